@@ -1,0 +1,345 @@
+"""Forward kinematics of a joint chain: joint angles to the pose of the link with the skin."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from edge.errors import InputError
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: a fixed step (`origin`), then the motion about or along `axis`, then another.
+
+    A URDF gives `origin_xyz` and `origin_rpy`; an arm that is written as "turn, then go on"
+    (Cody's) gives `translate`. Lengths in metres, angles in radians; limits for `q`.
+    """
+
+    name: str
+    axis: Vector
+    kind: str = "revolute"
+    origin_xyz: Vector = ZERO
+    origin_rpy: Vector = ZERO
+    translate: Vector = ZERO
+    limits: tuple[float, float] | None = None
+
+
+class Chain:
+    """Joints from a base to a tip.
+
+    >>> chain = Chain.cody()
+    >>> chain.pose([0.0] * 5)[:3, 3].round(5).tolist()
+    [0.00635, -0.21668, -0.55648]
+    """
+
+    def __init__(self, joints: Sequence[Joint], base: str = "base", tip: str = "tip") -> None:
+        """Chain the joints; a `kind` of "fixed" takes no angle.
+
+        Raises:
+            InputError: a joint's axis is zero or a number is not finite.
+        """
+        self.joints = tuple(joints)
+        self.base, self.tip = base, tip
+        self._before: list[NDArray[np.float64]] = []
+        self._moving: list[Joint] = []
+        fixed = np.eye(4)
+        for joint in self.joints:
+            _check_joint(joint)
+            fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
+            if joint.kind != "fixed":
+                self._moving.append(joint)
+                self._before.append(fixed)
+                fixed = np.eye(4)
+            fixed = fixed @ _transform(joint.translate, ZERO)
+        self._after = fixed
+        n = len(self._moving)
+        self._slides = np.array([j.kind == "prismatic" for j in self._moving], dtype=bool)
+        self._axes = np.zeros((n, 3))
+        self._k = np.zeros((n, 3, 3))
+        for i, joint in enumerate(self._moving):
+            x, y, z = np.array(joint.axis, dtype=float) / math.hypot(*joint.axis)
+            self._axes[i] = x, y, z
+            if not self._slides[i]:
+                self._k[i] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+        self._k2 = self._k @ self._k
+
+    @property
+    def dof(self) -> int:
+        """How many angles `pose` takes."""
+        return len(self._moving)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The moving joints' names, in the order of the angles."""
+        return tuple(j.name for j in self._moving)
+
+    @property
+    def limits(self) -> tuple[tuple[float, float] | None, ...]:
+        """(lower, upper) of each moving joint in radians (metres where it slides), or None."""
+        return tuple(j.limits for j in self._moving)
+
+    def pose(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Pose of the tip in the base's frame.
+
+        Rotations by Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2, where 1 - cos is
+        taken as 2 sin^2(q/2), which keeps its digits at small angles.
+
+        Args:
+            q: (dof,) or (..., dof) radians (metres for a sliding joint), base to tip.
+
+        Returns:
+            (4, 4) or (..., 4, 4) homogeneous transform, metres.
+
+        Raises:
+            InputError: the number of angles is not `dof`, or one is not finite.
+        """
+        try:
+            angles = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"joint angles must be numbers, not {q!r}") from None
+        if angles.ndim == 0 or angles.shape[-1] != self.dof:
+            given = angles.shape[-1] if angles.ndim else "a single number"
+            raise InputError(
+                f"the arm {self.base} to {self.tip} takes {self.dof} joint angles "
+                f"({', '.join(self.names)}), not {given}"
+            )
+        if not np.isfinite(angles).all():
+            bad = np.argwhere(~np.isfinite(angles))[0][-1]
+            raise InputError(f"the angle of joint {self.names[bad]} is not finite")
+        motion = np.zeros((*angles.shape, 4, 4))
+        motion[..., 3, 3] = 1.0
+        turn = np.where(self._slides, 0.0, angles)[..., None, None]
+        half = np.sin(0.5 * turn)
+        motion[..., :3, :3] = np.eye(3) + np.sin(turn) * self._k + 2.0 * half * half * self._k2
+        if self._slides.any():
+            motion[..., :3, 3] = np.where(self._slides, angles, 0.0)[..., None] * self._axes
+        pose = np.broadcast_to(np.eye(4), (*angles.shape[:-1], 4, 4))
+        for i, before in enumerate(self._before):
+            pose = pose @ before @ motion[..., i, :, :]
+        return np.asarray(pose @ self._after)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The chain as plain numbers, exact in JSON."""
+        joints = []
+        for j in self.joints:
+            entry: dict[str, Any] = {"name": j.name, "axis": list(j.axis), "type": j.kind}
+            for key in ("origin_xyz", "origin_rpy", "translate"):
+                if getattr(j, key) != ZERO:
+                    entry[key] = list(getattr(j, key))
+            if j.limits is not None:
+                entry["limits"] = list(j.limits)
+            joints.append(entry)
+        return {"base": self.base, "tip": self.tip, "joint": joints}
+
+    @classmethod
+    def from_dict(cls, arm: Mapping[str, Any], where: str = "arm") -> Chain:
+        """Read what `to_dict` or an arm's TOML file gives.
+
+        Raises:
+            InputError: a key is unknown or missing, or a value makes no sense.
+        """
+        if not isinstance(arm, Mapping):
+            raise InputError(f"{where}: an arm must be a table of base, tip and joints")
+        entries = arm.get("joint")
+        if not isinstance(entries, list) or not entries:
+            raise InputError(f"{where}: no [[joint]] given")
+        joints = [_joint_from(entry, i, where) for i, entry in enumerate(entries)]
+        unknown = set(arm) - {"base", "tip", "joint"}
+        if unknown:
+            raise InputError(
+                f"{where}: unknown key {sorted(unknown)[0]!r}; allowed: base, tip, joint"
+            )
+        return cls(joints, str(arm.get("base", "base")), str(arm.get("tip", "tip")))
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Chain:
+        """Read a chain from a TOML file like `edge/arms/cody.toml`.
+
+        Raises:
+            InputError: the file cannot be read, or is not a chain.
+        """
+        try:
+            with open(path, "rb") as file:
+                arm = tomllib.load(file)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: not TOML: {error}") from None
+        return cls.from_dict(arm, where=str(path))
+
+    @classmethod
+    def cody(cls) -> Chain:
+        """Right arm of Cody to the wrist frame that carries the skin: 5 angles."""
+        return cls.from_toml(Path(__file__).parent / "arms" / "cody.toml")
+
+    @classmethod
+    def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Chain:
+        """Read the joints between two links of a URDF file.
+
+        Raises:
+            InputError: the file cannot be read, or no chain leads from `base` to `tip`.
+        """
+        try:
+            root = ElementTree.parse(path).getroot()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        except (ElementTree.ParseError, ValueError, LookupError) as error:
+            raise InputError(f"{path}: not a URDF file: {error}") from None
+        if root.tag != "robot":
+            raise InputError(f"{path}: not a URDF file: its root is <{root.tag}>, not <robot>")
+        links = [link.get("name") for link in root.findall("link")]
+        for name in (base, tip):
+            if name not in links:
+                raise InputError(f"{path}: no link {name!r}; it has {', '.join(map(str, links))}")
+        parents: dict[str, ElementTree.Element] = {}
+        for element in root.findall("joint"):
+            parents[_attribute(path, element, "child", "link")] = element
+        joints: list[Joint] = []
+        link = tip
+        while link != base:
+            element = parents.pop(link, None)  # popped, so that a loop of links ends
+            if element is None:
+                raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
+            joints.append(_urdf_joint(path, element))
+            link = _attribute(path, element, "parent", "link")
+        return cls(joints[::-1], base, tip)
+
+
+def _check_joint(joint: Joint) -> None:
+    if joint.kind not in (*MOVING, "fixed"):
+        raise InputError(
+            f"joint {joint.name}: type {joint.kind!r} is not one of {', '.join((*MOVING, 'fixed'))}"
+        )
+    numbers = (*joint.axis, *joint.origin_xyz, *joint.origin_rpy, *joint.translate)
+    if not all(math.isfinite(x) for x in numbers):
+        raise InputError(f"joint {joint.name}: a number is not finite")
+    if joint.kind != "fixed" and math.hypot(*joint.axis) < 1e-9:
+        raise InputError(f"joint {joint.name}: its axis is zero; give a direction")
+    if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
+        raise InputError(f"joint {joint.name}: its limits {joint.limits} are turned round")
+
+
+def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
+    """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y, z."""
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
+            [-sp, cp * sr, cp * cr, xyz[2]],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def _vector(value: object, name: str, where: str) -> Vector:
+    if (
+        not isinstance(value, list | tuple)
+        or len(value) != 3
+        or any(isinstance(x, bool) or not isinstance(x, int | float) for x in value)
+    ):
+        raise InputError(f"{where}: {name} must be three numbers, not {value!r}")
+    x, y, z = map(float, value)
+    return x, y, z
+
+
+def _joint_from(entry: object, index: int, where: str) -> Joint:
+    if not isinstance(entry, Mapping):
+        raise InputError(f"{where}: joint {index} must be a table")
+    allowed = (
+        "name",
+        "type",
+        "axis",
+        "origin_xyz",
+        "origin_rpy",
+        "translate",
+        "limits",
+        "limits_deg",
+    )
+    unknown = set(entry) - set(allowed)
+    if unknown:
+        raise InputError(
+            f"{where}: joint {index} has an unknown key {sorted(unknown)[0]!r}; "
+            f"allowed: {', '.join(allowed)}"
+        )
+    name = str(entry.get("name", f"joint {index}"))
+    place = f"{where}: joint {name}"
+    if "axis" not in entry:
+        raise InputError(f"{place}: axis is missing")
+    vectors = {
+        key: _vector(entry[key], key, place)
+        for key in ("origin_xyz", "origin_rpy", "translate")
+        if key in entry
+    }
+    limits: tuple[float, float] | None = None
+    for key, unit in (("limits", 1.0), ("limits_deg", math.pi / 180.0)):
+        if key in entry:
+            pair = entry[key]
+            if not isinstance(pair, list) or len(pair) != 2:
+                raise InputError(f"{place}: {key} must be [lower, upper], not {pair!r}")
+            lower, upper, _ = _vector([*pair, 0.0], key, place)
+            limits = (lower * unit, upper * unit)
+    return Joint(
+        name=name,
+        axis=_vector(entry["axis"], "axis", place),
+        kind=str(entry.get("type", "revolute")),
+        limits=limits,
+        **vectors,
+    )
+
+
+def _attribute(
+    path: str | os.PathLike[str], element: ElementTree.Element, tag: str, name: str
+) -> str:
+    child = element.find(tag)
+    value = None if child is None else child.get(name)
+    if value is None:
+        raise InputError(f"{path}: joint {element.get('name')!r} has no <{tag} {name}=...>")
+    return value
+
+
+def _numbers(path: str | os.PathLike[str], text: str, what: str) -> Vector:
+    try:
+        x, y, z = map(float, text.split())
+    except ValueError:
+        raise InputError(f"{path}: {what} must be three numbers, not {text!r}") from None
+    return x, y, z
+
+
+def _urdf_joint(path: str | os.PathLike[str], element: ElementTree.Element) -> Joint:
+    name = str(element.get("name"))
+    kind = str(element.get("type"))
+    if kind not in (*MOVING, "fixed"):
+        raise InputError(f"{path}: joint {name!r} of type {kind!r} cannot be part of the chain")
+    origin, axis, limit = element.find("origin"), element.find("axis"), element.find("limit")
+    xyz = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+    rpy = "0 0 0" if origin is None else origin.get("rpy", "0 0 0")
+    limits: tuple[float, float] | None = None
+    if limit is not None and kind in ("revolute", "prismatic"):
+        text = f"{limit.get('lower', '0')} {limit.get('upper', '0')} 0"
+        lower, upper, _ = _numbers(path, text, f"limit of joint {name!r}")
+        limits = (lower, upper)
+    return Joint(
+        name=name,
+        axis=_numbers(
+            path, "1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"axis of joint {name!r}"
+        ),
+        kind=kind,
+        origin_xyz=_numbers(path, xyz, f"origin of joint {name!r}"),
+        origin_rpy=_numbers(path, rpy, f"origin of joint {name!r}"),
+        limits=limits,
+    )

@@ -1,0 +1,51 @@
+"""edge-classify: the robot computer's command."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from edge import __version__
+from edge.errors import EdgeError
+
+COMMANDS = ("replay", "verify")
+"""Modules of `edge.commands`, in the order of the help; each has `add_parser(subparsers)`,
+which sets `run`: a function of the parsed arguments that returns the exit status."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    top = argparse.ArgumentParser(
+        prog="edge-classify",
+        description="Tells from a touch on a robot's skin what was touched.",
+    )
+    top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        import_module(f"edge.commands.{name}").add_parser(commands)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
+    try:
+        arguments = parser().parse_args(argv)
+        status: int = arguments.run(arguments)
+        sys.stdout.flush()
+        return status
+    except EdgeError as error:
+        print(f"edge-classify: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # The reader of the lines has gone; what is left in the buffer has nowhere to go.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The same chips as models on a fake bus."""

@@ -1,0 +1,177 @@
+"""Shape, geometry and scale of a skin: what a taxel's index means in metres and newtons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+
+
+def _number(name: str, value: object, low: float, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{where}: skin.{name} must be a finite number, not {value!r}")
+    if value <= low:
+        raise InputError(f"{where}: skin.{name} must be above {low:g}, not {value!r}")
+    return float(value)
+
+
+@dataclass(frozen=True)
+class SkinLayout:
+    """A skin of `rows` x `cols` taxels, flat or on a cylinder about the link's z axis.
+
+    A flat skin lies in the link's x-y plane: columns along x, rows along y. On a cylinder
+    (`radius_m` given) rows go along z and columns around.
+    """
+
+    rows: int
+    cols: int
+    wraps: bool = False
+    """The last column touches the first."""
+    pitch_m: float | tuple[float, float] | None = None
+    """Distance between taxel centres, or (along rows, along columns); None where unknown."""
+    radius_m: float | None = None
+    row0_z_m: float = 0.0
+    """z of row 0 on a cylinder; z falls by the row pitch with each row (elbow to wrist)."""
+    column_angles_deg: tuple[float, ...] | None = None
+    """Angle of each column about z from x on a cylinder; even steps from 0 where None."""
+    counts_per_newton: float | None = None
+    """None: force stays in counts."""
+    threshold_counts: int = 0
+    """A taxel above this is in contact (paper, section III-B); the contact ends at it."""
+    onset_counts: int | None = None
+    """A contact begins when its region's peak is above this; `threshold_counts` where None."""
+
+    def __post_init__(self) -> None:
+        if not (1 <= self.rows <= 1024 and 1 <= self.cols <= 1024):
+            raise InputError(f"skin: {self.rows} x {self.cols} taxels; each must be 1 to 1024")
+        if self.column_angles_deg is not None and len(self.column_angles_deg) != self.cols:
+            raise InputError(
+                f"skin: column_angles_deg has {len(self.column_angles_deg)} values "
+                f"for {self.cols} columns"
+            )
+        if self.radius_m is not None and self.pitch_m is None:
+            raise InputError("skin: radius_m needs pitch_m, the distance between rows")
+        if self.onset < self.threshold_counts:
+            raise InputError(
+                f"skin: onset_counts {self.onset_counts} is below "
+                f"threshold_counts {self.threshold_counts}"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, cols)."""
+        return self.rows, self.cols
+
+    @property
+    def onset(self) -> int:
+        """Counts above which a contact begins."""
+        return self.threshold_counts if self.onset_counts is None else self.onset_counts
+
+    @property
+    def force_unit(self) -> str:
+        """`newton`, or `count` where the scale is unknown."""
+        return "count" if self.counts_per_newton is None else "newton"
+
+    @property
+    def length_unit(self) -> str:
+        """`metre`, or `taxel` where the pitch is unknown."""
+        return "taxel" if self.pitch_m is None else "metre"
+
+    def position(self, row: float, col: float) -> NDArray[np.float64]:
+        """Place of a point of the surface in the link's frame.
+
+        Args:
+            row: 0 to rows - 1, fractions allowed.
+            col: 0 to cols (cols is column 0 again where the skin wraps), fractions allowed.
+
+        Returns:
+            (3,) metres, or taxels where the pitch is unknown.
+        """
+        along, around = (
+            self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
+        )
+        if self.radius_m is None:
+            return np.array([col * around, row * along, 0.0])
+        angle = self._angle(col)
+        return np.array(
+            [
+                self.radius_m * math.cos(angle),
+                self.radius_m * math.sin(angle),
+                self.row0_z_m - row * along,
+            ]
+        )
+
+    def _angle(self, col: float) -> float:
+        """Angle of a fractional column in radians; between columns the shorter way round."""
+        if self.column_angles_deg is None:
+            return 2.0 * math.pi * col / self.cols
+        left = math.floor(col)
+        a = self.column_angles_deg[left % self.cols]
+        b = self.column_angles_deg[(left + 1) % self.cols]
+        step = (b - a + 180.0) % 360.0 - 180.0
+        return math.radians(a + (col - left) * step)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The layout as the `skin` object of a recording's or a model's metadata."""
+        out: dict[str, Any] = {}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if value is not None:
+                out[f.name] = list(value) if isinstance(value, tuple) else value
+        return out
+
+    @classmethod
+    def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> SkinLayout:
+        """Read the `skin` object of metadata; keys it does not know are left alone.
+
+        Raises:
+            InputError: a value is missing or makes no sense; `where` names the file.
+        """
+        if not isinstance(skin, Mapping):
+            raise InputError(f"{where}: skin must be an object, not {skin!r}")
+        known: dict[str, Any] = {}
+        for name in ("rows", "cols", "threshold_counts", "onset_counts"):
+            value = skin.get(name)
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 65535:
+                raise InputError(
+                    f"{where}: skin.{name} must be a whole number of 0 to 65535, not {value!r}"
+                )
+            known[name] = value
+        for name in ("rows", "cols"):
+            if name not in known:
+                raise InputError(f"{where}: skin.{name} is missing")
+        wraps = skin.get("wraps", False)
+        if not isinstance(wraps, bool):
+            raise InputError(f"{where}: skin.wraps must be true or false, not {wraps!r}")
+        known["wraps"] = wraps
+        for name in ("radius_m", "counts_per_newton"):
+            if skin.get(name) is not None:
+                known[name] = _number(name, skin[name], 0.0, where)
+        if skin.get("row0_z_m") is not None:
+            known["row0_z_m"] = _number("row0_z_m", skin["row0_z_m"], -math.inf, where)
+        pitch = skin.get("pitch_m")
+        if isinstance(pitch, list | tuple):
+            if len(pitch) != 2:
+                raise InputError(f"{where}: skin.pitch_m must be one number or two, not {pitch!r}")
+            known["pitch_m"] = tuple(_number("pitch_m", p, 0.0, where) for p in pitch)
+        elif pitch is not None:
+            known["pitch_m"] = _number("pitch_m", pitch, 0.0, where)
+        angles = skin.get("column_angles_deg")
+        if angles is not None:
+            if not isinstance(angles, list | tuple):
+                raise InputError(f"{where}: skin.column_angles_deg must be a list")
+            known["column_angles_deg"] = tuple(
+                _number("column_angles_deg", a, -math.inf, where) for a in angles
+            )
+        try:
+            return cls(**known)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None

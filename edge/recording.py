@@ -1,0 +1,270 @@
+"""One trial, one `.npz`: what the skin (and the arm) gave, with what is known about it."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.files import write_whole
+from edge.frame import Frame
+from edge.layout import SkinLayout
+
+LARGEST_BYTES = 1 << 30
+"""A trial that claims to be larger is taken for a damaged file."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One trial.
+
+    Attributes:
+        t: (n,) seconds, never going back; of frames at equal times the last one counts.
+        frames: (n, rows, cols) counts above baseline.
+        joints: (n, dof) radians, or None.
+        valid: (rows, cols) or (n, rows, cols), taxels that could be read, or None for all.
+        meta: `labels` {task: label}, `skin` (see `SkinLayout`), `source`, `trial`, and more.
+    """
+
+    t: NDArray[np.float64]
+    frames: NDArray[np.uint16]
+    joints: NDArray[np.float64] | None = None
+    valid: NDArray[np.bool_] | None = None
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """{task: label}; empty where the trial is not labelled."""
+        return dict(self.meta.get("labels", {}))
+
+    @property
+    def layout(self) -> SkinLayout:
+        """The skin that the trial was recorded with."""
+        skin = {"rows": self.frames.shape[1], "cols": self.frames.shape[2]}
+        return SkinLayout.from_dict({**skin, **self.meta.get("skin", {})})
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames as the live skin would give them."""
+        for i, t in enumerate(self.t.tolist()):
+            valid = self.valid
+            if valid is not None and valid.ndim == 3:
+                valid = valid[i]
+            joints = None if self.joints is None else self.joints[i]
+            yield Frame(t=t, counts=self.frames[i], valid=valid, joints=joints)
+
+
+def _check(path: str, recording: Recording) -> None:
+    """Raise InputError with one sentence where the trial is not as the contract says."""
+    t, frames, joints, valid = recording.t, recording.frames, recording.joints, recording.valid
+
+    def fail(what: str) -> None:
+        raise InputError(f"{path}: {what}")
+
+    if frames.dtype != np.uint16 or frames.ndim != 3:
+        fail(
+            f"frames must be uint16 (n, rows, cols), not {frames.dtype} {frames.shape}; "
+            "store counts above baseline"
+        )
+    n, rows, cols = frames.shape
+    if n == 0 or rows == 0 or cols == 0:
+        fail(f"frames are empty {frames.shape}; record at least one frame")
+    if t.dtype != np.float64 or t.shape != (n,):
+        fail(f"t must be float64 ({n},) for {n} frames, not {t.dtype} {t.shape}")
+    if not np.isfinite(t).all():
+        fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
+    back = np.flatnonzero(np.diff(t) < 0)
+    if back.size:
+        fail(f"time goes back at frame {int(back[0]) + 1}; sort the frames or split the recording")
+    if joints is not None:
+        if joints.dtype != np.float64 or joints.ndim != 2 or joints.shape[0] != n:
+            fail(
+                f"joints must be float64 ({n}, dof) for {n} frames, "
+                f"not {joints.dtype} {joints.shape}"
+            )
+        if joints.shape[1] == 0:
+            fail("joints have no column; leave them out where the arm is unknown")
+        finite = np.isfinite(joints).all(axis=1)
+        if not finite.all():
+            fail(f"a joint angle of frame {int(np.argmin(finite))} is not finite")
+    if valid is not None and (
+        valid.dtype != np.bool_ or valid.shape not in ((rows, cols), (n, rows, cols))
+    ):
+        fail(
+            f"valid must be bool ({rows}, {cols}) or ({n}, {rows}, {cols}), "
+            f"not {valid.dtype} {valid.shape}"
+        )
+    meta = recording.meta
+    if not isinstance(meta, dict):
+        fail("meta must be a JSON object")
+    labels = meta.get("labels", {})
+    if not isinstance(labels, dict) or not all(
+        isinstance(k, str) and k and isinstance(v, str) and v for k, v in labels.items()
+    ):
+        fail("meta.labels must map task names to labels, both text")
+    skin = meta.get("skin", {})
+    if not isinstance(skin, dict):
+        fail("meta.skin must be an object")
+    layout = SkinLayout.from_dict({"rows": rows, "cols": cols, **skin}, where=path)
+    if layout.shape != (rows, cols):
+        fail(f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}")
+
+
+def _array(path: str, archive: zipfile.ZipFile, key: str) -> NDArray[Any]:
+    """One array of the archive; its header is read before anything is allocated."""
+    with archive.open(f"{key}.npy") as file:
+        version = np.lib.format.read_magic(file)
+        read = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }.get(version)
+        if read is None:
+            raise InputError(f"{path}: {key} is in an unknown npy version {version}")
+        shape, _, dtype = read(file)
+        if dtype.hasobject:
+            raise InputError(f"{path}: {key} holds Python objects; store plain numbers")
+        size = dtype.itemsize
+        for extent in shape:
+            size *= extent
+        if size > LARGEST_BYTES or size > archive.getinfo(f"{key}.npy").file_size:
+            raise InputError(f"{path}: {key} claims {size} bytes, more than the file holds")
+    with archive.open(f"{key}.npy") as file:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+
+
+def load_arrays(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+    """All arrays of an `.npz`, without pickle.
+
+    Raises:
+        InputError: the file is missing, damaged, or holds something other than plain arrays.
+    """
+    name = os.fspath(path)
+    try:
+        with zipfile.ZipFile(name) as archive:
+            keys = [m.removesuffix(".npy") for m in archive.namelist() if m.endswith(".npy")]
+            return {key: _array(name, archive, key) for key in keys}
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"{name}: no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{name}: is a folder, not an .npz file") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        ValueError,
+        KeyError,
+        EOFError,
+        MemoryError,
+        NotImplementedError,
+        RuntimeError,
+        SyntaxError,
+        TypeError,
+        OverflowError,
+        RecursionError,
+    ) as error:
+        raise InputError(
+            f"{name}: not a readable .npz file ({type(error).__name__}); copy or record it again"
+        ) from None
+
+
+def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
+    """The JSON object under `meta`."""
+    raw = arrays.get("meta")
+    if raw is None:
+        raise InputError(f"{name}: meta is missing; store a JSON object as text under it")
+    if raw.dtype.kind != "U" or raw.size != 1:
+        raise InputError(f"{name}: meta must be one JSON text, not {raw.dtype} {raw.shape}")
+    try:
+        meta = json.loads(str(raw.reshape(())[()]), parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: meta is not JSON: {error}") from None
+    if not isinstance(meta, dict):
+        raise InputError(f"{name}: meta must be a JSON object, not {type(meta).__name__}")
+    return meta
+
+
+def _no_constant(text: str) -> None:
+    raise ValueError(f"{text} is not a JSON number")
+
+
+def load(path: str | os.PathLike[str]) -> Recording:
+    """Read a recording.
+
+    Raises:
+        InputError: the file is missing, damaged, or not as the contract says; the sentence
+            names the file and what to do.
+    """
+    name = os.fspath(path)
+    arrays = load_arrays(name)
+    for key in ("t", "frames"):
+        if key not in arrays:
+            raise InputError(f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}")
+    recording = Recording(
+        t=arrays["t"],
+        frames=arrays["frames"],
+        joints=arrays.get("joints"),
+        valid=arrays.get("valid"),
+        meta=load_meta(name, arrays),
+    )
+    _check(name, recording)
+    return recording
+
+
+def save(path: str | os.PathLike[str], recording: Recording, *, overwrite: bool = True) -> None:
+    """Write a recording, whole or not at all; the same recording gives the same bytes.
+
+    Raises:
+        InputError: the recording is not as the contract says, `path` cannot be written, or
+            it exists and `overwrite` is False.
+    """
+    name = os.fspath(path)
+    _check(name, recording)
+    arrays: dict[str, NDArray[Any]] = {"t": recording.t, "frames": recording.frames}
+    if recording.joints is not None:
+        arrays["joints"] = recording.joints
+    if recording.valid is not None:
+        arrays["valid"] = recording.valid
+    save_arrays(name, arrays, recording.meta, overwrite=overwrite)
+
+
+def save_arrays(
+    path: str | os.PathLike[str],
+    arrays: dict[str, NDArray[Any]],
+    meta: dict[str, Any],
+    *,
+    overwrite: bool = True,
+) -> None:
+    """Write arrays and their JSON metadata as one `.npz`, whole or not at all."""
+    text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    with write_whole(path, overwrite=overwrite) as file:
+        np.savez(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+
+
+def find(paths: list[str]) -> list[Path]:
+    """The `.npz` files named, and those in the folders named (sorted, folders within too).
+
+    Raises:
+        InputError: a path does not exist, or a folder holds no recording.
+    """
+    found: list[Path] = []
+    for text in paths:
+        path = Path(text)
+        if path.is_dir():
+            inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
+            if not inside:
+                raise InputError(f"{path}: no .npz recording in this folder")
+            found += inside
+        else:
+            found.append(path)
+    return found

@@ -1,0 +1,1 @@
+"""A fitted pipeline to model.onnx and golden.npz."""

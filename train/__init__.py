@@ -1,0 +1,1 @@
+"""The workstation: recordings to a fitted pipeline."""
