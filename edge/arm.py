@@ -211,7 +211,7 @@ class Chain:
         joints: list[Joint] = []
         link = tip
         while link != base:
-            element = parents.pop(link, None)  # popped, so that a loop of links ends
+            element = parents.pop(link, None)  # type: ignore[arg-type]  # popped, so that a loop of links ends
             if element is None:
                 raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
             joints.append(_urdf_joint(path, element))
