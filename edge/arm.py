@@ -211,9 +211,9 @@ class Chain:
         joints: list[Joint] = []
         link = tip
         while link != base:
-            element = parents.pop(link, None)  # type: ignore[arg-type]  # popped, so that a loop of links ends
-            if element is None:
+            if link not in parents:
                 raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
+            element = parents.pop(link)  # popped, so that a loop of links ends
             joints.append(_urdf_joint(path, element))
             link = _attribute(path, element, "parent", "link")
         return cls(joints[::-1], base, tip)
