@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,7 +41,7 @@ def feature_vector(
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
     if series.t.size == 0:
         raise InputError("the contact has no frame")
-    times = np.arange(samples) * (window_s / (samples - 1))
+    times = np.arange(samples, dtype=np.float64) * (window_s / (samples - 1))
     vector = np.empty((len(FEATURES), samples))
     vector[:2] = _resample(times, series.t, np.stack([series.max_force, series.contact_area]))
     known = np.isfinite(series.contact_motion)
@@ -53,7 +55,7 @@ def feature_vector(
 
 
 def _resample(
-    times: NDArray[np.float64], t: NDArray[np.float64], values: NDArray[np.float64]
+    times: NDArray[np.float64], t: NDArray[np.float64], values: NDArray[Any]
 ) -> NDArray[np.float64]:
     """Values (..., n) at `t` to `times`, which stay within their neighbours whatever the step.
 

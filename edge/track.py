@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +62,7 @@ class FeatureSeries:
     def max_force(self) -> NDArray[np.float64]:
         """(n,) newtons, or counts where the scale is unknown."""
         scale = 1.0 if self.counts_per_newton is None else self.counts_per_newton
-        return self.peak / scale
+        return np.asarray(self.peak / scale, dtype=np.float64)
 
     @property
     def contact_area(self) -> NDArray[np.int64]:
@@ -266,8 +265,3 @@ class Tracker:
             contact.ended = True
             self._contact, self._confirmed, self._run = None, False, 0
         return contact
-
-    def to_dict(self) -> dict[str, Any]:
-        """The settings as plain numbers, for a model's metadata."""
-        s = self.settings
-        return {"debounce": s.debounce, "release": s.release, "connectivity": s.connectivity}
