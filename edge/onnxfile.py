@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from edge.errors import InputError
 
 OPERATORS = frozenset(
-    [
+    {
         "Add",
         "And",
         "ArgMax",
@@ -38,7 +38,7 @@ OPERATORS = frozenset(
         "TopK",
         "Unsqueeze",
         "Where",
-    ]
+    }
 )
 """The operators, all of the standard domain, that an exported model may use."""
 
