@@ -50,6 +50,7 @@ def trials(path: Path) -> Iterator[tuple[str, Recording]]:
         pitch_m=PITCH_M,
         threshold_counts=THRESHOLD_COUNTS,
         onset_counts=ONSET_COUNTS,
+        dead=tuple(np.flatnonzero(~valid).tolist()),
     )
     for i, (a, b) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
         side_by_side = np.zeros((b - a, rows, 2 * cols + 1), dtype=np.uint16)
