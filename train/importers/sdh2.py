@@ -18,8 +18,8 @@ from edge.recording import Recording, load_arrays
 PITCH_M = 0.0034
 THRESHOLD_COUNTS = 50
 """Separates contact from noise on these pads (measured by their publishers' recordings)."""
-ONSET_COUNTS = 100
-"""Twice the threshold, so that one noisy texel begins no contact."""
+ONSET_COUNTS = 60
+"""A little above the threshold, so that a force that hovers there is one contact."""
 
 
 def trials(path: Path) -> Iterator[tuple[str, Recording]]:
