@@ -126,21 +126,23 @@ def window(state: State) -> None:
     away = np.take_along_axis(away, state["columns"], axis=0)
     state["gaps"] = skin.radius_m * (1.0 - np.cos(away))
     reach = np.where(away < 0.5 * math.pi, 1.0, 0.0)
-    breadth = state["values"].get("breadth_m")
-    if breadth is not None:
-        # A narrow face ends among the columns; the nearest one always meets it.
-        across = skin.radius_m * np.sin(away)
-        pitch = skin.radius_m * 2.0 * math.pi / skin.cols
-        reach = reach * np.clip((0.5 * breadth + 0.5 * pitch - across) / pitch, 0.0, 1.0)
-        reach = np.where(away == away.min(axis=0), np.maximum(reach, 0.2), reach)
-    state["reach"] = reach
+    # A narrow face ends among the columns; no face is narrower than a taxel.
+    pitch = skin.radius_m * 2.0 * math.pi / skin.cols
+    half = 0.5 * np.maximum(state["values"]["breadth_m"], pitch)
+    across = skin.radius_m * np.sin(away)
+    state["reach"] = reach * np.clip((half + 0.5 * pitch - across) / pitch, 0.0, 1.0)
+
+
+FLAT_M = 1e6
+"""Radius of a face that does not curve."""
 
 
 def lay_bed(state: State) -> None:
     """Lines are the skin's rows, as far as the object's face covers each."""
     offset = state["row_z"] - state["z"]
     state["weight"] = covered(offset, state)
-    state["line_gap"] = curve_gap(offset, state)
+    curved = (state["values"]["radius_m"] < FLAT_M).any()
+    state["line_gap"] = curve_gap(offset, state) if curved else np.zeros((1, 1))
     state["stiffness"] = state["reach"] * state["taxel_k"]
     state["lines"] = slice(0, len(offset))
 
@@ -154,16 +156,13 @@ def covered(offset: Array, state: State) -> Array:
 
 def curve_gap(offset: Array, state: State) -> Array:
     """(L, n) how far a face curved along the forearm has drawn back: l^2 / (2 r)."""
-    radius = state["values"].get("radius_m")
-    if radius is None:
-        return np.zeros((1, 1))
-    return np.asarray(offset * offset / (2.0 * radius))
+    return np.asarray(offset * offset / (2.0 * state["values"]["radius_m"]))
 
 
 def order_bed(state: State) -> None:
     """The bed's law as lines K a - B; a flat face needs one for each column only."""
     gaps, stiffness, weight = state["gaps"], state["stiffness"], state["weight"]
-    if state["line_gap"].shape[0] == 1:
+    if len(state["line_gap"]) == 1 < len(weight):
         covered_rows = total(weight)
         state["slopes"], state["intercepts"] = sort_bed(gaps, stiffness * covered_rows)
         return

@@ -34,19 +34,20 @@ class Trial:
 
 @dataclass(frozen=True)
 class Kind:
-    """Trials that run the same plan on beds of the same form."""
+    """Trials that run the same plan on beds of the same form, and so can share a batch."""
 
     effects: tuple[str, ...]
-    keys: tuple[str, ...]
-    """The object's values that exist; a bed of a curved or narrow face has another form."""
+    curved: bool
+    """Rows lie at different depths; a flat bed's law needs one line a column only."""
     stems: int
 
 
 def kind_of(scene: Scene, thing: SceneObject, condition: str) -> Kind:
     """What an object's trials have in common with others that can share their batch."""
-    keys = tuple(k for k in OBJECT if k in thing.values)
+    effects = tuple(callers(scene, thing, condition))
+    curved = "radius_m" in thing.given and "tilt" not in effects
     stems = int(thing.values["stem_count"].low) if "stem_count" in thing.values else 0
-    return Kind(tuple(callers(scene, thing, condition)), keys, stems)
+    return Kind(effects, curved, stems)
 
 
 @dataclass(frozen=True)
@@ -117,8 +118,8 @@ def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
 
 def frame_count(scene: Scene) -> int:
     """Frames of a trial: the longest lead, what follows, and the frame at t = 0."""
-    duration = scene.lead.high + float(scene.trials["after_s"] or 0.0)
-    return round(duration * float(scene.trials["rate_hz"] or 0.0)) + 1
+    duration = scene.lead.high + scene.trials["after_s"]
+    return round(duration * scene.trials["rate_hz"]) + 1
 
 
 def begin(
@@ -161,7 +162,7 @@ def run_batch(
     plan = plan or make_plan(scene, kind.effects)
     values = values_of(scene, trials) if values is None else values
     frames = frame_count(scene)
-    rate_hz = float(scene.trials["rate_hz"] or 0.0)
+    rate_hz = scene.trials["rate_hz"]
     substeps = max(1, round(1.0 / (rate_hz * step_s)))
     step_s = 1.0 / (rate_hz * substeps)
     state = begin(scene, plan, trials, step_s, values)

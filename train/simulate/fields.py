@@ -49,8 +49,7 @@ TRIALS = {
     "lead_s": Field(0.02, 10.0, 0.2, "time before the skin reaches the object"),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
-    "step_s": Field(1e-6, 1.0, None, "the physics' step; chosen by measurement where absent"),
-    "tolerance": Field(1e-5, 0.5, 0.01, "what the step may cost, as a part of the peak force"),
+    "tolerance": Field(1e-5, 0.5, 0.005, "what the step may cost, as a part of the peak force"),
 }
 SKIN = {
     "counts_per_newton": Field(0.0, 1e6, 1000.0, "counts", open_low=True),
@@ -72,8 +71,8 @@ OBJECT = {
     "friction_static": Field(0.0, 5.0, None, "mu_s"),
     "friction_kinetic": Field(0.0, 5.0, None, "mu_k, at most friction_static"),
     "width_m": Field(0.0, 10.0, 1.0, "the face along the forearm", open_low=True),
-    "breadth_m": Field(0.0, 10.0, None, "the face across the forearm", open_low=True),
-    "radius_m": Field(0.0, 1e6, None, "how the face curves along the forearm", open_low=True),
+    "breadth_m": Field(0.0, 10.0, 10.0, "the face across the forearm", open_low=True),
+    "radius_m": Field(0.0, 1e6, 1e6, "how the face curves along the forearm", open_low=True),
     "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
     "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
     "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
@@ -223,6 +222,7 @@ EFFECTS: dict[str, EffectInfo] = {
         {"part": Field(0.0, 0.9, 0.02, "of all frames")},
     ),
 }
+STEP = Field(1e-6, 1.0, None, "the physics' step")
 IMPLIED_BY_FAMILY = {
     FOAM: ("foundation", "relaxation"),
     PILLOW: ("foundation", "relaxation"),

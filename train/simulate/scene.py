@@ -81,7 +81,9 @@ class Scene:
 
     name: str
     seed: int
-    trials: dict[str, float | None]
+    trials: dict[str, float]
+    step_s: dict[str, float]
+    """{effect, or `base`: the largest step that its trials may take}; empty: to be measured."""
     lead: Value
     arm: Chain
     stiffness: tuple[float, ...]
@@ -105,7 +107,7 @@ class Scene:
     @property
     def count(self) -> int:
         """Trials of each object in each condition."""
-        return int(self.trials["count"] or 0)
+        return int(self.trials["count"])
 
 
 class _Reader:
@@ -179,8 +181,10 @@ class _Reader:
         return tuple(value)
 
 
-def load(path: str | os.PathLike[str]) -> Scene:
-    """Read a scene.
+def load(
+    path: str | os.PathLike[str], *, seed: int | None = None, count: int | None = None
+) -> Scene:
+    """Read a scene; `seed` and `count` (trials) take the place of the file's.
 
     Raises:
         InputError: the file cannot be read, a key is unknown, a value makes no sense, or an
@@ -194,10 +198,14 @@ def load(path: str | os.PathLike[str]) -> Scene:
         raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{name}: not TOML: {error}") from None
+    if seed is not None:
+        table["seed"] = seed
+    if count is not None and isinstance(table.setdefault("trials", {}), dict):
+        table["trials"]["count"] = count
     return from_dict(table, where=name)
 
 
-TOP = ("name", "seed", "trials", "arm", "motion", "skin", "spread", "effects", "object")
+TOP = ("name", "seed", "trials", "step_s", "arm", "motion", "skin", "spread", "effects", "object")
 
 
 def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
@@ -212,6 +220,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
         raise read.fail("seed", f"must be a whole number of 0 to 2^63 - 1, not {seed!r}")
     trials, lead = _trials(read, read.table(table.get("trials", {}), "trials"))
+    step_s = _steps(read, read.table(table.get("step_s", {}), "step_s"), trials["rate_hz"])
     chain, stiffness, damping = _arm(read, read.table(table.get("arm", {}), "arm"))
     start, rate, travel_s, place = _motion(
         read, read.table(table.get("motion", {}), "motion"), chain
@@ -224,6 +233,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         name=read.text(table.get("name", Path(where).stem or "scene"), "name"),
         seed=seed,
         trials=trials,
+        step_s=step_s,
         lead=lead,
         arm=chain,
         stiffness=stiffness,
@@ -259,34 +269,34 @@ def _fields(
     }
 
 
-def _trials(
-    read: _Reader, table: Mapping[str, Any]
-) -> tuple[dict[str, float | None], Value]:
+def _trials(read: _Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], Value]:
     read.known(table, "trials", tuple(fields.TRIALS))
-    out: dict[str, float | None] = {}
-    for name, limits in fields.TRIALS.items():
-        if name == "lead_s":
-            continue
-        out[name] = (
-            read.number(table[name], f"trials.{name}", limits) if name in table else limits.default
-        )
-    count = table.get("count", 1)
-    if not isinstance(count, int):
-        raise read.fail("trials.count", f"must be a whole number, not {count!r}")
-    lead = read.value(
-        table.get("lead_s", fields.TRIALS["lead_s"].default),
-        "trials.lead_s",
-        fields.TRIALS["lead_s"],
-    )
-    frame = 1.0 / float(out["rate_hz"] or 1.0)
-    step = out["step_s"]
-    if step is not None:
+    out = {
+        name: read.number(table.get(name, limits.default), f"trials.{name}", limits)
+        for name, limits in fields.TRIALS.items()
+        if name != "lead_s"
+    }
+    if out["count"] != int(out["count"]):
+        raise read.fail("trials.count", f"must be a whole number, not {out['count']!r}")
+    limits = fields.TRIALS["lead_s"]
+    return out, read.value(table.get("lead_s", limits.default), "trials.lead_s", limits)
+
+
+def _steps(read: _Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, float]:
+    read.known(table, "step_s", ("base", *EFFECTS))
+    if table and "base" not in table:
+        raise read.fail("step_s.base", "is missing: the step of trials without the others named")
+    frame = 1.0 / rate_hz
+    out: dict[str, float] = {}
+    for name, value in table.items():
+        step = read.number(value, f"step_s.{name}", fields.STEP)
         ratio = frame / step
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6 * ratio:
             raise read.fail(
-                "trials.step_s", f"must divide the frame's {frame:g} s evenly, not {step!r}"
+                f"step_s.{name}", f"must divide the frame's {frame:g} s evenly, not {step:g}"
             )
-    return out, lead
+        out[name] = step
+    return out
 
 
 def _arm(
