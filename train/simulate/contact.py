@@ -39,7 +39,7 @@ def total(values: Array) -> Array:
 
     `np.sum` adds so too, unless the batch is one wide: then it adds in pairs.
     """
-    if values[0].size == 1:
+    if values.shape[-1] == 1:
         return np.asarray(np.add.accumulate(values, axis=0)[-1])
     return np.asarray(np.add.reduce(values, axis=0))
 
@@ -70,26 +70,20 @@ def touching(gaps: Array, deepest: Array) -> slice:
 
     The others add exact zeros, so leaving them out changes no bit.
     """
-    touched = np.flatnonzero((gaps < deepest).any(axis=1))
-    return slice(int(touched[0]), int(touched[-1]) + 1) if len(touched) else slice(0, 0)
+    touched = (gaps < deepest).any(axis=1).nonzero()[0]
+    return slice(int(touched[0]), int(touched[-1]) + 1) if touched.size else slice(0, 0)
 
 
 def line_forces(state: State, depths: Array) -> tuple[Array, Array]:
     """(L, n) force and stiffness of each line at its depth (L, n)."""
-    force = np.zeros_like(depths)
-    stiffness = np.zeros_like(depths)
-    inside, held = np.empty_like(depths), np.empty_like(depths)
     some = touching(state["gaps"], depths.max(axis=0))
-    for gap, k in zip(state["gaps"][some], state["stiffness"][some], strict=True):
-        np.subtract(depths, gap, out=inside)
-        np.multiply(inside > 0.0, k, out=held)
-        stiffness += held
-        inside *= held
-        force += inside
+    if some.stop == 0:
+        return np.zeros_like(depths), np.zeros_like(depths)
+    inside = depths - state["gaps"][some, None]
+    held = (inside > 0.0) * state["stiffness"][some, None]
+    inside *= held
     weight = state["weight"]
-    force *= weight
-    stiffness *= weight
-    return force, stiffness
+    return total(inside) * weight, total(held) * weight
 
 
 def spring_loads(depths: Array, gaps: Array, stiffness: Array, weight: Array) -> Array:

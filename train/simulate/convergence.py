@@ -38,7 +38,7 @@ def middle_values(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
     """{name: (n,)} of trials in the middle of every range, without spread."""
     out: dict[str, Array] = {}
     for name in trials[0].thing.values:
-        out[name] = np.array([trial.thing.values[name].middle for trial in trials])
+        out[name] = np.array([trial.thing.values[name].middle if name in trial.thing.values else np.nan for trial in trials])
     n = len(trials)
     out["lead_s"] = np.full(n, scene.lead.middle)
     out["taxel_n_m"] = np.full(n, scene.taxel_n_m.middle)

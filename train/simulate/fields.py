@@ -49,7 +49,7 @@ TRIALS = {
     "lead_s": Field(0.02, 10.0, 0.2, "time before the skin reaches the object"),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
-    "tolerance": Field(1e-5, 0.5, 0.005, "what the step may cost, as a part of the peak force"),
+    "tolerance": Field(1e-5, 0.5, 0.01, "what the step may cost, as a part of the peak force"),
 }
 SKIN = {
     "counts_per_newton": Field(0.0, 1e6, 1000.0, "counts", open_low=True),

@@ -75,16 +75,15 @@ def order(state: State) -> None:
 
 def line_forces(state: State, depths: Array) -> tuple[Array, Array]:
     """(L, n) force and stiffness of each line at its depth (L, n)."""
-    force = np.zeros_like(depths)
-    stiffness = np.zeros_like(depths)
-    alive = state["alive"][state["lines"]]
     some = touching(state["gaps"], depths.max(axis=0))
-    for i in range(some.start, some.stop):
-        inside = depths - state["gaps"][i]
-        held = state["stiffness"][i] * alive[:, i]
-        stiffness += (inside > 0.0) * held
-        force += np.maximum(inside, 0.0) * held
-    return force * state["weight"], stiffness * state["weight"]
+    if some.stop == 0:
+        return np.zeros_like(depths), np.zeros_like(depths)
+    alive = state["alive"][state["lines"], some].swapaxes(0, 1)
+    inside = depths - state["gaps"][some, None]
+    held = (inside > 0.0) * state["stiffness"][some, None]
+    held *= alive
+    inside *= held
+    return total(inside) * state["weight"], total(held) * state["weight"]
 
 
 def image(state: State) -> None:
