@@ -51,6 +51,8 @@ class Build:
     solve: Callable[..., Any] = base.solve
     owners: dict[Any, str] = field(default_factory=dict)
     owner: str = "base"
+    around: Callable[[str, Callable[..., Any]], Callable[..., Any]] = lambda owner, f: f
+    """What is put around each solver: nothing, or a clock."""
 
     def put(self, stage: str, rank: int, function: Function) -> None:
         """Add a function; within a stage the lower rank runs first."""
@@ -64,8 +66,7 @@ class Build:
 
     def wrap(self, solve: Callable[..., Any]) -> None:
         """Let `solve` answer for the contact; it may ask the one before it."""
-        self.solve = solve
-        self.owners[solve] = self.owner
+        self.solve = self.around(self.owner, solve)
 
     def settings(self, effect: str) -> dict[str, float]:
         """The effect's settings of the scene."""
@@ -75,9 +76,14 @@ class Build:
         return {**defaults, **self.scene.settings.get(effect, {})}
 
 
-def make_plan(scene: Scene, effects: tuple[str, ...]) -> Plan:
-    """Flatten a scene's trials with these effects to a plan."""
-    build = Build(scene, effects)
+def make_plan(
+    scene: Scene,
+    effects: tuple[str, ...],
+    around: Callable[[str, Callable[..., Any]], Callable[..., Any]] = lambda owner, f: f,
+) -> Plan:
+    """Flatten a scene's trials with these effects to a plan; `around` can time its solvers."""
+    build = Build(scene, effects, around=around)
+    build.wrap(base.solve)
     base.add(build)
     for name in effects:
         build.owner = name

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from edge.errors import EdgeError
 from train.simulate import base
 from train.simulate.arm import cross, dot
 from train.simulate.contact import Array, Coordinates, State, total
@@ -17,6 +18,8 @@ from train.simulate.plan import Build
 
 ROUNDS = 8
 """Plain Newton rounds before the line search takes over; two or three are usual."""
+GUARDED_ROUNDS = 5000
+"""A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
 CLOSE = (1e-14, 1e-13)
 """Metres and radians: a step below it is rounding."""
 
@@ -183,7 +186,7 @@ def guarded(
         return -(p[0] * g0 + p[1] * g1)
 
     small = np.zeros(len(where), dtype=bool)
-    for _ in range(60):
+    for _ in range(GUARDED_ROUNDS):
         loads, h = answer(part, y_)
         p = newton_step(c_, residual(y_, free_, c_, loads), h)
         small |= (np.abs(p[0]) <= CLOSE[0]) & (np.abs(p[1]) <= CLOSE[1])
@@ -196,9 +199,14 @@ def guarded(
             far = (end > 0.5 * np.abs(begin)) & ~small
             if not far.any():
                 break
-            cut = np.clip(begin / (begin - end), 0.1, 0.9)
+            cut = np.clip(begin / np.where(far, begin - end, 1.0), 0.1, 0.9)
             size = np.where(far, size * cut, size)
         y_ = (y_[0] - size * p[0], y_[1] - size * p[1])
+    else:
+        raise EdgeError(
+            f"the tilt of {int((~small).sum())} contacts was not found in {GUARDED_ROUNDS} rounds; "
+            "make the skin, the object or the step less extreme"
+        )
     out = (y[0].copy(), y[1].copy())
     out[0][where], out[1][where] = y_
     return out
