@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +39,19 @@ def draws(
     if kind == "uniform":
         return generator.random(count)[trials]
     return np.clip(generator.standard_normal(count), -2.5, 2.5)[trials]
+
+
+@cache
+def _quantiles() -> NDArray[np.float32]:
+    """The normal law in 65,536 equal parts, to +-4.3 deviations."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri((np.arange(65536) + 0.5) / 65536.0), dtype=np.float32)
+
+
+def noise(generator: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Normal numbers of mean 0 and deviation 1, each by 16 random bits: several times faster
+    than `standard_normal`, and finer than any taxel's reading."""
+    count = int(np.prod(shape))
+    words = np.frombuffer(generator.bytes(2 * count), dtype="<u2")
+    return _quantiles()[words].reshape(shape)

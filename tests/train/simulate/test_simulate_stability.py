@@ -209,7 +209,7 @@ class TestTraps:
         np.testing.assert_allclose(shared[held], force[held], rtol=1e-14)
 
     def test_newton_on_the_tilt_needs_its_line_search(self, monkeypatch):
-        state, free, c = tilt_cases(4000, seed=1)
+        state, free, c = tilt_cases(600, seed=1)
         left = tilt_error(state, free, c, tilt.solve(state, free, c))
         assert left.max() < 1e-9
         monkeypatch.setattr(tilt, "guarded", lambda state, y, free, c, open_: y)

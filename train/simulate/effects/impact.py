@@ -55,10 +55,11 @@ def rebound_stiffness(state: State, energy: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * energy / (high * high))
 
 def touch(state: State) -> None:
-    """The first touch's time: when the free arm crossed the surface, within the step."""
+    """The first touch's time: when the free arm met the first spring, within the step."""
     first = (state["loads"][0] > 0.0) & np.isinf(state["touched"])
     if first.any():
-        since = np.clip(state["y"][0] / state["approach"], 0.0, state["h"])
+        depth = state["y"][0] - state["intercepts"][0] / state["slopes"][0]
+        since = np.clip(depth / state["approach"], 0.0, state["h"])
         state["touched"] = np.where(first, state["t"] - since, state["touched"])
 
 def rebound(state: State) -> None:

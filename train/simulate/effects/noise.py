@@ -18,6 +18,6 @@ def add(build: Build) -> None:
         counts, seed = state["counts"], state["scene"].seed
         for i, trial in enumerate(state["trials"]):
             generator = streams.stream(seed, "noise", trial.key, trial.number)
-            counts[i] += generator.standard_normal(counts.shape[1:], dtype=np.float32) * size
+            counts[i] += streams.noise(generator, counts.shape[1:]) * size
 
     build.put("sensor", 40, hiss)
