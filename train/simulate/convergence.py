@@ -37,8 +37,8 @@ class Convergence:
 def middle_values(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
     """{name: (n,)} of trials in the middle of every range, without spread."""
     out: dict[str, Array] = {}
-    for name in trials[0].thing.values:
-        out[name] = np.array([trial.thing.values[name].middle if name in trial.thing.values else np.nan for trial in trials])
+    for name in set.intersection(*(set(trial.thing.values) for trial in trials)):
+        out[name] = np.array([trial.thing.values[name].middle for trial in trials])
     n = len(trials)
     out["lead_s"] = np.full(n, scene.lead.middle)
     out["taxel_n_m"] = np.full(n, scene.taxel_n_m.middle)
@@ -68,7 +68,6 @@ def measure(scene: Scene, trials: tuple[Trial, ...], halvings: int = HALVINGS) -
     steps_s = [frame]
     forces = [physics(scene, first, frame).force]
     changes: list[float] = []
-    chosen: float | None = None
     while len(steps_s) <= halvings:
         steps_s.append(steps_s[-1] / 2.0)
         forces.append(physics(scene, first, steps_s[-1]).force)
@@ -79,14 +78,11 @@ def measure(scene: Scene, trials: tuple[Trial, ...], halvings: int = HALVINGS) -
             order = _order(changes)
             error = changes[-2] / (1.0 - 2.0**-order)
             if error <= tolerance:
-                chosen = steps_s[-3]
                 break
     order = _order(changes)
     errors = tuple(change / (1.0 - 2.0**-order) for change in changes)
-    if chosen is None:
-        within = [s for s, e in zip(steps_s, errors, strict=False) if e <= tolerance]
-        chosen = within[0] if within else steps_s[-1]
-    return Convergence(tuple(steps_s), errors, order, chosen)
+    within = [s for s, e in zip(steps_s, errors, strict=False) if e <= tolerance]
+    return Convergence(tuple(steps_s), errors, order, within[0] if within else steps_s[-1])
 
 
 def _order(changes: list[float]) -> float:

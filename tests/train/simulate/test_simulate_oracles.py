@@ -204,11 +204,11 @@ class TestRelaxation:
         t = np.arange(2000)[:, None] * 1e-2
         beat = rng.uniform(0.05, 3.0, (3, 1, 40))
         depth = (np.sin(beat * t + rng.uniform(0, 6, (3, 1, 40))) * 0.01).sum(axis=0)
-        depth -= depth[0]
+        depth += 0.005 - depth[0]
         taken = np.zeros(40)
         least = np.zeros(40)
         before = force = np.zeros(40)
-        for place in depth:
+        for place in np.vstack([np.linspace(0.0, 0.005, 50)[:, None] + np.zeros(40), depth]):
             rig.state["start"] = place[None]
             now = rig.run(1).force[0]
             assert (now >= 0.0).all()
