@@ -46,7 +46,11 @@ class Watcher:
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
         self.tracker = Tracker(
-            self.layout, info.tracking, chain=info.chain, horizon_s=info.window_s
+            self.layout,
+            info.tracking,
+            chain=info.chain,
+            horizon_s=info.window_s,
+            features=info.features,
         )
         self._waiting: list[Contact] = []
         self._current: Contact | None = None
@@ -86,7 +90,7 @@ class Watcher:
 
     def _decide(self, contact: Contact, began: float, *, short: bool) -> list[Event]:
         info = self.model.info
-        vector = feature_vector(contact.series(), info.window_s, info.samples)
+        vector = feature_vector(contact.series(), info.window_s, info.samples, info.features)
         flags = [
             flag
             for flag, raised in (
