@@ -1,0 +1,233 @@
+"""A fake skin: a recording, or any scene, played onto the registers of fake chips."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.chips import ad7147
+from edge.errors import InputError
+from edge.fake.bus import FakeBus
+from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA9548A, Sense
+from edge.fake.clock import VirtualClock
+from edge.fake.faults import NO_FAULTS, Fault
+from edge.recording import Recording
+from edge.skin import Skin
+from edge.skinfile import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
+
+Scene = Callable[[float], NDArray[np.uint16]]
+"""Counts above baseline (rows, cols) at a time in seconds since the start."""
+
+REST = {"ad7147": 20946, "mpr121": 600, "block": 20946}
+"""Raw rest value where the skin's file has no calibration; Cody's real skin rests at 20946."""
+
+
+class Playback:
+    """A recording as a scene: each frame holds until the next.
+
+    >>> recording = Recording(np.array([0.0, 0.01]), np.zeros((2, 4, 4), np.uint16))
+    >>> Playback(recording).ends
+    0.02
+    """
+
+    def __init__(self, recording: Recording, *, loop: bool = False) -> None:
+        """Play it once, or over and over.
+
+        Args:
+            recording: what the skin will feel.
+            loop: start again at its end.
+        """
+        t = recording.t - recording.t[0]
+        self._t, self._frames = t, recording.frames
+        self._joints = recording.joints
+        steps = np.diff(t)
+        last = float(np.median(steps)) if steps.size else 0.01
+        self._length = float(t[-1]) + last
+        self._loop = loop
+
+    @property
+    def ends(self) -> float:
+        """When it is over, in seconds; infinity where it loops."""
+        return math.inf if self._loop else self._length
+
+    def _index(self, t: float) -> int:
+        if self._loop:
+            t %= self._length
+        # Half a microsecond: a time that is meant to be a frame's own finds that frame.
+        return max(0, int(np.searchsorted(self._t, t + 5e-7, side="right")) - 1)
+
+    def __call__(self, t: float) -> NDArray[np.uint16]:
+        """Counts above baseline (rows, cols) at `t`."""
+        return self._frames[self._index(t)]
+
+    def joints(self, t: float) -> NDArray[np.float64] | None:
+        """Joint angles (dof,) at `t`, where the recording has them."""
+        return None if self._joints is None else self._joints[self._index(t)]
+
+
+def calibrated(file: SkinFile) -> SkinFile:
+    """The file, with a calibration: of fake chips that make no noise where it has none."""
+    if file.calibration is not None:
+        return file
+    baseline = np.zeros(file.layout.rows * file.layout.cols, dtype=np.uint16)
+    for chip in file.chips:
+        for taxel in chip.taxels:
+            if taxel != UNUSED:
+                baseline[taxel] = _rest(chip)
+    shape = file.layout.shape
+    return replace(file, calibration=Calibration(baseline.reshape(shape), np.zeros(shape)))
+
+
+def _rest(chip: ChipSpec) -> int:
+    return min(REST[chip.kind], 128 if chip.bits == 8 else 2048 if chip.bits == 12 else 65535)
+
+
+def _top(chip: ChipSpec) -> int:
+    if chip.kind == "mpr121":
+        return 1023
+    return (1 << chip.bits) - 1 if chip.kind == "block" else 65534
+
+
+def fake_buses(
+    file: SkinFile,
+    scene: Scene,
+    clock: VirtualClock,
+    *,
+    timed: bool = False,
+    noise_counts: float = 0.0,
+    faults: Sequence[Fault] = NO_FAULTS,
+    seed: int = 0,
+) -> list[FakeBus]:
+    """Fake chips on fake buses, as the skin's file lays them out.
+
+    Args:
+        file: what is where; its calibration, where it has one, is what the chips rest at.
+        scene: what they feel.
+        clock: shared by the buses.
+        timed: the clock advances by the bits on the wire, and chips convert in their own time.
+        noise_counts: standard deviation of the raw values, drawn anew at each conversion.
+        faults: see `edge.fake.faults`.
+        seed: of noise and faults.
+    """
+    rest = calibrated(file).calibration
+    assert rest is not None
+    buses = []
+    for b, spec in enumerate(file.buses):
+        bus = FakeBus(
+            spec.device,
+            clock=clock,
+            clock_hz=spec.clock_hz,
+            timed=timed,
+            timeout_s=file.reading.timeout_s,
+            faults=faults,
+            seed=seed,
+        )
+        for c, chip in enumerate(spec.chips):
+            stream = np.random.default_rng([seed, b, c]) if noise_counts > 0.0 else None
+            sense = _sense(chip, scene, rest.baseline.ravel(), noise_counts, stream)
+            _attach(bus, chip, _model(chip, sense, timed))
+        buses.append(bus)
+    return buses
+
+
+def _sense(
+    chip: ChipSpec,
+    scene: Scene,
+    rest: NDArray[np.uint16],
+    noise: float,
+    stream: np.random.Generator | None,
+) -> Sense:
+    """Raw values of one chip: rest and sign turned back on."""
+    taxels = np.array(chip.taxels)
+    idle = taxels == UNUSED
+    base = np.where(idle, _rest(chip), rest[taxels]).astype(np.int64)
+    gain = np.where(idle, 0, chip.sign)
+    top = _top(chip)
+
+    def sense(t: float) -> NDArray[np.uint16]:
+        raw = base + gain * scene(t).reshape(-1)[taxels]
+        if stream is not None:
+            raw = raw + np.rint(noise * stream.standard_normal(len(base))).astype(np.int64)
+        return np.clip(raw, 1, top).astype(np.uint16)
+
+    return sense
+
+
+def _model(chip: ChipSpec, sense: Sense, timed: bool) -> FakeChip:
+    if chip.kind == "ad7147":
+        return FakeAD7147(sense, refresh_s=ad7147.REFRESH_S[chip.decimation] if timed else 0.0)
+    if chip.kind == "mpr121":
+        return FakeMPR121(sense)
+    return FakeBlock(sense, taxels=len(chip.taxels), bits=chip.bits)
+
+
+def _attach(bus: FakeBus, chip: ChipSpec, model: FakeChip) -> None:
+    if chip.mux is None or chip.channel is None:
+        bus.chips[chip.address] = model
+        return
+    mux = bus.chips.setdefault(chip.mux, FakeTCA9548A())
+    assert isinstance(mux, FakeTCA9548A)
+    mux.channels[chip.channel][chip.address] = model
+
+
+def fake_skin(
+    file: SkinFile,
+    scene: Scene,
+    *,
+    clock: VirtualClock | None = None,
+    timed: bool = False,
+    noise_counts: float = 0.0,
+    faults: Sequence[Fault] = NO_FAULTS,
+    seed: int = 0,
+) -> Skin:
+    """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
+    clock = clock or VirtualClock()
+    file = calibrated(file)
+    buses = fake_buses(
+        file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed
+    )
+    skin = Skin(file, buses, clock=clock)
+    skin.start()
+    clock.sleep_until(clock.now())
+    for bus in buses:
+        bus.inject(faults, seed)
+    return skin
+
+
+def still(file: SkinFile) -> Skin:
+    """A fake skin that nothing touches."""
+    silence = np.zeros(file.layout.shape, dtype=np.uint16)
+    return fake_skin(file, lambda t: silence)
+
+
+def play(file: SkinFile, recording: Recording, *, loop: bool = False) -> tuple[Skin, Playback]:
+    """A fake skin that feels a recording.
+
+    Raises:
+        InputError: the recording's shape is not the skin's.
+    """
+    if recording.frames.shape[1:] != file.layout.shape:
+        rows, cols = recording.frames.shape[1:]
+        raise InputError(
+            f"the recording has {rows} x {cols} taxels, the skin {file.name!r} "
+            f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
+        )
+    playback = Playback(recording, loop=loop)
+    return fake_skin(file, playback), playback
+
+
+def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
+    """Bits on each bus's wire for so many frames, counted as the drivers send them."""
+    skin = still(file)
+    with skin:
+        buses = [reader.bus for reader in skin._readers]
+        before = [bus.bits for bus in buses]  # type: ignore[attr-defined]
+        for _ in range(frames):
+            skin.read()
+        return [bus.bits - b for bus, b in zip(buses, before, strict=True)]  # type: ignore[attr-defined]
+
+
