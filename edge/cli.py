@@ -29,15 +29,15 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
+def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
+    """Parse and run; what goes wrong on purpose is one sentence on stderr and exit status 2."""
+    arguments = top.parse_args(argv)
     try:
-        arguments = parser().parse_args(argv)
         status: int = arguments.run(arguments)
         sys.stdout.flush()
         return status
     except EdgeError as error:
-        print(f"edge-classify: {error}", file=sys.stderr)
+        print(f"{top.prog}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
         # The reader of the lines has gone; what is left in the buffer has nowhere to go.
@@ -45,6 +45,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         return 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
+    return dispatch(parser(), argv)
 
 
 if __name__ == "__main__":

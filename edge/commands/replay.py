@@ -1,0 +1,86 @@
+"""`edge-classify replay`: the board's own path over recordings."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from edge.errors import InputError
+from edge.live import Event, Watcher, require_joints
+from edge.model import Model
+from edge.recording import Recording, find, load
+from edge.summary import Summary
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "replay",
+        help="decide on recordings, frame by frame",
+        description="Runs the board's own path over recordings and prints one JSON object a "
+        "line. A file that cannot be used is named on stderr and the others are still run; the "
+        "exit status is then 2.",
+    )
+    parser.add_argument("--model", required=True, help="model.onnx")
+    parser.add_argument(
+        "--summary",
+        action="store_true",
+        help="accuracy and a confusion matrix per task on stderr, where recordings are labelled",
+    )
+    parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
+    parser.set_defaults(run=run)
+
+
+def decide(model: Model, recording: Recording, name: str) -> list[Event]:
+    """All events of one recording.
+
+    Raises:
+        InputError: the recording does not suit the model; the sentence names `name`.
+    """
+    joints = recording.joints
+    require_joints(model, None if joints is None else joints.shape[1], name)
+    try:
+        watcher = Watcher(model, recording.layout)
+        events = [event for frame in recording for event in watcher.push(frame)]
+        events += watcher.finish()
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    if not any(event["event"] == "onset" for event in events):
+        events.append({"event": "no_contact"})
+    return events
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the events; 2 where a file could not be used."""
+    model = Model(arguments.model)
+    summary = Summary(model.info.tasks)
+    failed = 0
+    for path in _paths(arguments.recordings):
+        try:
+            recording = load(path)
+            events = decide(model, recording, str(path))
+        except InputError as error:
+            failed += 1
+            print(f"edge-classify: {error}", file=sys.stderr)
+            continue
+        labels = recording.labels
+        for event in events:
+            line = {"source": str(path), **event}
+            if event["event"] == "decision" and event["task"] in labels:
+                line["expected"] = labels[event["task"]]
+            print(json.dumps(line, ensure_ascii=False))
+        summary.add(labels, events)
+    if arguments.summary:
+        print(summary.text(), file=sys.stderr)
+    return 2 if failed else 0
+
+
+def _paths(texts: list[str]) -> list[Path]:
+    """The recordings named; a path that is missing is left to `load`, which says so."""
+    paths: list[Path] = []
+    for text in texts:
+        paths += find([text])
+    return paths

@@ -1,0 +1,47 @@
+"""`edge-classify verify`: is this machine's answer the golden one?"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from edge.golden import verify
+from edge.model import Model
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "verify",
+        help="run a golden file and compare, bit for bit where integers allow",
+        description="Runs the frames and vectors of a golden file on this machine and compares "
+        "every result with the one stored. Exit status 1 where one falls short.",
+    )
+    parser.add_argument("--model", required=True, help="model.onnx")
+    parser.add_argument("--golden", required=True, help="golden.npz, written with the model")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print a line a quantity; 1 where one falls short."""
+    checks = verify(Model(arguments.model), arguments.golden)
+    for check in checks:
+        line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
+        line["passed"] = check.passed
+        if check.worst < float("inf"):
+            line["share_of_bound"] = round(check.worst, 6)
+        if check.row is not None:
+            line |= {"worst_row": check.row, "seen": check.seen, "expected": check.expected}
+        print(json.dumps(line))
+    failed = [check for check in checks if not check.passed]
+    for check in failed:
+        print(
+            f"edge-classify: {check.name} differs, worst in row {check.row}: "
+            f"{check.seen} instead of {check.expected}",
+            file=sys.stderr,
+        )
+    if not failed:
+        print(f"edge-classify: {len(checks)} quantities are as in the golden file", file=sys.stderr)
+    return 1 if failed else 0

@@ -1,0 +1,298 @@
+"""model.onnx on the board: what it says of itself, and decisions."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from edge import onnxfile
+from edge.arm import Chain
+from edge.errors import EdgeError, InputError
+from edge.features import FEATURES
+from edge.layout import SkinLayout
+from edge.track import TrackSettings
+
+METADATA_KEY = "edge-classify"
+FORMAT = 1
+LARGEST_BYTES = 1 << 30
+
+
+@dataclass(frozen=True)
+class Task:
+    """One question that the model answers, and how it was fitted.
+
+    Attributes:
+        labels: the answers, in the order of the scores.
+        k: neighbours that vote.
+        components: principal components.
+        scaling: "none" or "I" to "V" (paper, Eqs. 1 to 5).
+        accuracy: leave-one-out accuracy at export, 0 to 1.
+    """
+
+    labels: tuple[str, ...]
+    k: int
+    components: int
+    scaling: str
+    accuracy: float
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """A model's metadata: all that the board needs besides the weights."""
+
+    tasks: dict[str, Task]
+    layout: SkinLayout
+    tracking: TrackSettings
+    window_s: float
+    samples: int
+    features: tuple[str, ...]
+    units: dict[str, str]
+    motion_frame: str
+    """`world` (with joint angles) or `skin`."""
+    chain: Chain | None
+    rows: int
+    """Training trials."""
+    data_digest: str
+    versions: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def width(self) -> int:
+        """Length of a feature vector."""
+        return len(self.features) * self.samples
+
+    def to_json(self) -> str:
+        """As the model file carries it."""
+        return json.dumps(
+            {
+                "format": FORMAT,
+                "tasks": {name: vars(task) for name, task in self.tasks.items()},
+                "skin": self.layout.to_dict(),
+                "tracking": vars(self.tracking),
+                "window_s": self.window_s,
+                "samples": self.samples,
+                "features": self.features,
+                "units": self.units,
+                "motion_frame": self.motion_frame,
+                "arm": None if self.chain is None else self.chain.to_dict(),
+                "rows": self.rows,
+                "data_digest": self.data_digest,
+                "versions": self.versions,
+            },
+            sort_keys=True,
+            allow_nan=False,
+            ensure_ascii=False,
+        )
+
+    @classmethod
+    def from_json(cls, text: str, name: str) -> ModelInfo:
+        """Read what `to_json` wrote.
+
+        Raises:
+            InputError: something is missing or of the wrong kind; the sentence names `name`.
+        """
+        try:
+            meta = json.loads(text)
+            if meta["format"] != FORMAT:
+                raise InputError(
+                    f"{name}: its format is {meta['format']}, this edge-classify reads {FORMAT}; "
+                    "export it with the same version"
+                )
+            info = cls(
+                tasks={
+                    str(task): Task(
+                        labels=tuple(map(str, entry["labels"])),
+                        k=int(entry["k"]),
+                        components=int(entry["components"]),
+                        scaling=str(entry["scaling"]),
+                        accuracy=float(entry["accuracy"]),
+                    )
+                    for task, entry in meta["tasks"].items()
+                },
+                layout=SkinLayout.from_dict(meta["skin"], where=name),
+                tracking=TrackSettings(**meta["tracking"]),
+                window_s=float(meta["window_s"]),
+                samples=int(meta["samples"]),
+                features=tuple(map(str, meta["features"])),
+                units={str(k): str(v) for k, v in meta["units"].items()},
+                motion_frame=str(meta["motion_frame"]),
+                chain=None if meta["arm"] is None else Chain.from_dict(meta["arm"], where=name),
+                rows=int(meta["rows"]),
+                data_digest=str(meta["data_digest"]),
+                versions={str(k): str(v) for k, v in meta.get("versions", {}).items()},
+            )
+        except InputError:
+            raise
+        except KeyError as error:
+            raise InputError(f"{name}: its metadata lacks {error}; export it again") from None
+        except (TypeError, ValueError, AttributeError, RecursionError):
+            raise InputError(f"{name}: its metadata cannot be read; export it again") from None
+        info._check(name)
+        return info
+
+    def _check(self, name: str) -> None:
+        if self.features != FEATURES:
+            raise InputError(
+                f"{name}: was made for the features {', '.join(self.features)}, "
+                f"this edge-classify measures {', '.join(FEATURES)}"
+            )
+        if not self.tasks or not all(task.labels for task in self.tasks.values()):
+            raise InputError(f"{name}: its metadata names no task or no label; export it again")
+        if not (0.0 < self.window_s <= 3600.0 and 2 <= self.samples <= 10000):
+            raise InputError(f"{name}: its window or samples make no sense; export it again")
+        if (self.motion_frame == "world") != (self.chain is not None):
+            raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The answer to one task.
+
+    Attributes:
+        label: what was touched.
+        confidence: the label's share of the votes, 0 to 1.
+        scores: (labels,) share of the votes of each label.
+        distances: (k,) of the neighbours, nearest first, in PCA space.
+        neighbours: (k,) rows of the training set, nearest first.
+        tie: another label had as many votes; the nearest of the tied won.
+    """
+
+    label: str
+    confidence: float
+    scores: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    neighbours: NDArray[np.int64]
+    tie: bool
+
+
+class Model:
+    """A `model.onnx`, ready to decide.
+
+    Raises:
+        InputError: the file is missing, is not an exported model, or contradicts itself.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, threads: int = 1) -> None:
+        """Load the file; one thread is fastest for models of this size."""
+        name = os.fspath(path)
+        data = _read(name)
+        contents = onnxfile.check(data, name)
+        text = contents.metadata.get(METADATA_KEY)
+        if text is None:
+            raise InputError(
+                f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
+            )
+        self.path = name
+        self.info = ModelInfo.from_json(text, name)
+        runtime = _onnxruntime()
+        options = runtime.SessionOptions()
+        options.intra_op_num_threads = threads
+        options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        try:
+            self._session = runtime.InferenceSession(
+                data, options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # onnxruntime's own exceptions share no base but this
+            raise InputError(
+                f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
+            ) from None
+        self._check(name)
+        self._names = [output.name for output in self._session.get_outputs()]
+        self._value = runtime.OrtValue.ortvalue_from_numpy(np.zeros((1, self.info.width)))
+        self._binding = self._session.io_binding()
+        self._binding.bind_ortvalue_input("features", self._value)
+        for output in self._names:
+            self._binding.bind_output(output)
+
+    def _check(self, name: str) -> None:
+        inputs = self._session.get_inputs()
+        shape = inputs[0].shape if inputs else []
+        if len(inputs) != 1 or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
+            raise InputError(f"{name}: has no float64 input `features`; export it again")
+        if len(shape) != 2 or shape[1] != self.info.width:
+            raise InputError(
+                f"{name}: takes {shape[1:]} features, its metadata says {self.info.width}; "
+                "export it again"
+            )
+        outputs = {output.name: output.shape for output in self._session.get_outputs()}
+        for task, entry in self.info.tasks.items():
+            widths = {"scores": len(entry.labels), "distances": entry.k, "neighbours": entry.k}
+            if f"{task}_label" not in outputs:
+                raise InputError(f"{name}: has no output {task}_label; export it again")
+            for part, width in widths.items():
+                shape = outputs.get(f"{task}_{part}")
+                if shape is None or len(shape) != 2 or shape[1] != width:
+                    raise InputError(
+                        f"{name}: has no output {task}_{part} of width {width}, "
+                        "as its metadata says; export it again"
+                    )
+
+    def run(self, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+        """The graph's outputs for vectors (n, width), unguarded; for checks and benchmarks."""
+        values = self._session.run(self._names, {"features": vectors})
+        return dict(zip(self._names, values, strict=True))
+
+    def decide(self, vector: ArrayLike) -> dict[str, Decision]:
+        """Decide all tasks for one feature vector.
+
+        Raises:
+            InputError: the vector has another length, or a value that is not finite (or is so
+                large that no distance to the training rows is).
+        """
+        x = np.asarray(vector, dtype=np.float64)
+        if x.shape != (self.info.width,):
+            raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
+        # One sum sees every NaN and infinity; where finite values overflow it, look closely.
+        if not math.isfinite(float(np.add.reduce(np.abs(x)))) and not np.isfinite(x).all():
+            bad = int(np.argmin(np.isfinite(x)))
+            feature = self.info.features[bad // self.info.samples]
+            raise InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
+        self._value.update_inplace(x[None])
+        self._session.run_with_iobinding(self._binding)
+        values = dict(zip(self._names, self._binding.copy_outputs_to_cpu(), strict=True))
+        return {name: _decision(name, task, values) for name, task in self.info.tasks.items()}
+
+
+def _decision(name: str, task: Task, values: Mapping[str, NDArray[Any]]) -> Decision:
+    index = int(values[f"{name}_label"][0])
+    if index < 0:
+        raise InputError("the features are too large for the model to measure a distance to them")
+    scores = values[f"{name}_scores"][0]
+    confidence = float(scores[index])
+    return Decision(
+        label=task.labels[index],
+        confidence=confidence,
+        scores=scores,
+        distances=values[f"{name}_distances"][0],
+        neighbours=values[f"{name}_neighbours"][0],
+        tie=int(np.count_nonzero(scores == confidence)) > 1,
+    )
+
+
+def _read(name: str) -> bytes:
+    try:
+        with open(name, "rb") as file:
+            data = file.read(LARGEST_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(f"{name}: no such model; make one with `make export`") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if len(data) > LARGEST_BYTES:
+        raise InputError(f"{name}: is larger than any model; copy or export it again")
+    return data
+
+
+def _onnxruntime() -> Any:
+    """onnxruntime, imported where a model is first needed: it is most of the start-up time."""
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise EdgeError(f"onnxruntime cannot be imported ({error}); install it with pip") from None
+    return onnxruntime

@@ -1,0 +1,267 @@
+"""Contacts over time: onset, one region followed, and the end; a contact's feature series."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.arm import Chain
+from edge.errors import InputError
+from edge.frame import Frame
+from edge.layout import SkinLayout
+from edge.region import Region, largest_region
+
+
+@dataclass(frozen=True)
+class TrackSettings:
+    """How a contact begins, is followed and ends; training and the board use the same."""
+
+    debounce: int = 2
+    """Frames in a row whose peak is above the skin's onset count before a contact is believed;
+    its onset is the first of them."""
+    release: int = 5
+    """Frames in a row without a taxel above the skin's threshold that end a contact."""
+    connectivity: int = 4
+
+    def __post_init__(self) -> None:
+        for name in ("debounce", "release"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1000:
+                raise InputError(f"{name} must be a whole number of 1 to 1000, not {value!r}")
+        if self.connectivity not in (4, 8):
+            raise InputError(f"connectivity must be 4 or 8, not {self.connectivity!r}")
+
+
+@dataclass(frozen=True)
+class FeatureSeries:
+    """What was measured on one contact, frame by frame from its onset.
+
+    Attributes:
+        t: (n,) seconds from onset, increasing, the first 0.
+        peak: (n,) largest count of the region; 0 without contact.
+        area: (n,) taxels of the region; 0 without contact.
+        sums: (n, 2) sums of rows and columns over the region's taxels: area times centroid.
+        motion: (n,) distance of the centroid from its place at onset, metres; its last value
+            is kept without contact; NaN where the arm's pose was not known.
+        counts_per_newton: scale of `peak`, or None.
+        ended: the contact ended with the last frame: force and area are zero from there on.
+    """
+
+    t: NDArray[np.float64]
+    peak: NDArray[np.int64]
+    area: NDArray[np.int64]
+    sums: NDArray[np.int64]
+    motion: NDArray[np.float64]
+    counts_per_newton: float | None = None
+    ended: bool = False
+
+    @property
+    def max_force(self) -> NDArray[np.float64]:
+        """(n,) newtons, or counts where the scale is unknown."""
+        scale = 1.0 if self.counts_per_newton is None else self.counts_per_newton
+        return np.asarray(self.peak / scale, dtype=np.float64)
+
+    @property
+    def contact_area(self) -> NDArray[np.int64]:
+        """(n,) taxels."""
+        return self.area
+
+    @property
+    def contact_motion(self) -> NDArray[np.float64]:
+        """(n,) metres (taxels where the pitch is unknown)."""
+        return self.motion
+
+
+@dataclass
+class Contact:
+    """A contact being followed."""
+
+    onset_s: float
+    layout: SkinLayout
+    chain: Chain | None
+    ended: bool = False
+    missing_taxels: bool = False
+    """A frame had taxels that could not be read."""
+    missing_pose: bool = False
+    """A frame came without the joint angles that motion needs."""
+    region: Region | None = None
+    """The region followed so far."""
+    _t: list[float] = field(default_factory=list)
+    _measured: list[tuple[int, int, int, int]] = field(default_factory=list)
+    _motion: list[float] = field(default_factory=list)
+    _start: NDArray[np.float64] | None = None
+
+    @property
+    def last_s(self) -> float:
+        """Time of the last frame taken in, seconds."""
+        return self.onset_s + (self._t[-1] if self._t else 0.0)
+
+    def add(self, frame: Frame, region: Region | None) -> None:
+        """Take in a frame; `region` is None where nothing is above the threshold."""
+        t = max(_time(frame, region) - self.onset_s, 0.0)
+        if self._t and t <= self._t[-1]:
+            # Two readings of one instant: the later one counts.
+            t = self._t[-1]
+            for series in (self._t, self._measured, self._motion):
+                series.pop()
+        self._t.append(t)
+        if frame.valid is not None and not self.missing_taxels:
+            self.missing_taxels = not bool(frame.valid.all())
+        if region is None:
+            self._measured.append((0, 0, 0, 0))
+            self._motion.append(self._motion[-1] if self._motion else 0.0)
+            return
+        self.region = region
+        self._measured.append((region.peak, region.area, *region.sums))
+        self._motion.append(self._moved(frame, region))
+
+    def _moved(self, frame: Frame, region: Region) -> float:
+        place = self.layout.position(*region.centroid)
+        if self.chain is not None:
+            if frame.joints is None:
+                self.missing_pose = True
+                return math.nan
+            pose = self.chain.pose(frame.joints)
+            place = pose[:3, :3] @ place + pose[:3, 3]
+        if self._start is None:
+            self._start = place
+        return math.dist(place, self._start)
+
+    def series(self) -> FeatureSeries:
+        """What was measured so far."""
+        measured = np.array(self._measured, dtype=np.int64).reshape(-1, 4)
+        return FeatureSeries(
+            t=np.array(self._t),
+            peak=measured[:, 0],
+            area=measured[:, 1],
+            sums=measured[:, 2:],
+            motion=np.array(self._motion),
+            counts_per_newton=self.layout.counts_per_newton,
+            ended=self.ended,
+        )
+
+
+def _time(frame: Frame, region: Region | None) -> float:
+    """When the region was read: the mean over its taxels, as a frame is a rolling shutter."""
+    if region is None or frame.times is None:
+        return frame.t
+    return float(frame.times[region.mask].mean())
+
+
+def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
+    """The device's geometry and scale with the model's thresholds, brought to its counts.
+
+    Raises:
+        InputError: the device is another skin than the model's.
+    """
+    for name, what in (("rows", "rows"), ("cols", "columns"), ("wraps", "wrap-around")):
+        ours, theirs = getattr(device, name), getattr(model, name)
+        if ours != theirs:
+            raise InputError(f"this skin has {what} {ours}, the model was made for {theirs}")
+    if device.force_unit != model.force_unit or device.length_unit != model.length_unit:
+        raise InputError(
+            f"this skin measures {device.force_unit} and {device.length_unit}, "
+            f"the model was made for {model.force_unit} and {model.length_unit}"
+        )
+    ratio = 1.0
+    if device.counts_per_newton is not None and model.counts_per_newton is not None:
+        ratio = device.counts_per_newton / model.counts_per_newton
+    return replace(
+        device,
+        threshold_counts=min(round(model.threshold_counts * ratio), 65535),
+        onset_counts=min(round(model.onset * ratio), 65535),
+    )
+
+
+class Tracker:
+    """Finds contacts in a stream of frames and follows one at a time.
+
+    A contact begins with the first of `debounce` frames in a row whose region has a peak above
+    the skin's onset count, and ends when `release` frames in a row have no taxel above its
+    threshold: two thresholds, so that a force that hovers at one of them is one contact.
+    """
+
+    def __init__(
+        self,
+        layout: SkinLayout,
+        settings: TrackSettings | None = None,
+        *,
+        chain: Chain | None = None,
+        horizon_s: float = math.inf,
+    ) -> None:
+        """Follow contacts on a skin.
+
+        Args:
+            layout: the skin, with its thresholds.
+            settings: how contacts begin and end.
+            chain: with it, motion is measured in the base's frame from each frame's joint
+                angles; without, on the skin.
+            horizon_s: seconds from onset after which a contact's series takes in no more.
+        """
+        self.layout = layout
+        self.settings = settings or TrackSettings()
+        self.chain = chain
+        self.horizon_s = horizon_s
+        self.region: Region | None = None
+        """The last frame's largest region."""
+        self._contact: Contact | None = None
+        self._confirmed = False
+        self._run = 0
+        self._t = -math.inf
+
+    def push(self, frame: Frame) -> Contact | None:
+        """Take in a frame.
+
+        Returns:
+            The contact that this frame belongs to, from the frame that confirms it to the one
+            that ends it (its `ended` is then True); else None.
+
+        Raises:
+            InputError: the frame's shape is not the skin's, or its time goes back.
+        """
+        if frame.counts.shape != self.layout.shape:
+            raise InputError(
+                f"a frame of {frame.counts.shape} taxels on a skin of {self.layout.shape}"
+            )
+        if not frame.t >= self._t:
+            raise InputError(f"time goes back from {self._t} to {frame.t} s")
+        self._t = frame.t
+        followed = None if self._contact is None else self._contact.region
+        region = largest_region(
+            frame.counts,
+            self.layout.threshold_counts,
+            valid=frame.valid,
+            wraps=self.layout.wraps,
+            connectivity=self.settings.connectivity,
+            previous=followed,
+        )
+        self.region = region
+        return self._follow(frame, region) if self._confirmed else self._await(frame, region)
+
+    def _await(self, frame: Frame, region: Region | None) -> Contact | None:
+        if region is None or region.peak <= self.layout.onset:
+            self._contact = None
+            return None
+        if self._contact is None:
+            self._contact = Contact(_time(frame, region), self.layout, self.chain)
+            self._run = 0
+        self._contact.add(frame, region)
+        self._run += 1
+        if self._run < self.settings.debounce:
+            return None
+        self._confirmed, self._run = True, 0
+        return self._contact
+
+    def _follow(self, frame: Frame, region: Region | None) -> Contact:
+        contact = self._contact
+        assert contact is not None
+        if contact.last_s - contact.onset_s < self.horizon_s:
+            contact.add(frame, region)
+        self._run = 0 if region is not None else self._run + 1
+        if self._run >= self.settings.release:
+            contact.ended = True
+            self._contact, self._confirmed, self._run = None, False, 0
+        return contact

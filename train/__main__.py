@@ -1,0 +1,33 @@
+"""`python -m train`: the workstation's commands."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from edge.cli import dispatch
+
+COMMANDS = ("import_",)
+"""Modules of `train.commands`; each has `add_parser(subparsers)`, which sets `run`."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    top = argparse.ArgumentParser(
+        prog="train", description="Recordings in, studies out; `python -m export` makes the model."
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        import_module(f"train.commands.{name}").add_parser(commands)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
+    return dispatch(parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
