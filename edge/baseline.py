@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 SCALE_BITS = 8
 """The baseline is kept in 1/256 counts, so that a slow drift is not lost to rounding."""
-FOLLOW_BITS = 6
-"""A step is at most 1/64 of the distance: noise moves the baseline little."""
+FOLLOW_BITS = 4
+"""A step is at most 1/16 of the distance: noise moves the baseline little."""
 
 
 class Baseline:
@@ -67,8 +67,10 @@ class Baseline:
         error = (raw.astype(np.int32) << SCALE_BITS) - self._now
         error += 1 << (FOLLOW_BITS - 1)
         error >>= FOLLOW_BITS
-        np.clip(error, -self._step, self._step, out=error)
+        np.minimum(error, self._step, out=error)
+        np.maximum(error, -self._step, out=error)
         error *= fresh
         self._now += error
-        np.clip(self._now, self._low, self._high, out=self._now)
+        np.minimum(self._now, self._high, out=self._now)
+        np.maximum(self._now, self._low, out=self._now)
         self._counts = self._rounded()

@@ -110,7 +110,9 @@ _DENIED = Response(
 RESPONSES: dict[int, Response] = {
     errno.EREMOTEIO: _NACK,
     errno.ENXIO: _NACK,
-    errno.EIO: Response(BusFault, 2, mend="the transfer broke off; check cable length and pull-ups"),
+    errno.EIO: Response(
+        BusFault, 2, mend="the transfer broke off; check cable length and pull-ups"
+    ),
     errno.ETIMEDOUT: Response(BusTimeout, reopen=True, mend="the transfer hung until its timeout"),
     errno.EAGAIN: Response(BusArbitration, 3, mend="another master holds the bus"),
     errno.EBUSY: Response(
@@ -289,7 +291,7 @@ class LinuxBus:
         import smbus2
 
         self.close()
-        smbus = smbus2.SMBus()
+        smbus: Any = smbus2.SMBus()
         try:
             smbus.open(self.name)
             if not smbus.funcs & smbus2.I2cFunc.I2C:
@@ -305,14 +307,12 @@ class LinuxBus:
         from smbus2 import i2c_msg
         from smbus2.smbus2 import i2c_rdwr_ioctl_data
 
-        parts = []
+        parts: list[Any] = []
         for message in messages:
             buffer = message.buffer
             pointer = ctypes.cast(buffer.ctypes.data, ctypes.POINTER(ctypes.c_char))
             parts.append(
-                i2c_msg(
-                    addr=message.address, flags=int(message.read), len=len(buffer), buf=pointer
-                )
+                i2c_msg(addr=message.address, flags=int(message.read), len=len(buffer), buf=pointer)
             )
         return Transfer(messages, i2c_rdwr_ioctl_data.create(*parts))
 

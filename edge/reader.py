@@ -77,6 +77,11 @@ class Slot:
         self.send: Callable[[Transfer], None] = _nothing
         self.frame: Transfer | None = None
 
+    @property
+    def running(self) -> bool:
+        """Set up and answering."""
+        return self.state is State.RUNNING
+
 
 def _nothing(transfer: Transfer) -> None:
     raise AssertionError("a chip that is down is not read")
@@ -167,7 +172,7 @@ class BusReader:
         for slot in self.slots:
             slot.revival = None
             self.retries, self._timeouts = RETRIES_PER_FRAME, 0
-            while slot.state is not State.RUNNING and self._step(slot):
+            while not slot.running and self._step(slot):
                 pass
 
     def read(self, slots: Sequence[Slot], deadline: float = math.inf) -> None:
@@ -272,10 +277,10 @@ class BusReader:
         self._all_running = True
         steps = STEPS_PER_FRAME
         for slot in self.slots:
-            if slot.state is State.RUNNING:
+            if slot.running:
                 continue
             self._all_running = False
-            while slot.state is not State.RUNNING and slot.retry_at <= now():
+            while not slot.running and slot.retry_at <= now():
                 if steps <= 0 or (steps < STEPS_PER_FRAME and now() >= deadline):
                     return
                 steps -= 1

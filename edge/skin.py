@@ -103,9 +103,7 @@ class Skin:
     ((16, 24), True)
     """
 
-    def __init__(
-        self, file: SkinFile, buses: Sequence[Bus], *, clock: Clock | None = None
-    ) -> None:
+    def __init__(self, file: SkinFile, buses: Sequence[Bus], *, clock: Clock | None = None) -> None:
         """Set the skin up on buses that are open; `start` then sets the chips up.
 
         Args:
@@ -265,7 +263,8 @@ class Skin:
 
     def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
         """The last frame's values as the chips gave them (rows, cols), and which are valid."""
-        assert self._last is not None and self._last.valid is not None
+        assert self._last is not None
+        assert self._last.valid is not None
         return self._raw[self._stage_of].reshape(self.layout.shape), self._last.valid
 
     def _transfer(self, t: float) -> None:
@@ -328,7 +327,7 @@ class Skin:
         for group in self._groups:
             if not self._whole[group.stages].all():
                 bad = ~self._whole[group.stages].reshape(group.shape).all(axis=1)
-                for i in np.flatnonzero(bad):
+                for i in np.flatnonzero(bad).tolist():
                     group.slots[i].suspect = group.slots[i].good
         if self._noisy.any():
             limit = self.file.reading.stuck_frames

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import shutil
@@ -310,7 +309,7 @@ def _bus(entry: object, index: int, layout: SkinLayout, sign: int, where: str) -
     table = _Table(entry, f"{where}: bus {index}")
     device = table.get("device")
     if isinstance(device, bool) or not isinstance(device, int | str) or device == "":
-        raise table.fail("device", "a bus's number or its path, like 1 or \"/dev/i2c-1\"")
+        raise table.fail("device", 'a bus\'s number or its path, like 1 or "/dev/i2c-1"')
     clock_hz = table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
     common = {key: table.get(key) for key in ("kind", "mux", "block", "bits", "decimation")}
     chips = table.get("chips")
@@ -380,8 +379,7 @@ def _taxels(table: _Table, layout: SkinLayout) -> tuple[int, ...]:
         row, col = place
         if not (0 <= row < layout.rows and 0 <= col < layout.cols):
             raise InputError(
-                f"{table.where}: taxel [{row}, {col}] lies outside of "
-                f"{layout.rows} x {layout.cols}"
+                f"{table.where}: taxel [{row}, {col}] lies outside of {layout.rows} x {layout.cols}"
             )
         flat.append(row * layout.cols + col)
     return tuple(flat)
@@ -430,8 +428,8 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
 
 
 def _calibration(table: _Table, layout: SkinLayout) -> Calibration:
-    arrays = {}
-    for key, dtype in (("baseline", np.int64), ("noise", np.float64)):
+    arrays: dict[str, NDArray[np.float64]] = {}
+    for key in ("baseline", "noise"):
         value = table.get(key)
         rows = value if isinstance(value, list) else []
         flat = [x for row in rows if isinstance(row, list) for x in row]
@@ -444,7 +442,7 @@ def _calibration(table: _Table, layout: SkinLayout) -> Calibration:
                 f"{table.where}: {key} must be {layout.rows} rows of {layout.cols} "
                 f"{'whole ' if key == 'baseline' else ''}numbers; calibrate again"
             )
-        array = np.array(rows, dtype=dtype)
+        array = np.array(rows, dtype=np.float64)
         if not (np.isfinite(array).all() and (array >= 0).all() and (array <= 65535).all()):
             raise InputError(f"{table.where}: {key} has a value outside of 0 to 65535")
         arrays[key] = array
@@ -478,7 +476,9 @@ def with_calibration(text: str, calibration: Calibration, where: str = "skin") -
         InputError: the file writes its calibration in a way that cannot be replaced.
     """
     before = parse(text, where)
-    table = re.compile(r"^[ \t]*\[calibration\][ \t]*(#.*)?\n(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*", re.M)
+    table = re.compile(
+        r"^[ \t]*\[calibration\][ \t]*(#.*)?\n(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*", re.M
+    )
     rest = table.sub("", text if text.endswith("\n") else text + "\n").rstrip("\n")
     out = f"{rest}\n\n{calibration_text(calibration)}"
     after = parse(out, where)

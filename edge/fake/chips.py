@@ -144,7 +144,7 @@ class FakeMPR121:
         """Bytes from the pointer on."""
         bank = bytearray(self._registers)
         if self._registers[mpr121.ECR] & 0x0F:
-            values = np.clip(self._sense(t), 0, 1023).astype("<u2").tobytes()
+            values = np.minimum(self._sense(t), 1023).astype("<u2").tobytes()
             bank[mpr121.RESULTS : mpr121.RESULTS + len(values)] = values
         out = bytes(bank[(self._pointer + i) & 0xFF] for i in range(n))
         self._pointer = (self._pointer + n) & 0xFF
@@ -183,14 +183,14 @@ class FakeBlock:
     def read(self, n: int, t: float) -> bytes:
         """The identity or the frame, then zeros."""
         if self._pointer == block.IDENTITY[0]:
-            out = block.sealed(
-                block.MAGIC + bytes([self._bits]) + self._taxels.to_bytes(2, "big")
-            )
+            out = block.sealed(block.MAGIC + bytes([self._bits]) + self._taxels.to_bytes(2, "big"))
         elif self._pointer == block.FRAME[0]:
             # Half a microsecond keeps a time that is a sample's own from rounding below it.
             sample = int(t * self._rate + 5e-7)
             values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
-            out = block.sealed((sample & 0xFFFF).to_bytes(2, "big") + block.pack(values, self._bits))
+            out = block.sealed(
+                (sample & 0xFFFF).to_bytes(2, "big") + block.pack(values, self._bits)
+            )
         else:
             out = b""
         return out[:n].ljust(n, b"\0")

@@ -17,7 +17,7 @@ from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
 from edge.recording import Recording
 from edge.skin import Skin
-from edge.skinfile import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
+from edge.skinfile import UNUSED, Calibration, ChipSpec, SkinFile
 
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
@@ -62,7 +62,8 @@ class Playback:
 
     def __call__(self, t: float) -> NDArray[np.uint16]:
         """Counts above baseline (rows, cols) at `t`."""
-        return self._frames[self._index(t)]
+        frame: NDArray[np.uint16] = self._frames[self._index(t)]
+        return frame
 
     def joints(self, t: float) -> NDArray[np.float64] | None:
         """Joint angles (dof,) at `t`, where the recording has them."""
@@ -149,10 +150,10 @@ def _sense(
     top = _top(chip)
 
     def sense(t: float) -> NDArray[np.uint16]:
-        raw = base + gain * scene(t).reshape(-1)[taxels]
+        raw = base + gain * scene(t).reshape(-1).take(taxels)
         if stream is not None:
             raw = raw + np.rint(noise * stream.standard_normal(len(base))).astype(np.int64)
-        return np.clip(raw, 1, top).astype(np.uint16)
+        return np.maximum(np.minimum(raw, top), 1).astype(np.uint16)
 
     return sense
 
@@ -187,9 +188,7 @@ def fake_skin(
     """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
     clock = clock or VirtualClock()
     file = calibrated(file)
-    buses = fake_buses(
-        file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed
-    )
+    buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed)
     skin = Skin(file, buses, clock=clock)
     skin.start()
     clock.sleep_until(clock.now())
@@ -229,5 +228,3 @@ def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
         for _ in range(frames):
             skin.read()
         return [bus.bits - b for bus, b in zip(buses, before, strict=True)]  # type: ignore[attr-defined]
-
-
