@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,8 @@ class SkinLayout:
     """A taxel above this is in contact (paper, section III-B); the contact ends at it."""
     onset_counts: int | None = None
     """A contact begins when its region's peak is above this; `threshold_counts` where None."""
+    dead: tuple[int, ...] = ()
+    """Flat indices (row * cols + col) of taxels that are known never to be read."""
 
     def __post_init__(self) -> None:
         if not (1 <= self.rows <= 1024 and 1 <= self.cols <= 1024):
@@ -55,6 +58,8 @@ class SkinLayout:
                 f"skin: column_angles_deg has {len(self.column_angles_deg)} values "
                 f"for {self.cols} columns"
             )
+        if any(not 0 <= i < self.rows * self.cols for i in self.dead):
+            raise InputError(f"skin: dead has a taxel that is not 0 to {self.rows * self.cols - 1}")
         if self.radius_m is not None and self.pitch_m is None:
             raise InputError("skin: radius_m needs pitch_m, the distance between rows")
         if self.onset < self.threshold_counts:
@@ -62,6 +67,13 @@ class SkinLayout:
                 f"skin: onset_counts {self.onset_counts} is below "
                 f"threshold_counts {self.threshold_counts}"
             )
+
+    @cached_property
+    def alive(self) -> NDArray[np.bool_]:
+        """(rows, cols), False on the dead taxels."""
+        alive = np.ones(self.rows * self.cols, dtype=np.bool_)
+        alive[list(self.dead)] = False
+        return alive.reshape(self.rows, self.cols)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -122,7 +134,7 @@ class SkinLayout:
         out: dict[str, Any] = {}
         for f in fields(self):
             value = getattr(self, f.name)
-            if value is not None:
+            if value is not None and value != ():
                 out[f.name] = list(value) if isinstance(value, tuple) else value
         return out
 
@@ -171,6 +183,10 @@ class SkinLayout:
             known["column_angles_deg"] = tuple(
                 _number("column_angles_deg", a, -math.inf, where) for a in angles
             )
+        dead = skin.get("dead", ())
+        if not isinstance(dead, list | tuple) or not all(type(i) is int for i in dead):
+            raise InputError(f"{where}: skin.dead must be a list of flat taxel indices")
+        known["dead"] = tuple(dead)
         try:
             return cls(**known)
         except InputError as error:

@@ -18,6 +18,7 @@ OPERATORS = frozenset(
         "ArgMax",
         "Cast",
         "Concat",
+        "Div",
         "Gather",
         "GatherElements",
         "Identity",

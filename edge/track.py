@@ -84,7 +84,7 @@ class Contact:
     chain: Chain | None
     ended: bool = False
     missing_taxels: bool = False
-    """A frame had taxels that could not be read."""
+    """A frame lacked taxels that are not known to be dead."""
     missing_pose: bool = False
     """A frame came without the joint angles that motion needs."""
     region: Region | None = None
@@ -109,7 +109,8 @@ class Contact:
                 series.pop()
         self._t.append(t)
         if frame.valid is not None and not self.missing_taxels:
-            self.missing_taxels = not bool(frame.valid.all())
+            missing = self.layout.alive & ~frame.valid
+            self.missing_taxels = bool(missing.any())
         if region is None:
             self._measured.append((0, 0, 0, 0))
             self._motion.append(self._motion[-1] if self._motion else 0.0)
@@ -154,6 +155,8 @@ def _time(frame: Frame, region: Region | None) -> float:
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
     """The device's geometry and scale with the model's thresholds, brought to its counts.
 
+    The taxels known to be dead are the model's: what else the device lacks is missing.
+
     Raises:
         InputError: the device is another skin than the model's.
     """
@@ -173,6 +176,7 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
         device,
         threshold_counts=min(round(model.threshold_counts * ratio), 65535),
         onset_counts=min(round(model.onset * ratio), 65535),
+        dead=model.dead,
     )
 
 

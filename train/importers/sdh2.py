@@ -18,8 +18,8 @@ from edge.recording import Recording, load_arrays
 PITCH_M = 0.0034
 THRESHOLD_COUNTS = 50
 """Separates contact from noise on these pads (measured by their publishers' recordings)."""
-ONSET_COUNTS = 100
-"""Twice the threshold, so that one noisy texel begins no contact."""
+ONSET_COUNTS = 60
+"""A little above the threshold, so that a force that hovers there is one contact."""
 
 
 def trials(path: Path) -> Iterator[tuple[str, Recording]]:
@@ -50,6 +50,7 @@ def trials(path: Path) -> Iterator[tuple[str, Recording]]:
         pitch_m=PITCH_M,
         threshold_counts=THRESHOLD_COUNTS,
         onset_counts=ONSET_COUNTS,
+        dead=tuple(np.flatnonzero(~valid).tolist()),
     )
     for i, (a, b) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
         side_by_side = np.zeros((b - a, rows, 2 * cols + 1), dtype=np.uint16)

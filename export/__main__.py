@@ -1,0 +1,181 @@
+"""`python -m export`: recordings to model.onnx and golden.npz (`make export`)."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from edge import __version__
+from edge.cli import dispatch
+from edge.errors import InputError
+from edge.features import FEATURES, SAMPLES, WINDOW_S
+from edge.files import write_whole
+from edge.model import Model, ModelInfo, Task
+from export import golden
+from export.graph import to_onnx
+from train.crossval import Chosen, choose, jobs_here
+from train.dataset import DataSet, load_trials
+from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    top = argparse.ArgumentParser(
+        prog="export",
+        description="Fits scaler, PCA and k-NN for every task that the recordings' labels share, "
+        "and writes OUT/model.onnx and OUT/golden.npz. What is not given is chosen per task by "
+        "leave-one-out accuracy, the smallest model where several are equal.",
+    )
+    top.add_argument(
+        "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
+    )
+    top.add_argument("--out", type=Path, default=Path("build"), help="folder (build)")
+    top.add_argument("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
+    top.add_argument("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
+    top.add_argument("--components", type=int, help="fix the number of principal components")
+    top.add_argument("-k", "--k", type=int, help="fix the number of neighbours")
+    top.add_argument("--window", type=float, default=WINDOW_S, help="seconds from onset (1.2)")
+    top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
+    top.add_argument("--onset", type=int, help="counts above which a contact begins")
+    top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (all cores)")
+    top.set_defaults(run=run)
+    return top
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fit, write and report."""
+    _check_fixed(arguments)
+    dataset = load_trials(
+        arguments.data,
+        threshold=arguments.threshold,
+        onset=arguments.onset,
+        horizon_s=arguments.window,
+        progress=True,
+    )
+    tasks = _tasks(dataset, arguments.tasks)
+    X = dataset.features(arguments.window, SAMPLES)
+    y = {task: dataset.labels(task) for task in tasks}
+    chosen = choose(
+        X,
+        y,
+        scalings=SCALINGS if arguments.scaling is None else [arguments.scaling],
+        components=arguments.components,
+        k=arguments.k,
+        jobs=arguments.jobs,
+        progress=True,
+    )
+    classifier = ContactClassifier({task: c.choice for task, c in chosen.items()}).fit(X, y)
+    info = describe(dataset, classifier, chosen, arguments.window)
+    data = to_onnx(classifier, info)
+    path = arguments.out / "model.onnx"
+    with write_whole(path) as file:
+        file.write(data)
+    golden.write(arguments.out / "golden.npz", Model(path), dataset, X)
+    print(report(dataset, classifier, chosen), file=sys.stderr)
+    print(f"{path} ({len(data) / 1024:.0f} kB)\n{arguments.out / 'golden.npz'}")
+    return 0
+
+
+def _check_fixed(arguments: argparse.Namespace) -> None:
+    for name in ("components", "k", "jobs"):
+        value = getattr(arguments, name)
+        if value is not None and value < 1:
+            raise InputError(f"--{name} must be at least 1, not {value}")
+    for name in ("threshold", "onset"):
+        value = getattr(arguments, name)
+        if value is not None and not 0 <= value < 65535:
+            raise InputError(f"--{name} must be 0 to 65534 counts, not {value}")
+    if not 0.0 < arguments.window <= 60.0:
+        raise InputError(f"--window must be above 0 and at most 60 seconds, not {arguments.window}")
+
+
+def _tasks(dataset: DataSet, wanted: list[str] | None) -> tuple[str, ...]:
+    if wanted is None:
+        return dataset.tasks
+    missing = [task for task in wanted if task not in dataset.tasks]
+    if missing:
+        raise InputError(
+            f"not every recording has a label {missing[0]!r}; all have {', '.join(dataset.tasks)}"
+        )
+    return tuple(wanted)
+
+
+def describe(
+    dataset: DataSet, classifier: ContactClassifier, chosen: dict[str, Chosen], window_s: float
+) -> ModelInfo:
+    """The metadata that makes the model file describe itself."""
+    return ModelInfo(
+        tasks={
+            task: Task(
+                labels=tuple(map(str, classifier.classes_[task])),
+                k=found.choice.k,
+                components=classifier.components_[task],
+                scaling=found.choice.scaling,
+                accuracy=found.accuracy,
+            )
+            for task, found in chosen.items()
+        },
+        layout=dataset.layout,
+        tracking=dataset.tracking,
+        window_s=window_s,
+        samples=SAMPLES,
+        features=FEATURES,
+        units=dataset.units,
+        motion_frame="skin" if dataset.chain is None else "world",
+        chain=dataset.chain,
+        rows=len(dataset.trials),
+        data_digest=dataset.digest,
+        versions={
+            "edge-classify": __version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")},
+        },
+    )
+
+
+def report(dataset: DataSet, classifier: ContactClassifier, chosen: dict[str, Chosen]) -> str:
+    """What was fitted, a line a task, and what deserves a warning."""
+    lines = [f"{'task':<12} classes trials scaling components   k  leave-one-out"]
+    lines += [
+        f"{task:<12} {len(classifier.classes_[task]):>7} {len(dataset.trials):>6} "
+        f"{found.choice.scaling:>7} {classifier.components_[task]:>10} {found.choice.k:>3} "
+        f"{found.accuracy:>14.2%}"
+        for task, found in chosen.items()
+    ]
+    units = dataset.units
+    lines.append(
+        f"force in {units['max_force']}s, motion in {units['contact_motion']}s in the "
+        f"{'skin' if dataset.chain is None else 'world'}'s frame"
+    )
+    if dataset.untouched:
+        lines.append(
+            f"left out: {len(dataset.untouched)} recordings without a contact above "
+            f"{dataset.layout.onset} counts, the first {dataset.untouched[0]}"
+        )
+    for task, found in chosen.items():
+        dropped = found.choice.components - classifier.components_[task]
+        if dropped > 0:
+            lines.append(
+                f"warning: {task}: the trials span {classifier.components_[task]} components, "
+                f"{dropped} fewer than asked for"
+            )
+        projection = classifier.projections_[found.choice.scaling]
+        if projection.gap < CLOSE_EIGENVALUES:
+            lines.append(
+                f"warning: {task}: two components explain the same variance to within "
+                f"{projection.gap:.1e}; which of them is kept is arbitrary"
+            )
+    return "\n".join(lines)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; 0 fine, 2 bad usage or input."""
+    return dispatch(parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""golden.npz: see `edge.golden` for the format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.features import feature_vector
+from edge.golden import PARTS, first_series
+from edge.model import Model
+from edge.recording import Recording, load, save_arrays
+from train.dataset import DataSet
+
+TRIALS = 24
+"""Trials whose frames a golden file holds."""
+VECTORS = 256
+"""Feature vectors beyond the trials' own."""
+
+BOUNDS = {
+    "scores": 1e-15,
+    "distances": 1e-12,
+    "features": 1e-12,
+    "time_s": 1e-9,
+}
+"""Scores are quotients of small integers, correctly rounded everywhere. A distance sums at most 20
+squares of coordinates that are the same bits everywhere: its relative error is below
+22 * 2^-53 = 2.4e-15. Features are interpolated in a few operations, and motion passes through
+sines and cosines that differ by an ulp between C libraries: below 100 ulp of metres. The bounds
+leave a factor of 40 and more."""
+
+
+def trials_of(dataset: DataSet, count: int = TRIALS) -> list[int]:
+    """Trials spread evenly over the labels of the finest task."""
+    finest = max(dataset.tasks, key=lambda task: len(set(dataset.labels(task))))
+    order = np.argsort(dataset.labels(finest), kind="stable")
+    chosen = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
+    return sorted({int(order[i]) for i in chosen})
+
+
+def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
+    """A quarter second before onset to two frames past the window."""
+    t = recording.t
+    a = int(np.searchsorted(t, onset_s - 0.25))
+    b = int(np.searchsorted(t, onset_s + model.info.window_s)) + 2
+    valid = recording.valid
+    if valid is None:
+        valid = np.ones(recording.frames.shape[1:], dtype=bool)
+    if valid.ndim == 2:
+        valid = np.broadcast_to(valid, recording.frames.shape)
+    return Recording(
+        t=t[a:b],
+        frames=recording.frames[a:b],
+        joints=None if recording.joints is None else recording.joints[a:b],
+        valid=valid[a:b],
+        meta=recording.meta,
+    )
+
+
+def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
+    """Run the exported model on trials and vectors, and store what it gave.
+
+    Vectors are the trials' own, training vectors (distance exactly 0), others between and
+    beyond them, and two that are not finite (label -1).
+    """
+    info = model.info
+    parts: list[Recording] = []
+    found: list[tuple[float, Any]] = []
+    for i in trials_of(dataset):
+        trial = dataset.trials[i]
+        part = trimmed(load(trial.path), trial.onset_s, model)
+        series = first_series(part, model)
+        if series is None:
+            continue
+        parts.append(part)
+        found.append(series)
+    rng = np.random.default_rng(20120101)
+    own = np.stack([feature_vector(s, info.window_s, info.samples) for _, s in found])
+    rows = X[rng.permutation(len(X))[: VECTORS // 2]]
+    pairs = rng.integers(0, len(X), (VECTORS // 2, 2))
+    weight = rng.uniform(-0.5, 1.5, (len(pairs), 1))
+    mixed = X[pairs[:, 0]] + weight * (X[pairs[:, 1]] - X[pairs[:, 0]])
+    wrong = np.repeat(own[:1], 2, axis=0)
+    wrong[0, 5], wrong[1, -1] = np.nan, np.inf
+    vectors = np.concatenate([own, rows, mixed, wrong])
+    single = [model.run(vectors[i : i + 1]) for i in range(len(vectors))]
+    arrays: dict[str, NDArray[Any]] = {
+        "start": np.cumsum([0, *(len(p.t) for p in parts)]),
+        "t": np.concatenate([p.t for p in parts]),
+        "frames": np.concatenate([p.frames for p in parts]),
+        "valid": np.concatenate([p.valid for p in parts if p.valid is not None]),
+        "onset_s": np.array([onset for onset, _ in found]),
+        "series_start": np.cumsum([0, *(len(s.t) for _, s in found)]),
+        "series_t": np.concatenate([s.t for _, s in found]),
+        "series_counts": np.concatenate(
+            [np.column_stack([s.peak, s.area, s.sums]) for _, s in found]
+        ),
+        "vectors": vectors,
+    }
+    if info.chain is not None:
+        arrays["joints"] = np.concatenate([p.joints for p in parts if p.joints is not None])
+    for task in info.tasks:
+        for key in (f"{task}_{part}" for part in PARTS):
+            arrays[key] = np.concatenate([row[key] for row in single])
+    meta = {"skin": parts[0].meta.get("skin", {}), "bounds": BOUNDS, "model": info.data_digest}
+    save_arrays(path, arrays, meta)

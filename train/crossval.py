@@ -1,0 +1,213 @@
+"""Exact leave-one-out over all numbers of components and of neighbours at once.
+
+For each trial left out, scaler and components are fitted on the others. One decomposition a
+fold serves all component counts, squared distances are accumulated over components, one sort a
+component count serves all k, and votes are accumulated over k.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from edge.errors import InputError
+from edge.features import FEATURES
+from train.pipeline import SCALINGS, Choice, principal_axes, scale_of
+
+MAX_COMPONENTS = 20
+MAX_K = 20
+
+
+def fold_neighbours(
+    X: NDArray[np.float64],
+    test: int,
+    scaling: str,
+    max_components: int,
+    max_k: int,
+    types: int = len(FEATURES),
+) -> NDArray[np.int64]:
+    """Neighbours of one left-out trial for each number of components.
+
+    Returns:
+        (max_components, max_k) rows of X, nearest first, equal distances in the order of the
+        rows. Beyond the numerical rank a further component adds nothing, so its row repeats.
+    """
+    keep = np.arange(len(X)) != test
+    train = X[keep]
+    _, gain = scale_of(train, scaling, types)
+    columns = np.repeat(gain, X.shape[1] // types)
+    mean = train.mean(axis=0)
+    scaled = (train - mean) * columns
+    _, axes, _ = principal_axes(scaled)
+    axes = axes[:max_components]
+    gaps = ((X[test] - mean) * columns) @ axes.T - scaled @ axes.T
+    squares = np.cumsum(gaps * gaps, axis=1)
+    rows = np.empty((max_components, max_k), dtype=np.int64)
+    where = np.flatnonzero(keep)
+    for c in range(max_components):
+        if c < squares.shape[1]:
+            order = _nearest(squares[:, c], max_k)
+        rows[c] = where[order]
+    return rows
+
+
+def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
+    """The k smallest by (value, index): a partition finds the limit, a stable sort the order."""
+    if k >= len(squares):
+        return np.argsort(squares, kind="stable")[:k]
+    limit = np.partition(squares, k - 1)[k - 1]
+    among = np.flatnonzero(squares <= limit)
+    return among[np.argsort(squares[among], kind="stable")[:k]]
+
+
+def votes_right(
+    neighbours: NDArray[np.int64], labels: NDArray[np.int64], truth: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether the vote of the first 1, 2, ... k neighbours gives the truth.
+
+    Args:
+        neighbours: (..., k) rows, nearest first.
+        labels: (rows,) classes.
+        truth: broadcasts against neighbours[..., 0].
+
+    Returns:
+        (..., k), entry j for k = j + 1. A tie goes to the nearest neighbour among the tied.
+    """
+    classes = labels[neighbours]
+    k = classes.shape[-1]
+    # before[..., i, j]: votes that neighbour i's class has among the first j + 1.
+    same = classes[..., :, None] == classes[..., None, :]
+    votes = np.cumsum(same, axis=-1, dtype=np.int32)
+    asked = np.arange(k)
+    votes = np.where(asked[:, None] <= asked, votes, 0)  # neighbour i takes part from k = i + 1
+    winner = votes.argmax(axis=-2)
+    said = np.take_along_axis(classes, winner, axis=-1)
+    return np.asarray(said == np.asarray(truth)[..., None])
+
+
+def neighbours(
+    X: NDArray[np.float64],
+    *,
+    scaling: str = "none",
+    max_components: int = MAX_COMPONENTS,
+    max_k: int = MAX_K,
+    jobs: int = 1,
+    progress: bool = False,
+) -> NDArray[np.int64]:
+    """Each trial's neighbours among the others: (n, components, k) rows, nearest first.
+
+    Raises:
+        InputError: there are fewer than 2 trials, or a feature is not finite.
+    """
+    X = np.ascontiguousarray(X, dtype=np.float64)
+    n = len(X)
+    if n < 2:
+        raise InputError(f"leave-one-out needs at least 2 trials, not {n}")
+    if not np.isfinite(X).all():
+        raise InputError(
+            f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
+        )
+    k = min(max_k, n - 1)
+    chunks = np.array_split(np.arange(n), min(n, max(jobs, 1) * 8))
+    work = (delayed(_chunk)(X, tests, scaling, max_components, k) for tests in chunks)
+    parts = Parallel(n_jobs=jobs, return_as="generator")(work)
+    bar = tqdm(parts, total=len(chunks), desc=f"scaling {scaling}", disable=not progress)
+    return np.concatenate(list(bar))
+
+
+def _chunk(
+    X: NDArray[np.float64], tests: NDArray[np.int64], scaling: str, components: int, k: int
+) -> NDArray[np.int64]:
+    return np.stack([fold_neighbours(X, int(i), scaling, components, k) for i in tests])
+
+
+def accuracies(rows: NDArray[np.int64], y: NDArray[np.str_]) -> NDArray[np.float64]:
+    """Leave-one-out accuracy (components, k) from `neighbours` and labels (n,)."""
+    _, labels = np.unique(y, return_inverse=True)
+    right = votes_right(rows, labels, labels[:, None])
+    return np.asarray(right.sum(axis=0) / len(y))
+
+
+def leave_one_out(
+    X: NDArray[np.float64],
+    y: NDArray[np.str_],
+    max_components: int = MAX_COMPONENTS,
+    max_k: int = MAX_K,
+    *,
+    scaling: str = "none",
+    jobs: int = 1,
+) -> NDArray[np.float64]:
+    """Leave-one-out accuracies (components, k), entry [c - 1, k - 1]; exact, see the module.
+
+    Args:
+        X: (n, 3 * samples) feature vectors.
+        y: (n,) labels.
+        max_components: principal components tried, from 1.
+        max_k: neighbours tried, from 1; at most n - 1.
+        scaling: one of `train.pipeline.SCALINGS`, fitted inside each fold.
+        jobs: processes.
+    """
+    rows = neighbours(X, scaling=scaling, max_components=max_components, max_k=max_k, jobs=jobs)
+    return accuracies(rows, np.asarray(y))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The best cell of a task's grid."""
+
+    choice: Choice
+    accuracy: float
+
+
+def choose(
+    X: NDArray[np.float64],
+    y: Mapping[str, NDArray[np.str_]],
+    *,
+    scalings: Sequence[str] = SCALINGS,
+    components: int | None = None,
+    k: int | None = None,
+    jobs: int = 1,
+    progress: bool = False,
+) -> dict[str, Chosen]:
+    """For each task the scaling, components and k of the highest leave-one-out accuracy.
+
+    Equal cells go to the smallest model: fewest components, then the smallest k, then the
+    earlier scaling. `components` and `k` fix a value instead. Methods I and II, and no scaling
+    and Method III, differ by a constant per feature type that centring removes: they have the
+    same neighbours but for rounding, and only the earlier of each pair is fitted.
+    """
+    seen: set[str] = set()
+    best: dict[str, tuple[tuple[float, int, int, int], Chosen]] = {}
+    for order, scaling in enumerate(scalings):
+        twin = {"III": "none", "II": "I"}.get(scaling, scaling)
+        if twin in seen:
+            continue
+        seen.add(twin)
+        rows = neighbours(
+            X,
+            scaling=scaling,
+            max_components=components or min(MAX_COMPONENTS, len(X) - 1),
+            max_k=k or MAX_K,
+            jobs=jobs,
+            progress=progress,
+        )
+        for task, labels in y.items():
+            grid = accuracies(rows, labels)
+            for c in range(grid.shape[0]) if components is None else [components - 1]:
+                for j in range(grid.shape[1]) if k is None else [min(k, grid.shape[1]) - 1]:
+                    key = (-float(grid[c, j]), c, j, order)
+                    if task not in best or key < best[task][0]:
+                        found = Chosen(Choice(scaling, c + 1, j + 1), float(grid[c, j]))
+                        best[task] = (key, found)
+    return {task: found for task, (_, found) in best.items()}
+
+
+def jobs_here() -> int:
+    """Processes worth starting on this machine."""
+    return os.cpu_count() or 1

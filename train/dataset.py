@@ -1,0 +1,194 @@
+"""Recordings to feature vectors, by the edge's own path."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from edge.arm import Chain
+from edge.errors import InputError
+from edge.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
+from edge.golden import first_contact
+from edge.layout import SkinLayout
+from edge.recording import Recording, find, load
+from edge.track import FeatureSeries, Tracker, TrackSettings, for_device
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording's first contact."""
+
+    path: Path
+    labels: dict[str, str]
+    onset_s: float
+    series: FeatureSeries
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """Trials of one skin.
+
+    Attributes:
+        trials: in the order of the files' names.
+        layout: the skin, with the thresholds that all trials were followed with.
+        tracking: how contacts were followed.
+        chain: the arm, where every trial has joint angles; motion is then in the world's frame.
+        untouched: recordings in which no contact was found.
+        digest: SHA-256 over the recordings' bytes.
+    """
+
+    trials: tuple[Trial, ...]
+    layout: SkinLayout
+    tracking: TrackSettings
+    chain: Chain | None
+    untouched: tuple[Path, ...]
+    digest: str
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """The keys that all trials' labels share, sorted."""
+        shared = set.intersection(*(set(trial.labels) for trial in self.trials))
+        return tuple(sorted(shared))
+
+    def labels(self, task: str) -> NDArray[np.str_]:
+        """(n,) the trials' labels for a task."""
+        return np.array([trial.labels[task] for trial in self.trials])
+
+    def features(self, window_s: float = WINDOW_S, samples: int = SAMPLES) -> NDArray[np.float64]:
+        """(n, 3 * samples) feature vectors (see `edge.features.feature_vector`)."""
+        return np.stack([feature_vector(t.series, window_s, samples) for t in self.trials])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of each feature."""
+        return {
+            FEATURES[0]: self.layout.force_unit,
+            FEATURES[1]: "taxel",
+            FEATURES[2]: self.layout.length_unit,
+        }
+
+
+def arm_of(recording: Recording, where: str) -> Chain | None:
+    """The recording's arm: its `meta.arm`, Cody's where five angles name none, or None."""
+    if recording.joints is None:
+        return None
+    dof = recording.joints.shape[1]
+    arm = recording.meta.get("arm")
+    if arm is not None:
+        chain = Chain.from_dict(arm, where=f"{where}: meta.arm")
+    else:
+        chain = Chain.cody()
+        if dof != chain.dof:
+            raise InputError(
+                f"{where}: has {dof} joint angles and names no arm; store the chain as meta.arm"
+            )
+    if dof != chain.dof:
+        raise InputError(f"{where}: has {dof} joint angles, its arm takes {chain.dof}")
+    return chain
+
+
+def _load_all(paths: list[Path], progress: bool) -> tuple[list[Recording], str]:
+    digest = hashlib.sha256()
+    recordings: list[Recording] = []
+    bad: list[str] = []
+    for path in tqdm(paths, desc="reading", unit=" trials", disable=not progress):
+        try:
+            recordings.append(load(path))
+            digest.update(path.read_bytes())
+        except InputError as error:
+            bad.append(str(error))
+    if bad:
+        more = f" (and {len(bad) - 1} more files)" if len(bad) > 1 else ""
+        raise InputError(f"{bad[0]}{more}; mend or remove it, nothing was fitted")
+    return recordings, digest.hexdigest()
+
+
+def load_trials(
+    data: Sequence[str | Path],
+    *,
+    threshold: int | None = None,
+    onset: int | None = None,
+    tracking: TrackSettings | None = None,
+    horizon_s: float = 2.0,
+    progress: bool = False,
+) -> DataSet:
+    """Read recordings and follow the first contact of each.
+
+    Args:
+        data: `.npz` files and folders of them.
+        threshold: counts above which a taxel is in contact; the first recording's where None.
+            One for all, as the board cannot know which object it touches.
+        onset: counts above which a contact begins; scaled with the threshold where None.
+        tracking: how contacts begin and end.
+        horizon_s: seconds from onset that are kept of each contact.
+        progress: show progress bars on stderr.
+
+    Raises:
+        InputError: a file cannot be used, the skins differ, or nothing is labelled or touched.
+    """
+    paths = find([str(path) for path in data])
+    if not paths:
+        raise InputError("no recordings given; name .npz files or a folder of them")
+    recordings, digest = _load_all(paths, progress)
+    reference = recordings[0].layout
+    if threshold is not None:
+        begin = onset
+        if begin is None:
+            ratio = (
+                reference.onset / reference.threshold_counts if reference.threshold_counts else 1
+            )
+            begin = round(threshold * ratio)
+        reference = replace(reference, threshold_counts=threshold, onset_counts=begin)
+    elif onset is not None:
+        reference = replace(reference, onset_counts=onset)
+    reference = replace(reference, dead=_dead(recordings))
+    arms = [arm_of(r, str(p)) for r, p in zip(recordings, paths, strict=True)]
+    chain = arms[0] if None not in arms else None
+    if chain is not None:
+        for arm, path in zip(arms, paths, strict=True):
+            if arm is not None and arm.to_dict() != chain.to_dict():
+                raise InputError(f"{path}: its arm is not that of {paths[0]}; train on one arm")
+    settings = tracking or TrackSettings()
+    trials: list[Trial] = []
+    untouched: list[Path] = []
+    both = list(zip(recordings, paths, strict=True))
+    for recording, path in tqdm(both, desc="following", unit=" trials", disable=not progress):
+        try:
+            layout = for_device(reference, recording.layout)
+            tracker = Tracker(layout, settings, chain=chain, horizon_s=horizon_s)
+            found = first_contact(recording, tracker)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        if found is None:
+            untouched.append(path)
+        else:
+            trials.append(Trial(path, recording.labels, *found))
+    if not trials:
+        raise InputError(
+            f"no contact in any of {len(paths)} recordings; lower the threshold "
+            f"of {reference.threshold_counts} counts"
+        )
+    dataset = DataSet(tuple(trials), reference, settings, chain, tuple(untouched), digest)
+    if not dataset.tasks:
+        raise InputError(
+            "the recordings share no label; give every one the same keys under meta.labels"
+        )
+    return dataset
+
+
+def _dead(recordings: list[Recording]) -> tuple[int, ...]:
+    """Taxels that no frame of any recording could read."""
+    shape = recordings[0].frames.shape[1:]
+    alive = np.zeros(shape, dtype=bool)
+    for recording in recordings:
+        if recording.frames.shape[1:] != shape or recording.valid is None:
+            return ()
+        valid = recording.valid
+        alive |= valid if valid.ndim == 2 else valid.any(axis=0)
+    return tuple(np.flatnonzero(~alive).tolist())
