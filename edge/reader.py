@@ -21,7 +21,10 @@ from edge.bus import (
     BusRefused,
     BusTimeout,
     Transfer,
+    read,
     response,
+    wire_bits,
+    write,
 )
 from edge.chips.ad7147 import AD7147
 from edge.chips.block import Block, data_bytes
@@ -56,6 +59,7 @@ class Slot:
         row: (bytes,) that its frame is read into.
         state: see `State`.
         error: why it is down.
+        bits: of one reading on the wire.
         at: when it was last read, on the bus's clock.
         good: the bytes in `row` are of one whole transfer of a chip with its settings.
         recoveries: how often it has come back.
@@ -68,6 +72,7 @@ class Slot:
         self.error: BusError | None = None
         self.at = -math.inf
         self.good = False
+        self.bits = frame_wire_bits(spec, row)
         self.suspect = False
         """Its bytes look like those of a chip that has lost its settings: check it first."""
         self.recoveries = 0
@@ -85,6 +90,12 @@ class Slot:
 
 def _nothing(transfer: Transfer) -> None:
     raise AssertionError("a chip that is down is not read")
+
+
+def frame_wire_bits(spec: ChipSpec, row: NDArray[np.uint8]) -> int:
+    """Bits on the wire of one reading of a chip: `[write pointer][read row]`."""
+    pointer = b"\0\0" if spec.kind == "ad7147" else b"\0"
+    return wire_bits([write(spec.address, pointer), read(spec.address, row)])
 
 
 def frame_bytes(spec: ChipSpec) -> int:

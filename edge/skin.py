@@ -118,7 +118,7 @@ class Skin:
         self.following = True
         """The baseline follows drift."""
         groups = _rows(file)
-        self._readers = [
+        self.readers = [
             BusReader(
                 bus,
                 spec,
@@ -128,14 +128,14 @@ class Skin:
             )
             for bus, spec, rows in zip(buses, file.buses, groups.by_bus, strict=True)
         ]
-        self._slots = [slot for reader in self._readers for slot in reader.slots]
-        self._every: list[list[Slot]] = [reader.slots for reader in self._readers]
+        self._slots = [slot for reader in self.readers for slot in reader.slots]
+        self._every: list[list[Slot]] = [reader.slots for reader in self.readers]
         self._wire(groups)
         self._file_signal()
         self._last: Frame | None = None
         self._touched_at = -math.inf
-        self._missed = np.zeros(len(self._slots), dtype=np.int64)
-        self._workers = [_Worker(reader) for reader in self._readers[1:]]
+        self._states = [slot.state for slot in self._slots]
+        self._workers = [_Worker(reader) for reader in self.readers[1:]]
         self._closed = False
 
     @classmethod
@@ -222,8 +222,9 @@ class Skin:
         Raises:
             EdgeError: every chip is down.
         """
-        for reader in self._readers:
+        for reader in self.readers:
             reader.start()
+        self._states = [slot.state for slot in self._slots]
         down = [s for s in self.status() if s.state != State.RUNNING.value]
         if len(down) == len(self._slots):
             raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {down[0].error}")
@@ -241,9 +242,21 @@ class Skin:
                 error="" if slot.error is None else str(slot.error),
                 recoveries=slot.recoveries,
             )
-            for reader in self._readers
+            for reader in self.readers
             for slot in reader.slots
         ]
+
+    def changes(self) -> list[ChipStatus]:
+        """The chips whose state is another than at the last call, or than at the start."""
+        states = [slot.state for slot in self._slots]
+        if states == self._states:
+            return []
+        status = self.status()
+        changed = [
+            status[i] for i, (a, b) in enumerate(zip(states, self._states, strict=True)) if a != b
+        ]
+        self._states = states
+        return changed
 
     def read(self) -> Frame:
         """One frame: the chips that the planner names, the others as they were last read.
@@ -273,14 +286,14 @@ class Skin:
             chosen = self.planner.plan(self._last)
             jobs = [
                 [reader.slots[i] for i in indices]
-                for reader, indices in zip(self._readers, chosen, strict=True)
+                for reader, indices in zip(self.readers, chosen, strict=True)
             ]
         deadline = t + MARGIN * self.period_s
         for worker, job in zip(self._workers, jobs[1:], strict=True):
             worker.todo.put((job, deadline))
         failed: BaseException | None = None
         try:
-            self._readers[0].read(jobs[0], deadline)
+            self.readers[0].read(jobs[0], deadline)
         finally:
             for worker in self._workers:
                 failed = worker.done.get() or failed
@@ -331,7 +344,7 @@ class Skin:
                     group.slots[i].suspect = group.slots[i].good
         if self._noisy.any():
             limit = self.file.reading.stuck_frames
-            for i in np.flatnonzero(self._noisy):
+            for i in np.flatnonzero(self._noisy).tolist():
                 slot = self._slots[i]
                 if not slot.good:
                     continue
@@ -369,7 +382,7 @@ class Skin:
             worker.todo.put(None)
         for worker in self._workers:
             worker.join()
-        for reader in self._readers:
+        for reader in self.readers:
             reader.bus.close()
 
     def __enter__(self) -> Skin:

@@ -520,6 +520,6 @@ def dead_band(skin: SkinFile) -> NDArray[np.int32]:
     return np.maximum(floor, np.ceil(np.minimum(sigma, 65535.0))).astype(np.int32)
 
 
-def frame_rate(bits: Sequence[int], clocks: Sequence[int]) -> float:
+def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
     """Frames a second that buses carry side by side, each with its bits a frame."""
     return 1.0 / max(b / hz for b, hz in zip(bits, clocks, strict=True))

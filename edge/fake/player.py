@@ -9,15 +9,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.chips import ad7147
+from edge import skinfile
+from edge.chips import ad7147, block
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
 from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA9548A, Sense
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
+from edge.layout import SkinLayout
 from edge.recording import Recording
 from edge.skin import Skin
-from edge.skinfile import UNUSED, Calibration, ChipSpec, SkinFile
+from edge.skinfile import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
 
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
@@ -48,13 +50,21 @@ class Playback:
         last = float(np.median(steps)) if steps.size else 0.01
         self._length = float(t[-1]) + last
         self._loop = loop
+        self.start = 0.0
+        """When it began to play, on the skin's clock."""
 
     @property
     def ends(self) -> float:
         """When it is over, in seconds; infinity where it loops."""
         return math.inf if self._loop else self._length
 
+    @property
+    def dof(self) -> int | None:
+        """How many joint angles it has, or None."""
+        return None if self._joints is None else int(self._joints.shape[1])
+
     def _index(self, t: float) -> int:
+        t -= self.start
         if self._loop:
             t %= self._length
         # Half a microsecond: a time that is meant to be a frame's own finds that frame.
@@ -65,7 +75,7 @@ class Playback:
         frame: NDArray[np.uint16] = self._frames[self._index(t)]
         return frame
 
-    def joints(self, t: float) -> NDArray[np.float64] | None:
+    def at(self, t: float) -> NDArray[np.float64] | None:
         """Joint angles (dof,) at `t`, where the recording has them."""
         return None if self._joints is None else self._joints[self._index(t)]
 
@@ -216,15 +226,38 @@ def play(file: SkinFile, recording: Recording, *, loop: bool = False) -> tuple[S
             f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
         )
     playback = Playback(recording, loop=loop)
-    return fake_skin(file, playback), playback
+    skin = fake_skin(file, playback)
+    playback.start = skin.clock.now()
+    return skin, playback
 
 
 def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
     """Bits on each bus's wire for so many frames, counted as the drivers send them."""
     skin = still(file)
     with skin:
-        buses = [reader.bus for reader in skin._readers]
+        buses = [reader.bus for reader in skin.readers]
         before = [bus.bits for bus in buses]  # type: ignore[attr-defined]
         for _ in range(frames):
             skin.read()
         return [bus.bits - b for bus, b in zip(buses, before, strict=True)]  # type: ignore[attr-defined]
+
+
+def skin_file(layout: SkinLayout) -> SkinFile:
+    """Fake wiring for a skin that has only a layout: Cody's chips where its shape is Cody's.
+
+    Else microcontrollers that serve 16-bit frames, one for each 4000 taxels.
+
+    Raises:
+        InputError: there are more taxels than a bus has addresses for.
+    """
+    cody = skinfile.load(skinfile.shipped("cody"))
+    if layout.shape == cody.layout.shape:
+        return replace(cody, name="fake", layout=layout)
+    taxels, most = layout.rows * layout.cols, block.MOST_TAXELS
+    chips = tuple(
+        ChipSpec("block", 0x08 + i, tuple(range(first, min(first + most, taxels))))
+        for i, first in enumerate(range(0, taxels, most))
+    )
+    if len(chips) > 100:
+        raise InputError(f"a fake skin has at most {100 * most} taxels, not {taxels}")
+    return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

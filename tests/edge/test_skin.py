@@ -143,11 +143,11 @@ def test_dead_and_uncovered_taxels_are_never_valid():
 def test_each_bus_has_a_thread_of_its_own():
     with still(CODY) as skin:
         skin.clock.sleep_until(1.0)
-        for reader in skin._readers:
+        for reader in skin.readers:
             reader.bus.threads.clear()
         for _ in range(5):
             skin.read()
-        threads = [reader.bus.threads for reader in skin._readers]
+        threads = [reader.bus.threads for reader in skin.readers]
     assert [len(t) for t in threads] == [1, 1, 1]
     assert len(set.union(*threads)) == 3
     assert threading.get_ident() in threads[0]
