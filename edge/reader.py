@@ -33,9 +33,11 @@ from edge.chips.mpr121 import MPR121
 from edge.chips.tca9548a import TCA9548A
 from edge.skinfile import BusSpec, ChipSpec
 
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.05, 1.0
-HUNG_PAUSE_S = 0.25
-"""A hung chip costs the adapter's timeout at each try, so that tries are far apart."""
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
+"""Before a chip that does not answer is tried again; a try costs a few bits."""
+HUNG_PAUSE_S, LONGEST_HUNG_PAUSE_S = 0.05, 1.0
+"""Before a hung chip is: a try costs the adapter's timeout. Each pause is four times
+the one before."""
 GONE_PAUSE_S = 0.25
 """Between two tries to open a bus whose adapter has gone."""
 RETRIES_PER_FRAME = 12
@@ -191,7 +193,7 @@ class BusReader:
 
         Args:
             slots: of this bus, in the order in which to read them.
-            deadline: on the bus's clock; what can wait is not begun after it.
+            deadline: on the bus's clock; chips are not brought back after it.
 
         Raises:
             BusRefused: a transaction has a shape that the adapter does not carry.
@@ -203,8 +205,6 @@ class BusReader:
         now = self.bus.now
         if now() < self._resting_until or (self._gone and not self._return()):
             return
-        if not self._all_running:
-            self._revive(deadline)
         read_any = False
         for slot in slots:
             if slot.state is not State.RUNNING:
@@ -220,8 +220,12 @@ class BusReader:
             slot.at = now()
         if self._gone or self._timeouts > 1:
             self._give_up(read_any)
-        elif self._frames % self._recheck == 0 and now() < deadline:
+            return
+        if self._frames % self._recheck == 0:
             self._check_next()
+        # After the reading, so that what is broken takes no time from what is whole.
+        if not self._all_running:
+            self._revive(deadline)
 
     def _fail(self, slot: Slot, error: BusError) -> None:
         """Take a chip down, and say when to try it again.
@@ -235,14 +239,16 @@ class BusReader:
         slot.state, slot.error, slot.revival = State.DOWN, error, None
         self._all_running = False
         slot.failures += 1
-        pause = FIRST_PAUSE_S * 2.0 ** min(slot.failures - 2, 10) if slot.failures > 1 else 0.0
+        pause = 0.0
+        if slot.failures > 1:
+            pause = min(FIRST_PAUSE_S * 2.0 ** min(slot.failures - 2, 10), LONGEST_PAUSE_S)
         if isinstance(error, BusTimeout):
-            pause = HUNG_PAUSE_S * 2.0 ** min(slot.failures - 1, 10)
+            pause = min(HUNG_PAUSE_S * 4.0 ** min(slot.failures - 1, 10), LONGEST_HUNG_PAUSE_S)
             self._timeouts += 1
             self._reopen()
         elif isinstance(error, BusGone):
             self._gone = True
-        slot.retry_at = self.bus.now() + min(pause, LONGEST_PAUSE_S)
+        slot.retry_at = self.bus.now() + pause
 
     def _reopen(self) -> None:
         for mux in self._muxes.values():
@@ -277,13 +283,13 @@ class BusReader:
             self._resting_until = now + GONE_PAUSE_S
         elif not read_any:
             self._rests += 1
-            pause = HUNG_PAUSE_S * 2.0 ** min(self._rests - 1, 10)
-            self._resting_until = now + min(pause, LONGEST_PAUSE_S)
+            pause = min(HUNG_PAUSE_S * 4.0 ** min(self._rests - 1, 10), LONGEST_HUNG_PAUSE_S)
+            self._resting_until = now + pause
         else:
             self._rests = 0
 
     def _revive(self, deadline: float) -> None:
-        """Bring chips back, as far as the frame has time."""
+        """Bring chips back, as far as the frame has time, and by one step where it has none."""
         now = self.bus.now
         self._all_running = True
         steps = STEPS_PER_FRAME

@@ -69,7 +69,7 @@ class FakeBus:
         self.transactions = 0
         self.threads: set[int] = set()
         """Threads that have used it: a bus belongs to one at a time."""
-        self._held: dict[Place, bytes] = {}
+        self._held: dict[tuple[Place, int], bytes] = {}
         self._open = True
 
     def inject(self, faults: Sequence[Fault], seed: int = 0) -> None:
@@ -181,9 +181,9 @@ class FakeBus:
             bit = self.script.random.randrange(8 * len(out))
             out[bit // 8] ^= 1 << bit % 8
         if fault is not None and fault.kind == "hold":
-            out[:] = np.frombuffer(self._held.get(place, out.tobytes()), dtype=np.uint8)
+            out[:] = np.frombuffer(self._held.get((place, len(out)), out.tobytes()), dtype=np.uint8)
         elif len(out) > 2 and self.script.faults:
-            self._held[place] = out.tobytes()
+            self._held[place, len(out)] = out.tobytes()
         message.buffer[:] = out
 
     def _stop(self) -> None:
