@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -205,11 +203,20 @@ class Model:
             ) from None
         self._check(name)
         self._names = [output.name for output in self._session.get_outputs()]
-        self._value = runtime.OrtValue.ortvalue_from_numpy(np.zeros((1, self.info.width)))
+        # Input and outputs are arrays of ours that ONNX Runtime reads and writes in place: a
+        # decision then allocates next to nothing.
+        self._input = np.zeros((1, self.info.width))
+        self._outputs = {
+            output.name: np.zeros(
+                [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
+            )
+            for output in self._session.get_outputs()
+        }
         self._binding = self._session.io_binding()
-        self._binding.bind_ortvalue_input("features", self._value)
-        for output in self._names:
-            self._binding.bind_output(output)
+        value = runtime.OrtValue.ortvalue_from_numpy
+        self._binding.bind_ortvalue_input("features", value(self._input))
+        for output, array in self._outputs.items():
+            self._binding.bind_ortvalue_output(output, value(array))
 
     def _check(self, name: str) -> None:
         inputs = self._session.get_inputs()
@@ -240,7 +247,7 @@ class Model:
         return dict(zip(self._names, values, strict=True))
 
     def decide(self, vector: ArrayLike) -> dict[str, Decision]:
-        """Decide all tasks for one feature vector.
+        """Decide all tasks for one feature vector; not for several threads at once.
 
         Raises:
             InputError: the vector has another length, or a value that is not finite (or is so
@@ -249,31 +256,36 @@ class Model:
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != (self.info.width,):
             raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
-        # One sum sees every NaN and infinity; where finite values overflow it, look closely.
-        if not math.isfinite(float(np.add.reduce(np.abs(x)))) and not np.isfinite(x).all():
-            bad = int(np.argmin(np.isfinite(x)))
-            feature = self.info.features[bad // self.info.samples]
-            raise InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
-        self._value.update_inplace(x[None])
+        self._input[0] = x
         self._session.run_with_iobinding(self._binding)
-        values = dict(zip(self._names, self._binding.copy_outputs_to_cpu(), strict=True))
-        return {name: _decision(name, task, values) for name, task in self.info.tasks.items()}
+        return {name: self._decision(name, task, x) for name, task in self.info.tasks.items()}
 
+    def _decision(self, name: str, task: Task, x: NDArray[np.float64]) -> Decision:
+        outputs = self._outputs
+        index = int(outputs[f"{name}_label"][0])
+        if index < 0:
+            raise self._refusal(x)
+        scores = outputs[f"{name}_scores"][0].copy()
+        shares = scores.tolist()
+        confidence = shares[index]
+        return Decision(
+            label=task.labels[index],
+            confidence=confidence,
+            scores=scores,
+            distances=outputs[f"{name}_distances"][0].copy(),
+            neighbours=outputs[f"{name}_neighbours"][0].copy(),
+            tie=shares.count(confidence) > 1,
+        )
 
-def _decision(name: str, task: Task, values: Mapping[str, NDArray[Any]]) -> Decision:
-    index = int(values[f"{name}_label"][0])
-    if index < 0:
-        raise InputError("the features are too large for the model to measure a distance to them")
-    scores = values[f"{name}_scores"][0]
-    confidence = float(scores[index])
-    return Decision(
-        label=task.labels[index],
-        confidence=confidence,
-        scores=scores,
-        distances=values[f"{name}_distances"][0],
-        neighbours=values[f"{name}_neighbours"][0],
-        tie=int(np.count_nonzero(scores == confidence)) > 1,
-    )
+    def _refusal(self, x: NDArray[np.float64]) -> InputError:
+        """Why the graph answered -1: it does so for every vector it cannot measure."""
+        if np.isfinite(x).all():
+            return InputError(
+                "the features are too large for the model to measure a distance to them"
+            )
+        bad = int(np.argmin(np.isfinite(x)))
+        feature = self.info.features[bad // self.info.samples]
+        return InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
 
 
 def _read(name: str) -> bytes:

@@ -188,18 +188,25 @@ def _decide(
     # whose row of the votes (the last one) is empty.
     known = build.node("LessOrEqual", [squares, build.constant(LARGEST)])
     said = build.node("Where", [known, said, build.constant(-1, np.int64)])
-    ballots = build.constant(np.vstack([np.eye(classes), np.zeros((1, classes))]))
-    votes = build.node(
-        "ReduceSum",
-        [build.node("Gather", [ballots, said]), build.constant([1], np.int64)],
-        keepdims=0,
-    )
-    build.node("Div", [votes, build.constant(float(k))], f"{task}_scores")
+    # A power of two divides without rounding, so its ballots may already be shares.
+    share = 1.0 / k if k & (k - 1) == 0 else 1.0
+    ballots = build.constant(np.vstack([share * np.eye(classes), np.zeros((1, classes))]))
+    cast = build.node("Gather", [ballots, said])
+    axis = build.constant([1], np.int64)
+    if share == 1.0 and k > 1:
+        votes = build.node("ReduceSum", [cast, axis], keepdims=0)
+        build.node("Div", [votes, build.constant(float(k))], f"{task}_scores")
+    else:
+        votes = build.node("ReduceSum", [cast, axis], f"{task}_scores", keepdims=0)
+    if k <= 2:
+        # Two neighbours agree or tie: either way the nearest has it.
+        build.node("Gather", [said, build.constant(0, np.int64)], f"{task}_label", axis=1)
+        return
     # The first neighbour whose class has the most votes is the nearest of the tied.
     own = build.node("GatherElements", [votes, said], axis=1)
     place = build.node("ArgMax", [own], axis=1, keepdims=1)
     label = build.node("GatherElements", [said, place], axis=1)
-    build.node("Squeeze", [label, build.constant([1], np.int64)], f"{task}_label")
+    build.node("Squeeze", [label, axis], f"{task}_label")
 
 
 def _convert(scope: Any, operator: Any, container: Any) -> None:
