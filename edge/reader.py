@@ -45,6 +45,10 @@ STEPS_PER_FRAME = 24
 """Most transactions a frame spends on bringing chips back."""
 
 
+NEVER = -1.0e9
+"""When a chip that was never read was read: long ago, but a number."""
+
+
 class State(enum.Enum):
     """Of one chip."""
 
@@ -72,7 +76,7 @@ class Slot:
         self.chip: Chip | None = None
         self.state = State.DOWN
         self.error: BusError | None = None
-        self.at = -math.inf
+        self.at = NEVER
         self.good = False
         self.bits = frame_wire_bits(spec, row)
         self.suspect = False

@@ -18,9 +18,11 @@ from edge.chips.chip import Parsed
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError
 from edge.frame import Frame
-from edge.reader import BusReader, Slot, State, frame_bytes
+from edge.reader import NEVER, BusReader, Slot, State, frame_bytes
 from edge.skinfile import UNUSED, SkinFile, dead_band
 
+NOISY = 1.0
+"""Standard deviation in counts from which a chip's bytes change with every conversion."""
 MARGIN = 0.9
 """Part of a period in which a bus may begin what can wait."""
 
@@ -57,11 +59,19 @@ class ChipStatus:
 class _Group:
     """Chips that one parse call serves: of one kind, with the same number of taxels."""
 
-    def __init__(self, slots: Sequence[Slot], rows: NDArray[np.uint8], first: int) -> None:
+    def __init__(
+        self, slots: Sequence[Slot], chips: Sequence[int], rows: NDArray[np.uint8], first: int
+    ) -> None:
         self.slots, self.rows = slots, rows
+        self.chips = np.array(chips, dtype=np.intp)
         n = len(slots[0].spec.taxels)
         self.stages = slice(first, first + len(slots) * n)
         self.shape = (len(slots), n)
+        self.before = rows.copy()
+        self.unchanged = np.zeros(len(slots), dtype=np.int64)
+        """Readings in a row that gave the same bytes."""
+        self.noisy = np.zeros(len(slots), dtype=np.bool_)
+        self.any_noisy = False
 
     def parse(self) -> Parsed | None:
         for slot in self.slots:
@@ -166,7 +176,7 @@ class Skin:
         """Index arrays from stages and chips to taxels."""
         n = self.layout.rows * self.layout.cols
         self._groups = [
-            _Group([self._slots[i] for i in chips], rows, first)
+            _Group([self._slots[i] for i in chips], chips, rows, first)
             for chips, rows, first in groups.groups
         ]
         total = sum(g.shape[0] * g.shape[1] for g in self._groups)
@@ -202,16 +212,12 @@ class Skin:
             counts_per_frame=signal.drift_counts_per_s * self.period_s,
             limit=signal.drift_limit_counts,
         )
-        noisy = np.zeros(len(self._slots), dtype=np.bool_)
         if calibration is not None:
-            np.logical_or.at(
-                noisy,
-                self._chip_of[self._chip_of < len(noisy)],
-                (calibration.noise.ravel() >= 1.0)[self._chip_of < len(noisy)],
-            )
-        self._noisy = noisy
-        self._unchanged = np.zeros(len(self._slots), dtype=np.int64)
-        self._before = [slot.row.copy() for slot in self._slots]
+            noisy = np.zeros(len(self._slots) + 1, dtype=np.bool_)
+            np.logical_or.at(noisy, self._chip_of, calibration.noise.ravel() >= NOISY)
+            for group in self._groups:
+                group.noisy = noisy[group.chips]
+                group.any_noisy = bool(group.noisy.any())
 
     def start(self) -> list[ChipStatus]:
         """Identify and set up all chips.
@@ -307,20 +313,18 @@ class Skin:
             if parsed is not None:
                 raw[group.stages] = parsed[0].reshape(-1)
                 whole[group.stages] = parsed[1].reshape(-1)
-        at = np.array([slot.at for slot in slots] + [t])
+        at = np.array([slot.at for slot in slots] + [NEVER])
         good = np.array([slot.good for slot in slots] + [False])
-        self._suspect(good)
-        good[:-1] &= at[:-1] >= t - self.oldest_s
-        chip = self._chip_of
-        valid = good[chip]
+        self._suspect(good, at >= t)
+        good &= at >= t - self.oldest_s
+        valid = good[self._chip_of]
         valid &= whole[self._stage_of]
         valid &= self._alive
         values = raw[self._stage_of]
         counts = self.baseline.above(values)
         counts *= valid
-        times = at[chip]
-        np.maximum(times, t - 1.0e9, out=times)  # never read: long ago, but a number
-        self._follow(values, counts, valid, times >= t, t)
+        times = at[self._chip_of]
+        self._follow(values, counts, valid, times, t)
         shape = self.layout.shape
         self._last = Frame(
             t=t,
@@ -335,34 +339,31 @@ class Skin:
         """How old a taxel's value may be: with region-of-interest reading many frames."""
         return (2.0 if self.planner is None else 25.0) * self.period_s
 
-    def _suspect(self, good: NDArray[np.bool_]) -> None:
+    def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
         """Judge chips by what they serve: damaged words, or bytes that never change."""
+        limit = self.file.reading.stuck_frames
         for group in self._groups:
             if not self._whole[group.stages].all():
                 bad = ~self._whole[group.stages].reshape(group.shape).all(axis=1)
                 for i in np.flatnonzero(bad).tolist():
                     group.slots[i].suspect = group.slots[i].good
-        if self._noisy.any():
-            limit = self.file.reading.stuck_frames
-            for i in np.flatnonzero(self._noisy).tolist():
-                slot = self._slots[i]
-                if not slot.good:
-                    continue
-                if np.array_equal(slot.row, self._before[i]):
-                    self._unchanged[i] += 1
-                    if self._unchanged[i] >= limit:
-                        good[i] = False
-                        slot.suspect = True
-                else:
-                    self._unchanged[i] = 0
-                    self._before[i][:] = slot.row
+            if not group.any_noisy:
+                continue
+            same = (group.rows == group.before).all(axis=1)
+            np.copyto(group.before, group.rows)
+            group.unchanged += fresh[group.chips]
+            group.unchanged *= same & group.noisy
+            if int(group.unchanged.max()) >= limit:
+                for i in np.flatnonzero(group.unchanged >= limit).tolist():
+                    group.slots[i].suspect = True
+                    good[group.chips[i]] = False
 
     def _follow(
         self,
         values: NDArray[np.uint16],
         counts: NDArray[np.uint16],
         valid: NDArray[np.bool_],
-        fresh: NDArray[np.bool_],
+        times: NDArray[np.float64],
         t: float,
     ) -> None:
         """Let the baseline follow drift, unless something touches or has just touched."""
@@ -371,7 +372,7 @@ class Skin:
         if int(counts.max()) > self.layout.threshold_counts:
             self._touched_at = t
         elif t - self._touched_at >= self.file.signal.settle_s:
-            self.baseline.follow(values, valid & fresh)
+            self.baseline.follow(values, valid & (times >= t))
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""

@@ -6,7 +6,7 @@
  * in one call EINVAL, an address that nobody has EREMOTEIO; a channel connects after the call.
  *
  * I2CDEV_LOG names a file that gets a line for each ioctl but I2C_RDWR; I2CDEV_MUTE=bus:address
- * takes one address of channel 0 away; I2CDEV_HZ makes a call last as long as its bits do.
+ * takes one address of channel 0 away.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -20,7 +20,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { BUSES = 10, CHANNELS = 8, CHIPS = 4, REGISTERS = 0x400, HANDLES = 1024 };
@@ -94,7 +93,6 @@ static int carry(int b, struct i2c_msg *m)
 
 static int transfer(int b, struct i2c_rdwr_ioctl_data *call)
 {
-    long bits = 1;
     if (call->nmsgs > I2C_RDWR_IOCTL_MAX_MSGS)
         return EINVAL;
     for (unsigned i = 0; i < call->nmsgs; i++) {
@@ -107,14 +105,8 @@ static int transfer(int b, struct i2c_rdwr_ioctl_data *call)
         int error = carry(b, &call->msgs[i]);
         if (error)
             return error;
-        bits += 1 + 9 * (1 + call->msgs[i].len);
     }
     buses[b].connected = buses[b].control;
-    const char *hz = getenv("I2CDEV_HZ");
-    if (hz) {
-        struct timespec wait = { 0, (long)(bits * 1e9 / atof(hz)) };
-        nanosleep(&wait, NULL);
-    }
     return 0;
 }
 
