@@ -105,4 +105,4 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         for key in (f"{task}_{part}" for part in PARTS):
             arrays[key] = np.concatenate([row[key] for row in single])
     meta = {"skin": parts[0].meta.get("skin", {}), "bounds": BOUNDS, "model": info.data_digest}
-    save_arrays(path, arrays, meta)
+    save_arrays(path, arrays, meta, compress=True)

@@ -182,6 +182,8 @@ def choose(
     and Method III, differ by a constant per feature type that centring removes: they have the
     same neighbours but for rounding, and only the earlier of each pair is fitted.
     """
+    if k is not None and k > len(X) - 1:
+        raise InputError(f"k must be 1 to {len(X) - 1} with {len(X)} trials, not {k}")
     seen: set[str] = set()
     best: dict[str, tuple[tuple[float, int, int, int], Chosen]] = {}
     for order, scaling in enumerate(scalings):
@@ -200,7 +202,7 @@ def choose(
         for task, labels in y.items():
             grid = accuracies(rows, labels)
             for c in range(grid.shape[0]) if components is None else [components - 1]:
-                for j in range(grid.shape[1]) if k is None else [min(k, grid.shape[1]) - 1]:
+                for j in range(grid.shape[1]) if k is None else [k - 1]:
                     key = (-float(grid[c, j]), c, j, order)
                     if task not in best or key < best[task][0]:
                         found = Chosen(Choice(scaling, c + 1, j + 1), float(grid[c, j]))
