@@ -42,11 +42,9 @@ def main() -> None:
     with fake_skin(file, lambda t: patches[int(t) % 50], timed=True, faults=faults) as skin:
         loop = Loop(skin, lasts_s=60.0 * arguments.minutes)
         start = skin.clock.now()
-        frames = 0
-        for frame in loop.frames():
+        for frames, frame in enumerate(loop.frames(), 1):
             offset = (frame.t - start) / 0.01
             worst = max(worst, abs(offset - round(offset)) * 0.01)
-            frames += 1
             if frames % 6000 == 0:
                 gc.collect()
                 print(

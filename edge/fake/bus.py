@@ -20,6 +20,8 @@ from edge.fake.chips import FakeChip, FakeTCA9548A
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault, Place, Script
 
+Way = tuple[str, int, int | None, int | None]
+
 
 class FakeBus:
     """A bus with chips and muxes.
@@ -114,8 +116,9 @@ class FakeBus:
         self._refuse(messages)
         if not self._open:
             raise bus_error(errno.ENODEV, self.name, address)
-        place, chips = self._route(address)
-        fault = self.script.next(place, self.now()) if self.script.faults else None
+        way, chips = self._route(address)
+        place = Place(*way) if self.script.faults else None
+        fault = None if place is None else self.script.next(place, self.now())
         self.transactions += 1
         if fault is not None and fault.kind == "error":
             self._spend(11 if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
@@ -137,27 +140,29 @@ class FakeBus:
         self._stop()
 
     def _refuse(self, messages: Sequence[Message]) -> None:
-        address = messages[0].address
-        if len(messages) > LARGEST_MESSAGES or any(
-            len(m.buffer) > LARGEST_BYTES or m.address != address for m in messages
-        ):
-            raise bus_error(errno.EINVAL, self.name, address)
-        if any(m.read for m in messages[:-1]):
-            raise bus_error(errno.EOPNOTSUPP, self.name, address)
+        address, last = messages[0].address, messages[-1]
+        refused = errno.EINVAL if len(messages) > LARGEST_MESSAGES else 0
+        for message in messages:
+            if message.address != address or len(message.buffer) > LARGEST_BYTES:
+                refused = errno.EINVAL
+            elif message.read and message is not last:
+                refused = refused or errno.EOPNOTSUPP
+        if refused:
+            raise bus_error(refused, self.name, address)
 
-    def _route(self, address: int) -> tuple[Place, list[FakeChip]]:
+    def _route(self, address: int) -> tuple[Way, list[FakeChip]]:
         """Every chip that hears the address, and the way to it."""
-        found = [self.chips[address]] if address in self.chips else []
+        own = self.chips.get(address)
+        found = [] if own is None else [own]
         mux_address, channel = None, None
         for at, mux in self.chips.items():
             if isinstance(mux, FakeTCA9548A) and at != address:
                 for n in mux.connected:
-                    mux_address, channel = at, n
+                    if own is None:
+                        mux_address, channel = at, n
                     if address in mux.channels[n]:
                         found.append(mux.channels[n][address])
-        if address in self.chips:
-            mux_address = channel = None
-        return Place(self.name, address, mux_address, channel), found
+        return (self.name, address, mux_address, channel), found
 
     def _carry(
         self,
@@ -165,7 +170,7 @@ class FakeBus:
         chips: Sequence[FakeChip],
         t: float,
         fault: Fault | None,
-        place: Place,
+        place: Place | None,
     ) -> None:
         if not message.read:
             data = message.buffer.tobytes()
@@ -174,15 +179,20 @@ class FakeBus:
             for chip in chips:
                 chip.write(data, t)
             return
-        out = np.full(len(message.buffer), 0xFF, dtype=np.uint8)
-        for chip in chips:  # two chips at one address pull the same wire low
-            out &= np.frombuffer(chip.read(len(out), t), dtype=np.uint8)
+        out = np.frombuffer(chips[0].read(len(message.buffer), t), dtype=np.uint8)
+        if len(chips) > 1 or self.script.faults:
+            out = out.copy()
+            for chip in chips[1:]:  # two chips at one address pull the same wire low
+                out &= np.frombuffer(chip.read(len(out), t), dtype=np.uint8)
         if fault is not None and fault.kind == "flip":
             bit = self.script.random.randrange(8 * len(out))
             out[bit // 8] ^= 1 << bit % 8
+        if place is None:
+            message.buffer[:] = out
+            return
         if fault is not None and fault.kind == "hold":
             out[:] = np.frombuffer(self._held.get((place, len(out)), out.tobytes()), dtype=np.uint8)
-        elif len(out) > 2 and self.script.faults:
+        elif len(out) > 2:
             self._held[place, len(out)] = out.tobytes()
         message.buffer[:] = out
 

@@ -196,6 +196,9 @@ class FakeBlock:
         return out[:n].ljust(n, b"\0")
 
 
+CHANNELS_OF = [[n for n in range(8) if control >> n & 1] for control in range(256)]
+
+
 class FakeTCA9548A:
     """A model of the TCA9548A: what is written connects at STOP."""
 
@@ -224,4 +227,4 @@ class FakeTCA9548A:
     @property
     def connected(self) -> list[int]:
         """The channels that are connected."""
-        return [n for n in range(8) if self._connected >> n & 1]
+        return CHANNELS_OF[self._connected]

@@ -137,35 +137,53 @@ def fake_buses(
             faults=faults,
             seed=seed,
         )
+        felt = _Felt(spec, scene, rest.baseline.ravel())
         for c, chip in enumerate(spec.chips):
             stream = np.random.default_rng([seed, b, c]) if noise_counts > 0.0 else None
-            sense = _sense(chip, scene, rest.baseline.ravel(), noise_counts, stream)
-            _attach(bus, chip, _model(chip, sense, timed))
+            _attach(bus, chip, _model(chip, felt.sense(chip, noise_counts, stream), timed))
         buses.append(bus)
     return buses
 
 
-def _sense(
-    chip: ChipSpec,
-    scene: Scene,
-    rest: NDArray[np.uint16],
-    noise: float,
-    stream: np.random.Generator | None,
-) -> Sense:
-    """Raw values of one chip: rest and sign turned back on."""
-    taxels = np.array(chip.taxels)
-    idle = taxels == UNUSED
-    base = np.where(idle, _rest(chip), rest[taxels]).astype(np.int64)
-    gain = np.where(idle, 0, chip.sign)
-    top = _top(chip)
+class _Felt:
+    """Raw values of all taxels that one bus reads: rest and sign turned back on."""
 
-    def sense(t: float) -> NDArray[np.uint16]:
-        raw = base + gain * scene(t).reshape(-1).take(taxels)
-        if stream is not None:
-            raw = raw + np.rint(noise * stream.standard_normal(len(base))).astype(np.int64)
-        return np.maximum(np.minimum(raw, top), 1).astype(np.uint16)
+    def __init__(self, spec: BusSpec, scene: Scene, rest: NDArray[np.uint16]) -> None:
+        self._scene = scene
+        # One place more than taxels, for stages that are none.
+        self._rest = np.append(rest, 0).astype(np.int64)
+        self._gain = np.zeros(len(self._rest), dtype=np.int64)
+        self._top = np.full(len(self._rest), 65534, dtype=np.int64)
+        for chip in spec.chips:
+            places = list(chip.taxels)
+            self._gain[places], self._top[places] = chip.sign, _top(chip)
+        self._gain[UNUSED], self._rest[UNUSED] = 0, _rest(spec.chips[0])
+        self._at, self._raw = math.nan, self._rest
 
-    return sense
+    def raw(self, t: float) -> NDArray[np.int64]:
+        """(taxels + 1,) raw values at a time; chips that ask for the same time share them."""
+        if t != self._at:
+            self._raw = self._rest.copy()
+            self._raw[:-1] += self._gain[:-1] * self._scene(t).reshape(-1)
+            np.minimum(self._raw, self._top, out=self._raw)
+            np.maximum(self._raw, 1, out=self._raw)
+            self._at = t
+        return self._raw
+
+    def sense(self, chip: ChipSpec, noise: float, stream: np.random.Generator | None) -> Sense:
+        """What one chip senses."""
+        places, top = np.array(chip.taxels), _top(chip)
+
+        def quiet(t: float) -> NDArray[np.uint16]:
+            return self.raw(t).take(places, mode="wrap").astype(np.uint16)
+
+        def noisy(t: float) -> NDArray[np.uint16]:
+            assert stream is not None
+            raw = self.raw(t).take(places, mode="wrap")
+            raw = raw + np.rint(noise * stream.standard_normal(len(places))).astype(np.int64)
+            return np.maximum(np.minimum(raw, top), 1).astype(np.uint16)
+
+        return quiet if stream is None else noisy
 
 
 def _model(chip: ChipSpec, sense: Sense, timed: bool) -> FakeChip:
