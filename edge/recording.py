@@ -244,11 +244,13 @@ def save_arrays(
     meta: dict[str, Any],
     *,
     overwrite: bool = True,
+    compress: bool = False,
 ) -> None:
     """Write arrays and their JSON metadata as one `.npz`, whole or not at all."""
     text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     with write_whole(path, overwrite=overwrite) as file:
-        np.savez(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+        write = np.savez_compressed if compress else np.savez
+        write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
 def find(paths: list[str]) -> list[Path]:

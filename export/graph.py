@@ -265,6 +265,30 @@ def _shapes(operator: Any) -> None:
         variable.set_type(kind)
 
 
+def _captured(node: onnx.NodeProto) -> set[str]:
+    """What a node reads, itself or in its branches."""
+    names = set(node.input)
+    for attribute in node.attribute:
+        inside = attribute.g.node
+        made = {name for inner in inside for name in inner.output}
+        names |= {name for inner in inside for name in _captured(inner)} - made
+    return names
+
+
+def _in_order(nodes: list[onnx.NodeProto], known: set[str]) -> list[onnx.NodeProto]:
+    """Nodes after those they read from; skl2onnx does not see what a branch reads."""
+    made = {name for node in nodes for name in node.output}
+    waiting, ordered, ready = list(nodes), [], set(known)
+    while waiting:
+        now = [node for node in waiting if _captured(node) & made <= ready]
+        if not now:
+            raise ValueError("the graph has a loop")
+        waiting = [node for node in waiting if node not in now]
+        ordered += now
+        ready |= {name for node in now for name in node.output}
+    return ordered
+
+
 def to_onnx(model: ContactClassifier, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file."""
     update_registered_converter(
@@ -276,6 +300,9 @@ def to_onnx(model: ContactClassifier, info: ModelInfo) -> bytes:
         initial_types=[("features", DoubleTensorType([None, info.width]))],
         target_opset={"": OPSET},
     )
+    nodes = _in_order(list(proto.graph.node), {"features"})
+    del proto.graph.node[:]
+    proto.graph.node.extend(nodes)
     proto.ir_version = IR_VERSION
     proto.producer_name = "edge-classify"
     proto.doc_string = "scaler, PCA and k-NN of a touch; see the metadata"

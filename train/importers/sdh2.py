@@ -38,6 +38,8 @@ def trials(path: Path) -> Iterator[tuple[str, Recording]]:
         )
     if start.ndim != 1 or start.size < 2 or start[0] != 0 or start[-1] != len(frames):
         raise InputError(f"{path}: start does not divide the {len(frames)} frames into grasps")
+    if t_ms.shape != (len(frames),):
+        raise InputError(f"{path}: frames and their times t_ms differ in number")
     if not len(arrays["label"]) == len(arrays["fname"]) == start.size - 1:
         raise InputError(f"{path}: labels, names and grasps differ in number")
     rows, cols = frames.shape[2:]

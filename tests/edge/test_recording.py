@@ -1,0 +1,192 @@
+"""Recordings: what is written is read back, and what is wrong is one sentence."""
+
+import io
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from edge.recording import Recording, find, load, save
+
+
+def arrays_of(recording: Recording) -> dict[str, np.ndarray]:
+    out = {"t": recording.t, "frames": recording.frames, "meta": np.array("{}")}
+    if recording.joints is not None:
+        out["joints"] = recording.joints
+    return out
+
+
+def test_what_is_saved_is_loaded(make_touch, tmp_path):
+    recording = make_touch()
+    valid = np.ones(recording.frames.shape, dtype=bool)
+    valid[3, 4, 5] = False
+    full = Recording(recording.t, recording.frames, recording.joints, valid, recording.meta)
+    save(tmp_path / "a.npz", full)
+    back = load(tmp_path / "a.npz")
+    for name in ("t", "frames", "joints", "valid"):
+        assert getattr(back, name).tobytes() == getattr(full, name).tobytes()
+    assert back.meta == recording.meta
+    assert back.labels == {"category": "rigid-fixed", "object": "hard 0"}
+    assert [f.t for f in back] == recording.t.tolist()
+    assert not list(back)[3].valid[4, 5]
+
+
+def test_the_same_recording_gives_the_same_bytes(make_touch, tmp_path):
+    save(tmp_path / "a.npz", make_touch())
+    save(tmp_path / "b.npz", make_touch())
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_an_existing_file_is_kept_when_asked(make_touch, tmp_path):
+    path = tmp_path / "a.npz"
+    save(path, make_touch())
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="exists already"):
+        save(path, make_touch(seed=1), overwrite=False)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_recording_that_is_wrong_is_not_written(make_touch, tmp_path):
+    recording = make_touch()
+    with pytest.raises(InputError, match="time goes back at frame 1"):
+        save(tmp_path / "a.npz", Recording(recording.t[::-1], recording.frames))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_written_is_named(make_touch, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file/a.npz: cannot be written|exists already"):
+        save(tmp_path / "file" / "a.npz", make_touch())
+
+
+def change(**arrays):
+    return lambda good: {**good, **arrays}
+
+
+WRONG = {
+    "no t": (lambda a: {k: v for k, v in a.items() if k != "t"}, "t is missing"),
+    "no frames": (lambda a: {k: v for k, v in a.items() if k != "frames"}, "frames is missing"),
+    "no meta": (lambda a: {k: v for k, v in a.items() if k != "meta"}, "meta is missing"),
+    "float frames": (lambda a: {**a, "frames": a["frames"].astype(float)}, "frames must be uint16"),
+    "flat frames": (lambda a: {**a, "frames": a["frames"][0]}, "frames must be uint16"),
+    "no frame": (lambda a: {**a, "frames": a["frames"][:0], "t": a["t"][:0]}, "frames are empty"),
+    "short t": (lambda a: {**a, "t": a["t"][1:]}, r"t must be float64 \(180,\)"),
+    "whole t": (lambda a: {**a, "t": a["t"].astype(int)}, "t must be float64"),
+    "t goes back": (
+        lambda a: {**a, "t": np.append(a["t"][1:], 0.0)},
+        "time goes back at frame 179",
+    ),
+    "t not finite": (lambda a: {**a, "t": a["t"] * np.nan}, "t of frame 0 is not finite"),
+    "joints not finite": (
+        lambda a: {**a, "joints": np.where(np.arange(180)[:, None] == 7, np.inf, a["joints"])},
+        "joint angle of frame 7 is not finite",
+    ),
+    "few joints": (lambda a: {**a, "joints": a["joints"][1:]}, "joints must be float64"),
+    "no joint": (lambda a: {**a, "joints": a["joints"][:, :0]}, "joints have no column"),
+    "valid of another shape": (change(valid=np.ones((2, 2), bool)), "valid must be bool"),
+    "valid of another type": (change(valid=np.ones((16, 24))), "valid must be bool"),
+    "meta no text": (change(meta=np.array(3)), "meta must be one JSON text"),
+    "meta no JSON": (change(meta=np.array("{")), "meta is not JSON"),
+    "meta no object": (change(meta=np.array("[1]")), "meta must be a JSON object"),
+    "meta with NaN": (change(meta=np.array('{"a": NaN}')), "NaN is not a JSON number"),
+    "labels no text": (change(meta=np.array('{"labels": {"object": 3}}')), "meta.labels must map"),
+    "another skin": (change(meta=np.array('{"skin": {"rows": 3}}')), "frames are 16 x 24"),
+    "no scale": (change(meta=np.array('{"skin": {"counts_per_newton": -1}}')), "above 0"),
+    "objects": (change(meta=np.array([None], dtype=object)), "holds Python objects"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(case, make_touch, tmp_path):
+    damage, sentence = WRONG[case]
+    path = tmp_path / "wrong.npz"
+    np.savez(path, **damage(arrays_of(make_touch())))
+    with pytest.raises(InputError, match=sentence) as caught:
+        load(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_and_a_folder_are_named(tmp_path):
+    with pytest.raises(InputError, match="nothing.npz: no such file"):
+        load(tmp_path / "nothing.npz")
+    with pytest.raises(InputError, match="is a folder"):
+        load(tmp_path)
+    with pytest.raises(InputError, match="no .npz recording in this folder"):
+        find([str(tmp_path)])
+
+
+def test_a_header_that_claims_more_than_the_file_holds_allocates_nothing(tmp_path):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<u2", "fortran_order": False, "shape": (10**9, 16, 24)}
+    )
+    path = tmp_path / "huge.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("frames.npy", header.getvalue())
+    with pytest.raises(InputError, match="more than the file holds"):
+        load(path)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_damaged_files_are_refused_or_read_but_never_crash(good_bytes, tmp_path_factory, data):
+    """Cut short, or with bytes changed anywhere."""
+    damaged = bytearray(good_bytes)
+    for _ in range(data.draw(st.integers(0, 4))):
+        place = data.draw(st.integers(0, len(damaged) - 1))
+        damaged[place] = data.draw(st.integers(0, 255))
+    damaged = damaged[: data.draw(st.integers(0, len(damaged)))]
+    path = tmp_path_factory.getbasetemp() / "damaged.npz"
+    path.write_bytes(bytes(damaged))
+    try:
+        recording = load(path)
+    except InputError as error:
+        assert str(error).startswith(str(path))
+    else:
+        assert recording.frames.dtype == np.uint16
+
+
+@pytest.fixture(scope="module")
+def good_bytes(tmp_path_factory):
+    path = tmp_path_factory.mktemp("good") / "good.npz"
+    frames = np.arange(2 * 3 * 4, dtype=np.uint16).reshape(2, 3, 4)
+    save(path, Recording(np.array([0.0, 0.1]), frames, meta={"labels": {"object": "box"}}))
+    return path.read_bytes()
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=12), inner),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    labels=json_values,
+    skin=st.dictionaries(
+        st.sampled_from(
+            (
+                "rows cols wraps pitch_m radius_m counts_per_newton dead threshold_counts "
+                "onset_counts column_angles_deg row0_z_m"
+            ).split()
+        ),
+        json_values | st.integers(-5, 30),
+    ),
+)
+def test_any_metadata_is_read_or_refused_with_a_sentence(labels, skin, tmp_path_factory):
+    path = tmp_path_factory.getbasetemp() / "meta.npz"
+    meta = json.dumps({"labels": labels, "skin": skin})
+    np.savez(path, t=np.zeros(1), frames=np.zeros((1, 3, 4), np.uint16), meta=np.array(meta))
+    try:
+        recording = load(path)
+    except InputError as error:
+        assert str(path) in str(error)
+    else:
+        assert recording.layout.shape == (3, 4)

@@ -1,0 +1,205 @@
+"""The ONNX graph against the estimators it was made from, and against exact arithmetic."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from edge.features import FEATURES
+from edge.layout import SkinLayout
+from edge.model import Model, ModelInfo, Task
+from edge.track import TrackSettings
+from export import graph
+from train.pipeline import SCALINGS, Choice, ContactClassifier, vote
+
+
+def features(n, seed=0):
+    rng = np.random.default_rng(seed)
+    X = rng.gamma(2.0, size=(n, 120))
+    X[:, 40:80] *= 30
+    X[:, 80:] *= 0.02
+    return X
+
+
+@pytest.fixture
+def export(tmp_path):
+    """Fit and export; returns the classifier and the loaded model."""
+
+    def run(X, choices, labels=5, seed=0):
+        rng = np.random.default_rng(seed)
+        y = {t: np.array([f"o{i:02d}" for i in rng.integers(0, labels, len(X))]) for t in choices}
+        fitted = ContactClassifier(choices).fit(X, y)
+        tasks = {
+            t: Task(tuple(fitted.classes_[t]), c.k, fitted.components_[t], c.scaling, 0.5)
+            for t, c in choices.items()
+        }
+        info = ModelInfo(
+            tasks=tasks,
+            layout=SkinLayout(16, 24, True),
+            tracking=TrackSettings(),
+            window_s=1.2,
+            samples=40,
+            features=FEATURES,
+            units={},
+            motion_frame="skin",
+            chain=None,
+            rows=len(X),
+            data_digest="",
+        )
+        path = tmp_path / "model.onnx"
+        path.write_bytes(graph.to_onnx(fitted, info))
+        return fitted, Model(path)
+
+    return run
+
+
+def agree(fitted, model, queries):
+    answers = model.run(queries)
+    for task in fitted.choices:
+        distances, rows = fitted.neighbours(task, queries)
+        winners, shares = vote(fitted.labels_[task][rows], len(fitted.classes_[task]))
+        assert (answers[f"{task}_neighbours"] == rows).all()
+        assert (answers[f"{task}_label"] == winners).all()
+        assert (answers[f"{task}_scores"] == shares).all()
+        assert np.abs(answers[f"{task}_distances"] - distances).max() <= 1e-14 * distances.max()
+
+
+@pytest.mark.parametrize("scaling", SCALINGS)
+def test_every_scaling_agrees_with_the_estimators(export, scaling):
+    X = features(60)
+    fitted, model = export(X, {"t": Choice(scaling, 7, 3)})
+    agree(fitted, model, np.concatenate([X, features(40, seed=1)]))
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 7, 8, 40])
+def test_every_number_of_voters_agrees_down_to_the_last_tie(export, k):
+    X = features(40)
+    fitted, model = export(X, {"t": Choice("IV", 3, k)})
+    agree(fitted, model, features(100, seed=1))
+
+
+def test_several_tasks_share_what_they_share(export):
+    X = features(50)
+    choices = {
+        "a": Choice("IV", 20, 2),
+        "b": Choice("IV", 3, 4),
+        "c": Choice("none", 7, 1),
+        "d": Choice("IV", 20, 5),
+    }
+    fitted, model = export(X, choices)
+    agree(fitted, model, np.concatenate([X, features(40, seed=1)]))
+    proto = onnx.load(model.path)
+    operators = [n.op_type for n in proto.graph.node]
+    # Two projections of two products each; three distinct neighbour searches.
+    assert operators.count("MatMul") == 4
+    assert operators.count("ReduceSumSquare") == 3
+    assert [o.domain for o in proto.opset_import] == [""]
+
+
+@pytest.mark.parametrize("n", [100, 1400])
+def test_a_query_that_equals_a_training_row_lies_at_distance_zero(export, n):
+    X = features(n)
+    _, model = export(X, {"t": Choice("IV", 20, 3)})
+    for queries in (X[:64], X[5:6]):
+        answer = model.run(queries)
+        assert not answer["t_distances"][:, 0].any()
+    assert (model.run(X)["t_neighbours"][:, 0] == np.arange(n)).all()
+
+
+@pytest.mark.parametrize("n", [100, 1400])
+def test_one_at_a_time_or_all_at_once_gives_the_same_bits(export, n):
+    X = features(n)
+    _, model = export(X, {"t": Choice("II", 20, 4)})
+    queries = features(50, seed=3)
+    together = model.run(queries)
+    for i in range(50):
+        for name, value in model.run(queries[i : i + 1]).items():
+            assert value.tobytes() == together[name][i : i + 1].tobytes()
+
+
+def exact_order(fitted, queries, k):
+    """Neighbours by exact squared distances of the projected coordinates, ties to lower rows."""
+    rows = [[Fraction(v) for v in r] for r in fitted.rows_["none"].tolist()]
+    found = []
+    for q in fitted.projections_["none"](queries).tolist():
+        point = [Fraction(v) for v in q]
+        squares = [sum((a - b) ** 2 for a, b in zip(r, point, strict=True)) for r in rows]
+        found.append(sorted(range(len(rows)), key=lambda i: (squares[i], i))[:k])
+    return np.array(found)
+
+
+def test_near_duplicates_are_told_apart_by_the_exact_distances(export):
+    base = features(8)
+    jitter = 1e-7 * np.random.default_rng(1).normal(size=(160, 120))
+    X = np.repeat(base, 20, axis=0) * (1 + jitter)
+    fitted, model = export(X, {"t": Choice("none", 5, 6)})
+    queries = np.repeat(base, 3, axis=0) * (
+        1 + 1e-7 * np.random.default_rng(2).normal(size=(24, 120))
+    )
+    assert (model.run(queries)["t_neighbours"] == exact_order(fitted, queries, 6)).all()
+
+
+def test_a_shortlist_that_may_be_too_narrow_measures_every_row(export):
+    """Two hundred near-duplicates are all within float32's rounding of each other: the
+    shortlist cannot hold them, its check fails, and the answer is still exact."""
+    base = features(8)
+    jitter = 1e-9 * np.random.default_rng(1).normal(size=(1600, 120))
+    X = np.repeat(base, 200, axis=0) * (1 + jitter)
+    assert len(X) >= graph.SHORTLIST_ROWS
+    fitted, model = export(X, {"t": Choice("none", 5, 6)})
+    agree(fitted, model, X[::100] * (1 + 1e-10))
+
+
+def test_without_its_check_the_shortlist_would_be_wrong(export, monkeypatch):
+    """The guard is needed: taken away, near-duplicates get wrong neighbours."""
+    base = features(8)
+    jitter = 1e-9 * np.random.default_rng(1).normal(size=(1600, 120))
+    X = np.repeat(base, 200, axis=0) * (1 + jitter)
+    node = graph.Builder.node
+
+    def always_sure(self, operator, inputs, output="", **attributes):
+        if operator == "Less":
+            return node(self, "LessOrEqual", [inputs[0], inputs[0]], output)
+        return node(self, operator, inputs, output, **attributes)
+
+    monkeypatch.setattr(graph.Builder, "node", always_sure)
+    fitted, model = export(X, {"t": Choice("none", 5, 6)})
+    _, rows = fitted.neighbours("t", X[::100])
+    assert (model.run(X[::100])["t_neighbours"] != rows).any()
+
+
+def test_a_shortlist_beside_the_direct_search(export, monkeypatch):
+    X = features(1400)
+    queries = np.concatenate([X[:100], features(100, seed=1), 50.0 * features(5, seed=2)])
+    choices = {"t": Choice("IV", 20, 5)}
+    _, short = export(X, choices)
+    answers = short.run(queries)
+    monkeypatch.setattr(graph, "SHORTLIST_ROWS", 10**9)
+    _, direct = export(X, choices)
+    expected = direct.run(queries)
+    for part in ("label", "neighbours", "scores"):
+        assert (answers[f"t_{part}"] == expected[f"t_{part}"]).all()
+
+
+@pytest.mark.parametrize("n", [60, 1400])
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_what_is_not_finite_is_never_classified_and_spoils_no_other_row(export, n, k):
+    X = features(n)
+    _, model = export(X, {"t": Choice("IV", 5, k)})
+    queries = X[:8].copy()
+    queries[1, 0], queries[2, 119], queries[3, 60] = np.nan, np.inf, -np.inf
+    queries[4] = 1e200
+    answer = model.run(queries)
+    assert (answer["t_label"][[1, 2, 3, 4]] == -1).all()
+    assert not answer["t_scores"][[1, 2, 3, 4]].any()
+    assert (answer["t_label"][[0, 5, 6, 7]] == model.run(X[[0, 5, 6, 7]])["t_label"]).all()
+
+
+def test_the_same_fit_gives_the_same_bytes(export):
+    X = features(30)
+    _, first = export(X, {"t": Choice("IV", 5, 2)})
+    before = Path(first.path).read_bytes()
+    _, again = export(X, {"t": Choice("IV", 5, 2)})
+    assert Path(again.path).read_bytes() == before

@@ -1,0 +1,140 @@
+"""Leave-one-out over the whole grid, entry by entry against scikit-learn's search."""
+
+import numpy as np
+import pytest
+from sklearn.model_selection import GridSearchCV, LeaveOneOut
+from sklearn.pipeline import Pipeline
+
+from edge.errors import InputError
+from train.crossval import choose, leave_one_out, neighbours, votes_right
+from train.dataset import load_trials
+from train.pipeline import SCALINGS, FeatureScaler, NearestNeighbours, PrincipalComponents, vote
+
+
+def sklearn_table(X, y, scaling, components, ks):
+    search = GridSearchCV(
+        Pipeline(
+            [
+                ("scale", FeatureScaler(scaling)),
+                ("pca", PrincipalComponents()),
+                ("knn", NearestNeighbours()),
+            ]
+        ),
+        {"pca__components": components, "knn__k": ks},
+        cv=LeaveOneOut(),
+        scoring="accuracy",
+    ).fit(X, y)
+    table = np.zeros((len(components), len(ks)))
+    for cell, score in zip(
+        search.cv_results_["params"], search.cv_results_["mean_test_score"], strict=True
+    ):
+        at = components.index(cell["pca__components"]), ks.index(cell["knn__k"])
+        table[at] = score
+    return table
+
+
+def overlapping(n=24, seed=0):
+    """Two feature types that overlap, so that votes tie and accuracies differ."""
+    rng = np.random.default_rng(seed)
+    y = np.array(["a", "b", "c"])[rng.integers(0, 3, n)]
+    X = rng.normal(size=(n, 120))
+    X[:, 40:80] += np.where(y == "a", 1.0, 0.0)[:, None]
+    X[:, 80:] = X[:, 80:] * 0.01 + np.where(y == "b", 0.005, 0.0)[:, None]
+    return X, y
+
+
+@pytest.mark.parametrize("scaling", SCALINGS)
+def test_the_table_is_that_of_grid_search(scaling):
+    X, y = overlapping()
+    components, ks = [1, 2, 3, 7, 20], [1, 2, 3, 4, 9, 20]
+    ours = leave_one_out(X, y, scaling=scaling)
+    theirs = sklearn_table(X, y, scaling, components, ks)
+    assert ours.shape == (20, 20)
+    picked = ours[np.ix_([c - 1 for c in components], [k - 1 for k in ks])]
+    assert np.abs(picked - theirs).max() < 1e-12
+    assert len(np.unique(picked)) > 3
+
+
+def test_the_table_is_that_of_grid_search_on_touches(recordings):
+    data = load_trials([recordings])
+    X, y = data.features(), data.labels("object")
+    ours = leave_one_out(X, y, max_components=4, max_k=4)
+    assert np.abs(ours - sklearn_table(X, y, "none", [1, 2, 3, 4], [1, 2, 3, 4])).max() < 1e-12
+
+
+def test_the_table_is_that_of_grid_search_on_real_grasps(real, tmp_path):
+    from edge.recording import save
+    from train.importers import sdh2
+
+    for name, recording in list(sdh2.trials(real / "sdh2_grasps_856.npz"))[::30]:
+        save(tmp_path / f"{name}.npz", recording)
+    data = load_trials([tmp_path])
+    X, y = data.features(), np.array([label[:4] for label in data.labels("object")])
+    ours = leave_one_out(X, y, max_components=5, max_k=6, scaling="IV")
+    theirs = sklearn_table(X, y, "IV", [1, 5], [1, 2, 6])
+    assert np.abs(ours[np.ix_([0, 4], [0, 1, 5])] - theirs).max() < 1e-12
+
+
+def test_votes_for_every_k_at_once_are_those_one_by_one():
+    rng = np.random.default_rng(0)
+    labels = rng.integers(0, 3, 50)
+    rows = rng.integers(0, 50, (7, 4, 9))
+    truth = rng.integers(0, 3, (7, 1))
+    right = votes_right(rows, labels, truth)
+    for k in range(1, 10):
+        for i in range(7):
+            winners, _ = vote(labels[rows[i, :, :k]], 3)
+            assert (right[i, :, k - 1] == (winners == truth[i])).all()
+
+
+def test_equal_distances_and_duplicates_go_to_the_earlier_row():
+    rng = np.random.default_rng(1)
+    X = rng.normal(size=(4, 120))[[0, 1, 0, 2, 0, 3]]
+    rows = neighbours(X, max_components=2, max_k=3)
+    assert rows[0, :, :2].tolist() == [[2, 4], [2, 4]]
+    assert rows[4, :, :2].tolist() == [[0, 2], [0, 2]]
+
+
+def test_components_beyond_the_rank_add_nothing():
+    X = np.random.default_rng(2).normal(size=(5, 120))
+    rows = neighbours(X, max_components=10, max_k=3)
+    assert rows.shape == (5, 10, 3)
+    assert (rows[:, 3:] == rows[:, 3:4]).all()  # four others span three components
+
+
+def test_processes_do_not_change_the_result():
+    X, _ = overlapping(20)
+    assert (neighbours(X, jobs=2) == neighbours(X, jobs=1)).all()
+
+
+def test_the_smallest_of_the_best_models_is_chosen():
+    X, y = overlapping(seed=4)
+    found = choose(X, {"t": y})["t"]
+    tables = {s: leave_one_out(X, y, scaling=s) for s in SCALINGS}
+    best = max(table.max() for table in tables.values())
+    assert found.accuracy == pytest.approx(best)
+    cells = [
+        (c, k, SCALINGS.index(s))
+        for s, table in tables.items()
+        for c, k in np.argwhere(table >= best - 1e-12).tolist()
+    ]
+    c, k, s = min(cells)
+    assert (found.choice.components, found.choice.k) == (c + 1, k + 1)
+    assert found.choice.scaling == SCALINGS[s]
+
+
+def test_fixed_values_are_kept():
+    X, y = overlapping()
+    found = choose(X, {"t": y}, scalings=["II"], components=7, k=3)["t"]
+    assert (found.choice.scaling, found.choice.components, found.choice.k) == ("II", 7, 3)
+    table = leave_one_out(X, y, scaling="II")
+    assert found.accuracy == pytest.approx(table[6, 2])
+
+
+def test_too_few_trials_and_values_that_are_not_finite_are_named():
+    with pytest.raises(InputError, match="at least 2 trials"):
+        leave_one_out(np.zeros((1, 120)), np.array(["a"]))
+    X, y = overlapping()
+    X[3, 3] = np.inf
+    with pytest.raises(InputError, match="trial 3"):
+        leave_one_out(X, y)

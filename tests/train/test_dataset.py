@@ -1,0 +1,126 @@
+"""Data sets: one skin, one arm, one threshold, the edge's own features."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.features import feature_vector
+from edge.live import Watcher
+from edge.model import Model
+from edge.recording import load, save
+from train.dataset import load_trials
+
+
+def test_trials_and_tasks_of_a_folder(recordings):
+    data = load_trials([recordings])
+    assert len(data.trials) == 16
+    assert data.tasks == ("category", "object")
+    assert data.features().shape == (16, 120)
+    assert set(data.labels("object")) == {"hard 0", "hard 1", "soft 0", "soft 1"}
+    assert data.chain.dof == 5
+    assert data.units["contact_motion"] == "metre"
+
+
+def test_training_and_the_board_compute_the_same_bits(recordings, exported):
+    model = Model(exported / "model.onnx")
+    data = load_trials([recordings], horizon_s=1.2)
+    for trial, expected in zip(data.trials, data.features(), strict=True):
+        recording = load(trial.path)
+        watcher = Watcher(model, recording.layout)
+        seen = []
+        for frame in recording:
+            watcher.push(frame)
+            seen += [c for c in watcher._waiting if c not in seen]
+        vector = feature_vector(seen[0].series(), 1.2)
+        assert vector.tobytes() == expected.tobytes()
+
+
+def test_the_digest_follows_the_data(recordings, tmp_path):
+    before = load_trials([recordings]).digest
+    copy = tmp_path / "copy"
+    shutil.copytree(recordings, copy)
+    assert load_trials([copy]).digest == before
+    save(copy / "hard_0.npz", load(recordings / "hard_1.npz"))
+    assert load_trials([copy]).digest != before
+
+
+def test_one_threshold_for_all(recordings):
+    low = load_trials([recordings])
+    high = load_trials([recordings], threshold=400)
+    assert (high.layout.threshold_counts, high.layout.onset_counts) == (400, 600)
+    area = slice(40, 80)
+    assert high.features()[:, area].sum() < low.features()[:, area].sum()
+    own = load_trials([recordings], threshold=400, onset=500)
+    assert own.layout.onset_counts == 500
+
+
+def test_recordings_that_are_never_touched_are_left_out_and_named(recordings, make_touch, tmp_path):
+    shutil.copytree(recordings, tmp_path / "data")
+    quiet = make_touch()
+    save(tmp_path / "data" / "quiet.npz", replace(quiet, frames=np.zeros_like(quiet.frames)))
+    data = load_trials([tmp_path / "data"])
+    assert [p.name for p in data.untouched] == ["quiet.npz"]
+    assert len(data.trials) == 16
+
+
+def test_without_joints_in_every_trial_motion_is_on_the_skin(recordings, make_touch, tmp_path):
+    shutil.copytree(recordings, tmp_path / "data")
+    save(tmp_path / "data" / "bare.npz", make_touch(arm=False))
+    assert load_trials([tmp_path / "data"]).chain is None
+
+
+def labelled(recording, **labels):
+    return replace(recording, meta={**recording.meta, "labels": labels})
+
+
+def skinned(recording, **skin):
+    return replace(recording, meta={**recording.meta, "skin": {**recording.meta["skin"], **skin}})
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda r: labelled(r), "share no label"),
+        (lambda r: skinned(r, wraps=False), "odd.npz: this skin has wrap-around False"),
+        (lambda r: skinned(r, counts_per_newton=None), "odd.npz: this skin measures count"),
+        (
+            lambda r: replace(r, joints=np.zeros((len(r.t), 3))),
+            "odd.npz: has 3 joint angles and names no arm",
+        ),
+        (
+            lambda r: replace(
+                r,
+                joints=np.zeros((len(r.t), 1)),
+                meta={**r.meta, "arm": {"joint": [{"axis": [0, 0, 1]}]}},
+            ),
+            "is not that of",
+        ),
+        (
+            lambda r: replace(r, meta={**r.meta, "arm": {"joint": [{"axis": [0, 0, 1]}]}}),
+            "odd.npz: has 5 joint angles, its arm takes 1",
+        ),
+    ],
+)
+def test_recordings_that_do_not_belong_together_are_refused(
+    change, word, recordings, make_touch, tmp_path
+):
+    shutil.copytree(recordings, tmp_path / "data")
+    save(tmp_path / "data" / "odd.npz", change(make_touch()))
+    with pytest.raises(InputError, match=word):
+        load_trials([tmp_path / "data"])
+
+
+def test_damaged_files_stop_the_fit_and_the_first_is_named(recordings, tmp_path):
+    shutil.copytree(recordings, tmp_path / "data")
+    for name in ("hard_3", "soft_1"):
+        (tmp_path / "data" / f"{name}.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"hard_3.npz: not a readable .* \(and 1 more files\)"):
+        load_trials([tmp_path / "data"])
+
+
+def test_a_threshold_that_no_contact_reaches_is_said(recordings):
+    with pytest.raises(InputError, match="no contact in any of 16 recordings"):
+        load_trials([recordings], threshold=60000)

@@ -1,0 +1,199 @@
+"""The estimators against formulas, exact integers and long double."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.pipeline import make_pipeline
+
+from edge.errors import InputError
+from train.pipeline import (
+    SCALINGS,
+    WEIGHT_BITS,
+    Choice,
+    ContactClassifier,
+    FeatureScaler,
+    NearestNeighbours,
+    PrincipalComponents,
+    Projection,
+    principal_axes,
+    vote,
+)
+
+
+def data(n=30, seed=0):
+    rng = np.random.default_rng(seed)
+    X = rng.gamma(2.0, size=(n, 120))
+    X[:, 40:80] *= 30
+    X[:, 80:] *= 0.02
+    return X
+
+
+def test_scalings_are_the_papers_equations_per_feature_type():
+    X = data()
+    f = [X[:, i * 40 : i * 40 + 40] for i in range(3)]
+    expected = {
+        "none": f,
+        "I": [(b - b.mean()) / b.max() for b in f],
+        "II": [b / b.max() for b in f],
+        "III": [b - b.mean() for b in f],
+        "IV": [(b - b.mean()) / b.std() for b in f],
+        "V": [f[0], f[1], f[2] * max(f[0].max(), f[1].max()) / f[2].max()],
+    }
+    assert set(expected) == set(SCALINGS)
+    for method, blocks in expected.items():
+        scaled = FeatureScaler(method).fit(X).transform(X)
+        assert scaled == pytest.approx(np.hstack(blocks), rel=1e-14, abs=1e-13)
+
+
+@pytest.mark.parametrize("method", ["I", "II", "IV", "V"])
+def test_a_feature_type_that_told_nothing_in_training_is_dropped(method):
+    X = data()
+    X[:, 80:] = 0.0
+    scaler = FeatureScaler(method).fit(X)
+    moved = X.copy()
+    moved[:, 80:] = 1e6
+    assert (scaler.transform(moved) == scaler.transform(X)).all()
+
+
+def test_a_spread_that_is_only_rounding_is_no_spread():
+    X = data()
+    X[:, 80:] = 0.1  # its mean is not exactly 0.1
+    assert FeatureScaler("IV").fit(X).gain_[2] == 0.0
+
+
+def test_components_match_long_double_and_have_a_fixed_sign():
+    X = data(n=50)
+    _, axes, values = principal_axes(X)
+    centred = (X - X.mean(axis=0)).astype(np.longdouble)
+    covariance = centred.T @ centred
+    assert len(axes) == 49
+    # Each is an eigenvector of the long double scatter to within rounding of the largest.
+    residual = (
+        covariance @ axes.T.astype(np.longdouble) - axes.T * values.astype(np.longdouble) ** 2
+    )
+    assert float(np.abs(residual).max()) < 1e-12 * float(values[0] ** 2)
+    top = axes[np.arange(len(axes)), np.abs(axes).argmax(axis=1)]
+    assert (top > 0).all()
+    assert principal_axes(X[::-1])[1][:5] == pytest.approx(axes[:5], abs=1e-12)
+
+
+def test_components_stop_at_the_rank():
+    X = data(n=12)
+    pca = PrincipalComponents(20).fit(X)
+    assert (len(pca.components_), pca.dropped_) == (11, 9)
+    rank_two = np.outer(np.arange(30.0), X[0]) + np.outer(np.arange(30.0) ** 2, X[1])
+    assert len(PrincipalComponents(20).fit(rank_two).components_) == 2
+
+
+def test_a_column_without_variance_gets_no_weight():
+    X = data()
+    X[:, 7] = 0.1
+    X[:, 90] = 0.0
+    _, axes, _ = principal_axes(X)
+    assert not axes[:, [7, 90]].any()
+
+
+def test_votes_and_ties():
+    labels = np.array([[2, 0, 0], [1, 0, 2], [1, 0, 0], [2, 2, 0]])
+    winners, shares = vote(labels, 3)
+    assert winners.tolist() == [0, 1, 0, 2]
+    assert shares[1].tolist() == [1 / 3, 1 / 3, 1 / 3]
+    assert vote(np.array([[2, 0]]), 3)[0].tolist() == [2]
+
+
+def test_equal_distances_go_to_the_earlier_row():
+    rows = np.array([[1.0], [-1.0], [1.0], [3.0]])
+    nearest = NearestNeighbours(3).fit(rows, np.array(["a", "b", "c", "d"]))
+    _, found = nearest.kneighbors(np.array([[0.0]]))
+    assert found.tolist() == [[0, 1, 2]]
+    assert nearest.predict(np.array([[0.0]])).tolist() == ["a"]
+
+
+def test_the_estimators_work_in_a_scikit_learn_pipeline():
+    X, y = data(), np.repeat(["a", "b"], 15)
+    pipe = make_pipeline(FeatureScaler("IV"), PrincipalComponents(3), NearestNeighbours(1))
+    assert (pipe.fit(X, y).predict(X) == y).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 100),
+    scaling=st.sampled_from(SCALINGS),
+    offset=st.sampled_from([0.0, 1e3, 1e6]),
+    spread=st.sampled_from([1e-6, 1.0, 1e6]),
+)
+def test_a_projection_is_exact_in_any_order(seed, scaling, offset, spread):
+    """Its two sums are those of exact fractions, so the order of summation cannot matter."""
+    X = data(seed=seed) * spread + offset
+    projection = Projection(X, scaling, 4)
+    z = projection(X)
+    d = (X - projection.mean) * projection.gain
+    high = (d + projection.high) - projection.high
+    low = ((d - high) + projection.low) - projection.low
+    scale = 2**WEIGHT_BITS
+    weights = (projection.weights * scale).astype(int)
+    for i in range(0, len(X), 7):
+        for j in range(weights.shape[1]):
+            w = [Fraction(int(v), scale) for v in weights[:, j]]
+            parts = [
+                sum((Fraction(v) * u for v, u in zip(half[i].tolist(), w, strict=True)), Fraction())
+                for half in (high, low)
+            ]
+            # Each half's sum is a float64, and only their sum is rounded.
+            assert all(Fraction(float(part)) == part for part in parts)
+            assert z[i, j] == float(parts[0]) + float(parts[1])
+    order = np.random.default_rng(seed).permutation(120)
+    shuffled = (
+        high[:, order] @ projection.weights[order] + low[:, order] @ projection.weights[order]
+    )
+    assert (shuffled == z).all()
+
+
+def test_what_a_projection_cuts_off_is_below_float64_of_its_range():
+    X = data()
+    projection = Projection(X, "none", 20)
+    exact = (X - projection.mean).astype(np.longdouble) @ projection.weights.astype(np.longdouble)
+    reach = np.abs(X - projection.mean).max()
+    assert float(np.abs(projection(X) - exact).max()) < 120 * 2.0**-51 * reach
+
+
+def test_features_whose_squares_vanish_or_overflow_are_refused():
+    for scale in (1e-110, 1e110):
+        with pytest.raises(InputError, match="other units"):
+            Projection(data() * scale, "none", 2)
+
+
+def test_a_classifier_answers_every_task_by_the_rules():
+    X = data()
+    y = {"kind": np.repeat(["a", "b"], 15), "object": np.tile(["x", "y", "z"], 10)}
+    choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
+    model = ContactClassifier(choices).fit(X, y)
+    assert model.components_ == {"kind": 5, "object": 29}
+    distances, rows = model.neighbours("object", X)
+    assert (rows[:, 0] == np.arange(30)).all()
+    assert not distances.any()
+    assert (model.predict(X)["object"] == y["object"]).all()
+
+
+@pytest.mark.parametrize(
+    ("choice", "word"),
+    [
+        (Choice("none", 5, 31), "k must be 1 to 30"),
+        (Choice("none", 5, 0), "k must be"),
+        (Choice("none", 0, 1), "components must be"),
+        (Choice("VI", 5, 1), "scaling must be one of none, I"),
+    ],
+)
+def test_choices_that_make_no_sense_are_named(choice, word):
+    with pytest.raises(InputError, match=word):
+        ContactClassifier({"t": choice}).fit(data(), {"t": np.repeat(["a", "b"], 15)})
+
+
+def test_a_trial_that_is_not_finite_is_named():
+    X = data()
+    X[17, 3] = np.nan
+    with pytest.raises(InputError, match="trial 17"):
+        ContactClassifier({"t": Choice("none", 2, 1)}).fit(X, {"t": np.repeat(["a", "b"], 15)})
