@@ -64,7 +64,9 @@ class Baseline:
 
     def follow(self, raw: NDArray[np.uint16], fresh: NDArray[np.bool_]) -> None:
         """Follow one frame's drift, where the taxels are `fresh`; call it while nothing touches."""
-        error = (raw.astype(np.int32) << SCALE_BITS) - self._now
+        error = raw.astype(np.int32)
+        error <<= SCALE_BITS
+        error -= self._now
         error += 1 << (FOLLOW_BITS - 1)
         error >>= FOLLOW_BITS
         np.minimum(error, self._step, out=error)
