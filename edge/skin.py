@@ -30,7 +30,7 @@ MARGIN = 0.9
 class Planner(Protocol):
     """Chooses which chips a frame reads; `edge.interest` has one."""
 
-    def plan(self, frame: Frame | None) -> Sequence[Sequence[int]]:
+    def plan(self, frame: Frame | None, touch_counts: int) -> Sequence[Sequence[int]]:
         """For each bus the indices of the chips to read next, in order."""
         ...
 
@@ -125,6 +125,8 @@ class Skin:
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
         self.planner: Planner | None = None
+        self.touch_counts = file.layout.threshold_counts
+        """A taxel above this is being touched: the baseline is frozen, its chip is of interest."""
         self.following = True
         """The baseline follows drift."""
         groups = _rows(file)
@@ -289,7 +291,7 @@ class Skin:
     def _transfer(self, t: float) -> None:
         jobs = self._every
         if self.planner is not None:
-            chosen = self.planner.plan(self._last)
+            chosen = self.planner.plan(self._last, self.touch_counts)
             jobs = [
                 [reader.slots[i] for i in indices]
                 for reader, indices in zip(self.readers, chosen, strict=True)
@@ -369,7 +371,7 @@ class Skin:
         """Let the baseline follow drift, unless something touches or has just touched."""
         if self.file.calibration is None or not self.following:
             return
-        if int(counts.max()) > self.layout.threshold_counts:
+        if int(counts.max()) > self.touch_counts:
             self._touched_at = t
         elif t - self._touched_at >= self.file.signal.settle_s:
             self.baseline.follow(values, valid & (times >= t))

@@ -39,7 +39,7 @@ def test_one_400_khz_bus_carries_13_chips_at_100_hz(planner):
 
 
 def test_while_nothing_touches_every_chip_comes_in_turn(planner):
-    read = [set(planner.plan(touched())[0]) for _ in range(9)]
+    read = [set(planner.plan(touched(), 200)[0]) for _ in range(9)]
     for k in range(6):
         assert set.union(*read[k : k + 3]) == set(range(32))
 
@@ -50,14 +50,14 @@ def test_chips_near_a_contact_are_read_in_every_frame(planner):
     near = chips_at((3, 4), (4, 4))
     assert len(near) == 2
     for _ in range(20):
-        assert near <= set(planner.plan(frame)[0])
+        assert near <= set(planner.plan(frame, 200)[0])
 
 
 def test_the_neighbourhood_reaches_across_the_seam(planner):
     near = chips_at((8, 23), (8, 0))
     assert len(near) == 2
     for _ in range(5):
-        assert near <= set(planner.plan(touched((8, 0)))[0])
+        assert near <= set(planner.plan(touched((8, 0)), 200)[0])
 
 
 def test_away_from_the_contact_no_chip_is_forgotten(planner):
@@ -65,14 +65,14 @@ def test_away_from_the_contact_no_chip_is_forgotten(planner):
     last = np.zeros(32, dtype=int)
     oldest = 0
     for tick in range(1, 200):
-        last[planner.plan(frame)[0]] = tick
+        last[planner.plan(frame, 200)[0]] = tick
         oldest = max(oldest, int((tick - last).max()))
     assert oldest <= 20
 
 
 def test_a_contact_larger_than_the_wire_is_read_in_turn(planner):
     frame = Frame(t=0.0, counts=np.full((16, 24), 3000, dtype=np.uint16))
-    read = [set(planner.plan(frame)[0]) for _ in range(6)]
+    read = [set(planner.plan(frame, 200)[0]) for _ in range(6)]
     assert set.union(*read[:3]) == set(range(32))
     assert all(len(chips) >= 12 for chips in read)
 
