@@ -4,13 +4,15 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo bench clean
+.PHONY: help venv test lint types export demo bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
 	@echo "make bench    speed, side by side with the alternatives"
+	@echo "make faults   what each fault on the skin's wires costs, as a table"
+	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -70,6 +72,12 @@ bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
+
+faults: $(READY)
+	$(BIN)/python -m bench.faults
+
+soak: $(READY)
+	$(BIN)/python -m bench.soak
 
 clean:
 	rm -rf build dist
