@@ -9,6 +9,7 @@ import sys
 from typing import Any
 
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
+from edge.commands.sure import add_error, check_error
 from edge.live import Event, Watcher
 from edge.loop import Loop, Schedule, stop_on
 from edge.model import Model
@@ -24,6 +25,7 @@ def add_parser(commands: Any) -> None:
         "chips that fail and come back. Ctrl-C ends it after the line at hand.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
+    add_error(parser)
     add_skin(parser, joint_options=True)
     parser.add_argument(
         "--without-joints",
@@ -72,6 +74,7 @@ def emit(events: list[Event]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, watch, print, until the recording or the user ends it."""
     model = Model(arguments.model)
+    check_error(model, arguments.error)
     chain = model.info.chain
     with stop_on(signal.SIGINT) as stop, open_skin(arguments) as opened:
         on_skin = arguments.without_joints == "skin"
@@ -80,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         skin = opened.skin
         dof = None if chain is None else chain.dof
         with open_joints(arguments, opened, dof) as joints:
-            watcher = Watcher(model, skin.layout)
+            watcher = Watcher(model, skin.layout, error=arguments.error)
             # The model's threshold counts where it is the lower one.
             skin.touch_counts = min(skin.touch_counts, watcher.layout.threshold_counts)
             loop = Loop(
