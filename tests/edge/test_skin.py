@@ -200,14 +200,14 @@ def test_the_baseline_follows_drift_until_something_touches():
 
 
 def test_drift_is_not_followed_beyond_its_limit():
-    signal = replace(CODY.signal, drift_limit_counts=50, drift_counts_per_s=1000.0)
+    signal = replace(CODY.signal, drift_limit_counts=10, drift_counts_per_s=1000.0)
     file = replace(CODY, signal=signal)
-    level = np.full((16, 24), 150, dtype=np.uint16)
+    level = np.full((16, 24), 30, dtype=np.uint16)
     with fake_skin(file, lambda t: level) as skin:
         for i in range(300):
             skin.clock.sleep_until(i * 0.01)
             frame = skin.read()
-    assert (frame.counts == 100).all()
+    assert (frame.counts == 20).all()
 
 
 def test_a_skin_without_a_single_chip_says_so():
