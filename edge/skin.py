@@ -14,15 +14,18 @@ from numpy.typing import NDArray
 
 from edge.baseline import Baseline
 from edge.bus import Bus, BusError, LinuxBus
+from edge.calibration import dead_band
 from edge.chips.chip import Parsed
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError
 from edge.frame import Frame
 from edge.reader import NEVER, BusReader, Slot, State, frame_bytes
-from edge.skinfile import UNUSED, SkinFile, dead_band
+from edge.skinfile import UNUSED, SkinFile
 
 FOLLOW_FRAMES = 4
 """The baseline takes a step every so many frames: drift is slow, and steps cost time."""
+SEQUENCE_FRAMES = 25
+"""Readings after which a microcontroller that serves one frame over and over is taken to hang."""
 NOISY = 1.0
 """Standard deviation in counts from which a chip's bytes change with every conversion."""
 MARGIN = 0.9
@@ -62,7 +65,12 @@ class _Group:
     """Chips that one parse call serves: of one kind, with the same number of taxels."""
 
     def __init__(
-        self, slots: Sequence[Slot], chips: Sequence[int], rows: NDArray[np.uint8], first: int
+        self,
+        slots: Sequence[Slot],
+        chips: Sequence[int],
+        rows: NDArray[np.uint8],
+        first: int,
+        limit: int,
     ) -> None:
         self.slots, self.rows = slots, rows
         self.chips = np.array(chips, dtype=np.intp)
@@ -74,6 +82,11 @@ class _Group:
         """Readings in a row that gave the same bytes."""
         self.noisy = np.zeros(len(slots), dtype=np.bool_)
         self.any_noisy = False
+        self.limit = limit
+        if slots[0].spec.kind == "block":
+            # A frame's sequence number changes whatever its taxels do.
+            self.noisy[:] = self.any_noisy = True
+            self.limit = min(limit, SEQUENCE_FRAMES)
 
     def parse(self) -> Parsed | None:
         for slot in self.slots:
@@ -180,8 +193,9 @@ class Skin:
     def _wire(self, groups: _Rows) -> None:
         """Index arrays from stages and chips to taxels."""
         n = self.layout.rows * self.layout.cols
+        limit = self.file.reading.stuck_frames
         self._groups = [
-            _Group([self._slots[i] for i in chips], chips, rows, first)
+            _Group([self._slots[i] for i in chips], chips, rows, first, limit)
             for chips, rows, first in groups.groups
         ]
         total = sum(g.shape[0] * g.shape[1] for g in self._groups)
@@ -223,8 +237,9 @@ class Skin:
             noisy = np.zeros(len(self._slots) + 1, dtype=np.bool_)
             np.logical_or.at(noisy, self._chip_of, calibration.noise.ravel() >= NOISY)
             for group in self._groups:
-                group.noisy = noisy[group.chips]
-                group.any_noisy = bool(group.noisy.any())
+                if group.slots[0].spec.kind != "block":
+                    group.noisy = noisy[group.chips]
+                    group.any_noisy = bool(group.noisy.any())
 
     def start(self) -> list[ChipStatus]:
         """Identify and set up all chips.
@@ -353,7 +368,6 @@ class Skin:
 
     def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
         """Judge chips by what they serve: damaged words, or bytes that never change."""
-        limit = self.file.reading.stuck_frames
         for group in self._groups:
             if not self._whole[group.stages].all():
                 bad = ~self._whole[group.stages].reshape(group.shape).all(axis=1)
@@ -365,8 +379,8 @@ class Skin:
             np.copyto(group.before, group.rows)
             group.unchanged += fresh[group.chips]
             group.unchanged *= same & group.noisy
-            if int(group.unchanged.max()) >= limit:
-                for i in np.flatnonzero(group.unchanged >= limit).tolist():
+            if int(group.unchanged.max()) >= group.limit:
+                for i in np.flatnonzero(group.unchanged >= group.limit).tolist():
                     group.slots[i].suspect = True
                     good[group.chips[i]] = False
 
