@@ -15,17 +15,15 @@ from numpy.typing import NDArray
 from edge.baseline import Baseline
 from edge.bus import Bus, BusError, LinuxBus
 from edge.calibration import dead_band
-from edge.chips.chip import Parsed
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError
 from edge.frame import Frame
-from edge.reader import NEVER, BusReader, Slot, State, frame_bytes
+from edge.groups import Buffers, ChipGroup, buffers
+from edge.reader import NEVER, BusReader, Slot, State
 from edge.skinfile import UNUSED, SkinFile
 
 FOLLOW_FRAMES = 4
 """The baseline takes a step every so many frames: drift is slow, and steps cost time."""
-SEQUENCE_FRAMES = 25
-"""Readings after which a microcontroller that serves one frame over and over is taken to hang."""
 NOISY = 1.0
 """Standard deviation in counts from which a chip's bytes change with every conversion."""
 MARGIN = 0.9
@@ -59,40 +57,6 @@ class ChipStatus:
     state: str
     error: str
     recoveries: int
-
-
-class _Group:
-    """Chips that one parse call serves: of one kind, with the same number of taxels."""
-
-    def __init__(
-        self,
-        slots: Sequence[Slot],
-        chips: Sequence[int],
-        rows: NDArray[np.uint8],
-        first: int,
-        limit: int,
-    ) -> None:
-        self.slots, self.rows = slots, rows
-        self.chips = np.array(chips, dtype=np.intp)
-        n = len(slots[0].spec.taxels)
-        self.stages = slice(first, first + len(slots) * n)
-        self.shape = (len(slots), n)
-        self.before = rows.copy()
-        self.unchanged = np.zeros(len(slots), dtype=np.int64)
-        """Readings in a row that gave the same bytes."""
-        self.noisy = np.zeros(len(slots), dtype=np.bool_)
-        self.any_noisy = False
-        self.limit = limit
-        if slots[0].spec.kind == "block":
-            # A frame's sequence number changes whatever its taxels do.
-            self.noisy[:] = self.any_noisy = True
-            self.limit = min(limit, SEQUENCE_FRAMES)
-
-    def parse(self) -> Parsed | None:
-        for slot in self.slots:
-            if slot.chip is not None:
-                return slot.chip.parse(self.rows)
-        return None
 
 
 class _Worker(threading.Thread):
@@ -144,7 +108,7 @@ class Skin:
         """A taxel above this is being touched: the baseline is frozen, its chip is of interest."""
         self.following = True
         """The baseline follows drift."""
-        groups = _rows(file)
+        groups = buffers(file)
         self.readers = [
             BusReader(
                 bus,
@@ -190,12 +154,12 @@ class Skin:
             raise
         return skin
 
-    def _wire(self, groups: _Rows) -> None:
+    def _wire(self, groups: Buffers) -> None:
         """Index arrays from stages and chips to taxels."""
         n = self.layout.rows * self.layout.cols
         limit = self.file.reading.stuck_frames
         self._groups = [
-            _Group([self._slots[i] for i in chips], chips, rows, first, limit)
+            ChipGroup([self._slots[i] for i in chips], chips, rows, first, limit)
             for chips, rows, first in groups.groups
         ]
         total = sum(g.shape[0] * g.shape[1] for g in self._groups)
@@ -422,29 +386,3 @@ class Skin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Buffers: for each bus its chips' rows; the groups as (chips, rows, first stage)."""
-
-    by_bus: list[list[NDArray[np.uint8]]]
-    groups: list[tuple[list[int], NDArray[np.uint8], int]]
-
-
-def _rows(file: SkinFile) -> _Rows:
-    """One array for all chips of a kind, so that one call parses them."""
-    chips = file.chips
-    alike: dict[tuple[str, int, int], list[int]] = {}
-    for i, chip in enumerate(chips):
-        alike.setdefault((chip.kind, len(chip.taxels), chip.bits), []).append(i)
-    own: dict[int, NDArray[np.uint8]] = {}
-    groups, first = [], 0
-    for indices in alike.values():
-        rows = np.zeros((len(indices), frame_bytes(chips[indices[0]])), dtype=np.uint8)
-        own.update(zip(indices, rows, strict=True))
-        groups.append((indices, rows, first))
-        first += len(indices) * len(chips[indices[0]].taxels)
-    numbered = iter(range(len(chips)))
-    by_bus = [[own[next(numbered)] for _ in bus.chips] for bus in file.buses]
-    return _Rows(by_bus, groups)

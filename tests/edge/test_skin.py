@@ -10,7 +10,8 @@ from edge import skinfile
 from edge.errors import EdgeError
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_skin, frame_bits, still
-from edge.skin import SEQUENCE_FRAMES, Skin
+from edge.groups import SEQUENCE_FRAMES
+from edge.skin import Skin
 from edge.skinfile import BusSpec, Reading
 
 CODY = skinfile.load(skinfile.shipped("cody"))
