@@ -63,12 +63,13 @@ def peer_model(family, condition):
             sensors.append(f'<touch site="{name}"/>')
     soft = 'solref="-3000 -50"' if family == "foam" else ""
     free = '<joint type="slide" axis="1 0 0" frictionloss="3.4"/>' if condition == "movable" else ""
-    return f"""<mujoco><option timestep="0.01" integrator="implicitfast" gravity="0 0 0"/><worldbody>
+    return f"""<mujoco><worldbody>
       <body name="arm"><joint name="reach" type="slide" axis="1 0 0" damping="6"/>
         {"".join(taxels)}</body>
       <body pos="0.13 0 0">{free}<geom type="box" size="0.05 0.15 0.05" mass="1"
         contype="2" conaffinity="1" {soft}/></body></worldbody>
       <actuator><position joint="reach" kp="115"/></actuator>
+      <option timestep="0.01" integrator="implicitfast" gravity="0 0 0"/>
       <sensor>{"".join(sensors)}</sensor></mujoco>"""
 
 
