@@ -33,7 +33,7 @@ def test_a_skin_of_any_shape_gives_back_its_recording(shape):
 def test_raw_values_saturate_as_a_chip_does():
     layout = SkinLayout(rows=16, cols=24)
     recording = noise((16, 24))
-    skin, playback = play(skin_file(layout), recording)
+    skin, _ = play(skin_file(layout), recording)
     with skin:
         counts = skin.read().counts
     np.testing.assert_array_equal(counts, np.minimum(recording.frames[0], 65534 - 20946))
