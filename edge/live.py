@@ -28,7 +28,9 @@ class Watcher:
 
     Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended
     inside the window; its last values held), `missing_taxels` (taxels could not be read),
-    `missing_pose` (joint angles were absent in part of the window), `out_of_range` (`label` is
+    `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
+    measured on the skin, though the model's is in the world: see `run --without-joints`),
+    `out_of_range` (`label` is
     None: the features are too large to be measured against the training rows).
     """
 
@@ -97,6 +99,7 @@ class Watcher:
                 ("short", short),
                 ("missing_taxels", contact.missing_taxels),
                 ("missing_pose", contact.missing_pose),
+                ("skin_motion", contact.chain is None and info.chain is not None),
             )
             if raised
         ]
