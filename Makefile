@@ -48,6 +48,18 @@ endif
 export: $(READY)
 	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT) $(EXPORT)
 
+DEMO := $(OUT)/demo
+
+# Contacts to learn from, contacts of another seed to decide on, the same over fake chips.
+demo: $(READY)
+	rm -rf $(DEMO)
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMO)/known
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMO)/unseen --seed 2012 --trials 2
+	$(BIN)/python -m export --data $(DEMO)/known --out $(DEMO)
+	$(BIN)/edge-classify verify --model $(DEMO)/model.onnx --golden $(DEMO)/golden.npz > /dev/null
+	$(BIN)/edge-classify replay --model $(DEMO)/model.onnx --summary $(DEMO)/unseen
+	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
+
 BENCHVENV := $(VENV)/.bench
 
 $(BENCHVENV): $(READY)
