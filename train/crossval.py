@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from edge.errors import InputError
@@ -160,7 +161,11 @@ def _chunk(
     k: int,
     features: Sequence[str],
 ) -> NDArray[np.int64]:
-    return np.stack([fold_neighbours(X, int(i), scaling, components, k, features) for i in tests])
+    # Matrices this small only lose by several threads; processes share the work instead.
+    with threadpool_limits(1):
+        return np.stack(
+            [fold_neighbours(X, int(i), scaling, components, k, features) for i in tests]
+        )
 
 
 def accuracies(rows: NDArray[np.int64], y: NDArray[np.str_]) -> NDArray[np.float64]:
