@@ -25,8 +25,9 @@ WEIGHT_BITS = 20
 HALF_BITS = 26
 RANGE = 4.0
 """How far beyond the training set's range a query may lie and still be projected exactly."""
-SMALLEST_SCALE, LARGEST_SCALE = 1e-100, 1e100
-"""Squares of features outside these would vanish or overflow in a distance."""
+SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
+"""Above these, squares overflow in a distance. Below, ONNX Runtime's optimiser takes the grids of
+a `Projection` for the 0 that they are in float32, and leaves their rounding out."""
 CLOSE_EIGENVALUES = 1e-6
 
 
