@@ -54,28 +54,30 @@ class Chain:
         """
         self.joints = tuple(joints)
         self.base, self.tip = base, tip
-        self._before: list[NDArray[np.float64]] = []
         self._moving: list[Joint] = []
+        # Each moving joint's step is still + f sway + g swing: f = sin q and g = 1 - cos q turn
+        # about the axis (Rodrigues), f = q and g = 0 slide along it.
+        still: list[NDArray[np.float64]] = []
+        sway: list[NDArray[np.float64]] = []
+        swing: list[NDArray[np.float64]] = []
         fixed = np.eye(4)
         for joint in self.joints:
             _check_joint(joint)
             fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
             if joint.kind != "fixed":
+                first, second = _generators(joint)
                 self._moving.append(joint)
-                self._before.append(fixed)
+                still.append(fixed)
+                sway.append(fixed @ first)
+                swing.append(fixed @ second)
                 fixed = np.eye(4)
             fixed = fixed @ _transform(joint.translate, ZERO)
+        self._still, self._sway, self._swing = (
+            np.array(steps).reshape(-1, 4, 4) for steps in (still, sway, swing)
+        )
         self._after = fixed
-        n = len(self._moving)
         self._slides = np.array([j.kind == "prismatic" for j in self._moving], dtype=bool)
-        self._axes = np.zeros((n, 3))
-        self._k = np.zeros((n, 3, 3))
-        for i, joint in enumerate(self._moving):
-            x, y, z = np.array(joint.axis, dtype=float) / math.hypot(*joint.axis)
-            self._axes[i] = x, y, z
-            if not self._slides[i]:
-                self._k[i] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-        self._k2 = self._k @ self._k
+        self._any_slide = bool(self._slides.any())
 
     @property
     def dof(self) -> int:
@@ -95,8 +97,8 @@ class Chain:
     def pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pose of the tip in the base's frame.
 
-        Rotations by Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2, where 1 - cos is
-        taken as 2 sin^2(q/2), which keeps its digits at small angles.
+        Rotations by Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2, where 1 - cos(q)
+        is taken as 2 sin^2(q/2), which keeps its digits at small angles.
 
         Args:
             q: (dof,) or (..., dof) radians (metres for a sliding joint), base to tip.
@@ -120,17 +122,17 @@ class Chain:
         if not np.isfinite(angles).all():
             bad = np.argwhere(~np.isfinite(angles))[0][-1]
             raise InputError(f"the angle of joint {self.names[bad]} is not finite")
-        motion = np.zeros((*angles.shape, 4, 4))
-        motion[..., 3, 3] = 1.0
-        turn = np.where(self._slides, 0.0, angles)[..., None, None]
-        half = np.sin(0.5 * turn)
-        motion[..., :3, :3] = np.eye(3) + np.sin(turn) * self._k + 2.0 * half * half * self._k2
-        if self._slides.any():
-            motion[..., :3, 3] = np.where(self._slides, angles, 0.0)[..., None] * self._axes
-        pose = np.broadcast_to(np.eye(4), (*angles.shape[:-1], 4, 4))
-        for i, before in enumerate(self._before):
-            pose = pose @ before @ motion[..., i, :, :]
-        return np.asarray(pose @ self._after)
+        half = np.sin(0.5 * angles)
+        f, g = np.sin(angles), 2.0 * half * half
+        if self._any_slide:
+            f, g = np.where(self._slides, angles, f), np.where(self._slides, 0.0, g)
+        steps = self._still + f[..., None, None] * self._sway + g[..., None, None] * self._swing
+        pose = self._after
+        for i in range(self.dof - 1, -1, -1):
+            pose = steps[..., i, :, :] @ pose
+        if self.dof == 0:
+            pose = np.broadcast_to(pose, (*angles.shape[:-1], 4, 4))
+        return pose
 
     def to_dict(self) -> dict[str, Any]:
         """The chain as plain numbers, exact in JSON."""
@@ -231,6 +233,17 @@ def _check_joint(joint: Joint) -> None:
         raise InputError(f"joint {joint.name}: its axis is zero; give a direction")
     if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
         raise InputError(f"joint {joint.name}: its limits {joint.limits} are turned round")
+
+
+def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """K and K^2 of a turn about the joint's axis; of a slide its direction and nothing."""
+    x, y, z = np.array(joint.axis, dtype=float) / math.hypot(*joint.axis)
+    first = np.zeros((4, 4))
+    if joint.kind == "prismatic":
+        first[:3, 3] = x, y, z
+        return first, np.zeros((4, 4))
+    first[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    return first, first @ first
 
 
 def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:

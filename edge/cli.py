@@ -11,20 +11,24 @@ from importlib import import_module
 from edge import __version__
 from edge.errors import EdgeError
 
-COMMANDS = ("replay", "verify")
+COMMANDS = ("check", "scan", "calibrate", "record", "run", "view", "replay", "verify")
 """Modules of `edge.commands`, in the order of the help; each has `add_parser(subparsers)`,
 which sets `run`: a function of the parsed arguments that returns the exit status."""
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+    """The command line of these commands.
+
+    The command that was asked for is enough to parse it: the others' modules are not loaded,
+    which a slow board would notice.
+    """
     top = argparse.ArgumentParser(
         prog="edge-classify",
         description="Tells from a touch on a robot's skin what was touched.",
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in COMMANDS:
+    for name in wanted:
         import_module(f"edge.commands.{name}").add_parser(commands)
     return top
 
@@ -49,7 +53,9 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
-    return dispatch(parser(), argv)
+    words = list(sys.argv[1:] if argv is None else argv)
+    wanted = [word for word in words[:1] if word in COMMANDS]
+    return dispatch(parser(wanted or COMMANDS), words)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@
 | `series_start` | int64 (m + 1,) | the same for the series |
 | `onset_s` | float64 (m,) | |
 | `series_t` | float64 (s,) | |
-| `series_counts` | int64 (s, 4) | peak, area, sum of rows, sum of columns: exact |
+| `series_counts` | int64 (s, c) | `FeatureSeries.integers`: exact |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `meta` | JSON text | `skin`, `bounds` {`scores`, `distances`, `features`, `time_s`} |
@@ -69,6 +69,7 @@ def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeri
         info.tracking,
         chain=info.chain,
         horizon_s=info.window_s,
+        features=info.features,
     )
     return first_contact(recording, tracker)
 
@@ -145,16 +146,16 @@ def _verify_path(
         require_joints(model, None if trial.joints is None else trial.joints.shape[1], f"trial {i}")
         found = first_series(trial, model)
         length = int(starts[i + 1] - starts[i])
-        rows = np.zeros((length, 4), dtype=np.int64)
+        rows = np.zeros((length, arrays["series_counts"].shape[1]), dtype=np.int64)
         if found is not None:
             onsets[i], series = found
-            vectors[i] = feature_vector(series, info.window_s, info.samples)
-            seen = np.column_stack([series.peak, series.area, series.sums])
-            if len(seen) == length:
+            vectors[i] = feature_vector(series, info.window_s, info.samples, info.features)
+            seen = series.integers
+            if seen.shape == rows.shape:
                 rows = seen
             elif wrong_length is None:
                 wrong_length = Check(
-                    "series length", len(trials), np.inf, i, str(len(seen)), str(length)
+                    "series length", len(trials), np.inf, i, str(seen.shape), str(rows.shape)
                 )
         counts.append(rows)
     expected = arrays["vectors"][: len(trials)]

@@ -28,7 +28,9 @@ class Watcher:
 
     Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended
     inside the window; its last values held), `missing_taxels` (taxels could not be read),
-    `missing_pose` (joint angles were absent in part of the window), `out_of_range` (`label` is
+    `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
+    measured on the skin, though the model's is in the world: see `run --without-joints`),
+    `out_of_range` (`label` is
     None: the features are too large to be measured against the training rows).
     """
 
@@ -46,7 +48,11 @@ class Watcher:
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
         self.tracker = Tracker(
-            self.layout, info.tracking, chain=info.chain, horizon_s=info.window_s
+            self.layout,
+            info.tracking,
+            chain=info.chain,
+            horizon_s=info.window_s,
+            features=info.features,
         )
         self._waiting: list[Contact] = []
         self._current: Contact | None = None
@@ -86,13 +92,14 @@ class Watcher:
 
     def _decide(self, contact: Contact, began: float, *, short: bool) -> list[Event]:
         info = self.model.info
-        vector = feature_vector(contact.series(), info.window_s, info.samples)
+        vector = feature_vector(contact.series(), info.window_s, info.samples, info.features)
         flags = [
             flag
             for flag, raised in (
                 ("short", short),
                 ("missing_taxels", contact.missing_taxels),
                 ("missing_pose", contact.missing_pose),
+                ("skin_motion", contact.chain is None and info.chain is not None),
             )
             if raised
         ]

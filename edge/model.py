@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge import onnxfile
+from edge import measures, onnxfile
 from edge.arm import Chain
 from edge.errors import EdgeError, InputError
-from edge.features import FEATURES
 from edge.layout import SkinLayout
 from edge.track import TrackSettings
 
@@ -135,11 +134,13 @@ class ModelInfo:
         return info
 
     def _check(self, name: str) -> None:
-        if self.features != FEATURES:
+        try:
+            measures.features(self.features)
+        except InputError as error:
             raise InputError(
-                f"{name}: was made for the features {', '.join(self.features)}, "
-                f"this edge-classify measures {', '.join(FEATURES)}"
-            )
+                f"{name}: was made for the features {', '.join(self.features)}; {error}; "
+                "export it with this version of edge-classify"
+            ) from None
         if not self.tasks or not all(task.labels for task in self.tasks.values()):
             raise InputError(f"{name}: its metadata names no task or no label; export it again")
         if not (0.0 < self.window_s <= 3600.0 and 2 <= self.samples <= 10000):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from edge.arm import Chain
 from edge.errors import InputError
 from edge.frame import Frame
 from edge.layout import SkinLayout
+from edge.measures import COLS, FORCE, PAPER, ROWS, WIDTH, Measurer
 from edge.region import Region, largest_region
 
 
@@ -43,11 +45,17 @@ class FeatureSeries:
         t: (n,) seconds from onset, increasing, the first 0.
         peak: (n,) largest count of the region; 0 without contact.
         area: (n,) taxels of the region; 0 without contact.
-        sums: (n, 2) sums of rows and columns over the region's taxels: area times centroid.
+        sums: (n, 2) sums of rows and columns over the region's taxels: area times centroid;
+            0 where motion was not asked for.
         motion: (n,) distance of the centroid from its place at onset, metres; its last value
-            is kept without contact; NaN where the arm's pose was not known.
+            is kept without contact; NaN where the arm's pose was not known; 0 where it was not
+            asked for.
         counts_per_newton: scale of `peak`, or None.
         ended: the contact ended with the last frame: force and area are zero from there on.
+        places: {place: (n, 8)} what was measured there, see `edge.measures`.
+        regions: (n,) regions of the frame, or None.
+        force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
+        turn: columns of a whole turn where the skin wraps, or None.
     """
 
     t: NDArray[np.float64]
@@ -57,6 +65,16 @@ class FeatureSeries:
     motion: NDArray[np.float64]
     counts_per_newton: float | None = None
     ended: bool = False
+    places: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    regions: NDArray[np.int64] | None = None
+    force_motion: NDArray[np.float64] | None = None
+    turn: int | None = None
+
+    @property
+    def integers(self) -> NDArray[np.int64]:
+        """(n, m) all that was counted: peak, area, sums, then the places and the regions."""
+        more = [] if self.regions is None else [self.regions]
+        return np.column_stack([self.peak, self.area, self.sums, *self.places.values(), *more])
 
     @property
     def max_force(self) -> NDArray[np.float64]:
@@ -82,6 +100,7 @@ class Contact:
     onset_s: float
     layout: SkinLayout
     chain: Chain | None
+    measurer: Measurer
     ended: bool = False
     missing_taxels: bool = False
     """A frame lacked taxels that are not known to be dead."""
@@ -92,7 +111,9 @@ class Contact:
     _t: list[float] = field(default_factory=list)
     _measured: list[tuple[int, int, int, int]] = field(default_factory=list)
     _motion: list[float] = field(default_factory=list)
-    _start: NDArray[np.float64] | None = None
+    _more: list[list[int]] = field(default_factory=list)
+    _force_motion: list[float] = field(default_factory=list)
+    _starts: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def last_s(self) -> float:
@@ -105,37 +126,64 @@ class Contact:
         if self._t and t <= self._t[-1]:
             # Two readings of one instant: the later one counts.
             t = self._t[-1]
-            for series in (self._t, self._measured, self._motion):
-                series.pop()
-            if not any(map(math.isfinite, self._motion)):
-                self._start = None
+            for series in (self._t, self._measured, self._motion, self._more, self._force_motion):
+                del series[-1:]
+            for which, motion in (("area", self._motion), ("force", self._force_motion)):
+                if not any(map(math.isfinite, motion)):
+                    self._starts.pop(which, None)
         self._t.append(t)
         if frame.valid is not None and not self.missing_taxels:
             missing = self.layout.alive & ~frame.valid
             self.missing_taxels = bool(missing.any())
+        called = self.measurer
+        if called.places or called.regions:
+            self._more.append(called.measure(frame, region))
         if region is None:
             self._measured.append((0, 0, 0, 0))
             self._motion.append(self._motion[-1] if self._motion else 0.0)
+            if called.force_motion:
+                self._force_motion.append(self._force_motion[-1] if self._force_motion else 0.0)
             return
         self.region = region
-        self._measured.append((region.peak, region.area, *region.sums))
-        self._motion.append(self._moved(frame, region))
+        pose = self._pose(frame) if called.motion or called.force_motion else None
+        if called.motion:
+            self._measured.append((region.peak, region.area, *region.sums))
+            self._motion.append(self._moved("area", region.centroid, pose))
+        else:
+            self._measured.append((region.peak, region.area, 0, 0))
+            self._motion.append(0.0)
+        if called.force_motion:
+            sums = self._more[-1]  # the contact's place comes first
+            centroid = (
+                sums[ROWS] / sums[FORCE],
+                sums[COLS] / sums[FORCE] % self.layout.cols,
+            )
+            self._force_motion.append(self._moved("force", centroid, pose))
 
-    def _moved(self, frame: Frame, region: Region) -> float:
-        place = self.layout.position(*region.centroid)
-        if self.chain is not None:
-            if frame.joints is None:
-                self.missing_pose = True
-                return math.nan
-            pose = self.chain.pose(frame.joints)
+    def _pose(self, frame: Frame) -> NDArray[np.float64] | None:
+        """The link's pose; None where the skin's own frame is used or joint angles lack."""
+        if self.chain is None:
+            return None
+        if frame.joints is None:
+            self.missing_pose = True
+            return None
+        return self.chain.pose(frame.joints)
+
+    def _moved(
+        self, which: str, centroid: tuple[float, float], pose: NDArray[np.float64] | None
+    ) -> float:
+        if self.chain is not None and pose is None:
+            return math.nan
+        place = self.layout.position(*centroid)
+        if pose is not None:
             place = pose[:3, :3] @ place + pose[:3, 3]
-        if self._start is None:
-            self._start = place
-        return math.dist(place, self._start)
+        return math.dist(place, self._starts.setdefault(which, place))
 
     def series(self) -> FeatureSeries:
         """What was measured so far."""
+        called = self.measurer
         measured = np.array(self._measured, dtype=np.int64).reshape(-1, 4)
+        more = np.array(self._more, dtype=np.int64)
         return FeatureSeries(
             t=np.array(self._t),
             peak=measured[:, 0],
@@ -144,6 +192,12 @@ class Contact:
             motion=np.array(self._motion),
             counts_per_newton=self.layout.counts_per_newton,
             ended=self.ended,
+            places={
+                place: more[:, WIDTH * i : WIDTH * (i + 1)] for i, place in enumerate(called.places)
+            },
+            regions=more[:, -1] if called.regions else None,
+            force_motion=np.array(self._force_motion) if called.force_motion else None,
+            turn=self.layout.cols if self.layout.wraps else None,
         )
 
 
@@ -200,6 +254,7 @@ class Tracker:
         *,
         chain: Chain | None = None,
         horizon_s: float = math.inf,
+        features: Sequence[str] = PAPER,
     ) -> None:
         """Follow contacts on a skin.
 
@@ -209,11 +264,14 @@ class Tracker:
             chain: with it, motion is measured in the base's frame from each frame's joint
                 angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no more.
+            features: what the series is to hold (see `edge.measures`); what is not called for
+                is not measured.
         """
         self.layout = layout
         self.settings = settings or TrackSettings()
         self.chain = chain
         self.horizon_s = horizon_s
+        self._measurer = Measurer(layout, features, self.settings.connectivity)
         self.region: Region | None = None
         """The last frame's largest region."""
         self._contact: Contact | None = None
@@ -258,7 +316,7 @@ class Tracker:
             self._contact = None
             return None
         if self._contact is None:
-            self._contact = Contact(_time(frame, region), self.layout, self.chain)
+            self._contact = Contact(_time(frame, region), self.layout, self.chain, self._measurer)
             self._run = 0
         self._contact.add(frame, region)
         self._run += 1

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from edge import __version__
+from edge import __version__, measures
 from edge.cli import dispatch
 from edge.errors import InputError
 from edge.features import FEATURES, SAMPLES, WINDOW_S
@@ -19,7 +19,7 @@ from export import golden
 from export.graph import to_onnx
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
-from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier
+from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier, check_columns
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,6 +35,18 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--out", type=Path, default=Path("build"), help="folder (build)")
     top.add_argument("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
+    top.add_argument(
+        "--features",
+        nargs="+",
+        default=list(FEATURES),
+        metavar="NAME",
+        help="what is measured on a contact (the paper's max_force contact_area contact_motion); "
+        f"others: PLACE_QUANTITY, of {', '.join(measures.PLACES)} and "
+        f"{', '.join(measures.QUANTITIES)}; regions, force_motion; with _rate: a second's change",
+    )
+    top.add_argument(
+        "--samples", type=int, default=SAMPLES, help=f"values a feature has ({SAMPLES})"
+    )
     top.add_argument("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
     top.add_argument("--components", type=int, help="fix the number of principal components")
     top.add_argument("-k", "--k", type=int, help="fix the number of neighbours")
@@ -54,10 +66,11 @@ def run(arguments: argparse.Namespace) -> int:
         threshold=arguments.threshold,
         onset=arguments.onset,
         horizon_s=arguments.window,
+        features=arguments.features,
         progress=True,
     )
     tasks = _tasks(dataset, arguments.tasks)
-    X = dataset.features(arguments.window, SAMPLES)
+    X = dataset.features(arguments.window, arguments.samples)
     y = {task: dataset.labels(task) for task in tasks}
     chosen = choose(
         X,
@@ -65,11 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
         scalings=SCALINGS if arguments.scaling is None else [arguments.scaling],
         components=arguments.components,
         k=arguments.k,
+        features=dataset.names,
         jobs=arguments.jobs,
         progress=True,
     )
-    classifier = ContactClassifier({task: c.choice for task, c in chosen.items()}).fit(X, y)
-    info = describe(dataset, classifier, chosen, arguments.window)
+    choices = {task: found.choice for task, found in chosen.items()}
+    classifier = ContactClassifier(choices, dataset.names).fit(X, y)
+    info = describe(dataset, classifier, chosen, arguments.window, arguments.samples)
     data = to_onnx(classifier, info)
     path = arguments.out / "model.onnx"
     with write_whole(path) as file:
@@ -89,6 +104,9 @@ def _check_fixed(arguments: argparse.Namespace) -> None:
         value = getattr(arguments, name)
         if value is not None and not 0 <= value < 65535:
             raise InputError(f"--{name} must be 0 to 65534 counts, not {value}")
+    if not 2 <= arguments.samples <= 1000:
+        raise InputError(f"--samples must be 2 to 1000, not {arguments.samples}")
+    check_columns(len(arguments.features) * arguments.samples)
     if not 0.0 < arguments.window <= 60.0:
         raise InputError(f"--window must be above 0 and at most 60 seconds, not {arguments.window}")
 
@@ -105,7 +123,11 @@ def _tasks(dataset: DataSet, wanted: list[str] | None) -> tuple[str, ...]:
 
 
 def describe(
-    dataset: DataSet, classifier: ContactClassifier, chosen: dict[str, Chosen], window_s: float
+    dataset: DataSet,
+    classifier: ContactClassifier,
+    chosen: dict[str, Chosen],
+    window_s: float,
+    samples: int = SAMPLES,
 ) -> ModelInfo:
     """The metadata that makes the model file describe itself."""
     return ModelInfo(
@@ -122,8 +144,8 @@ def describe(
         layout=dataset.layout,
         tracking=dataset.tracking,
         window_s=window_s,
-        samples=SAMPLES,
-        features=FEATURES,
+        samples=samples,
+        features=dataset.names,
         units=dataset.units,
         motion_frame="skin" if dataset.chain is None else "world",
         chain=dataset.chain,
@@ -146,11 +168,9 @@ def report(dataset: DataSet, classifier: ContactClassifier, chosen: dict[str, Ch
         f"{found.accuracy:>14.2%}"
         for task, found in chosen.items()
     ]
-    units = dataset.units
-    lines.append(
-        f"force in {units['max_force']}s, motion in {units['contact_motion']}s in the "
-        f"{'skin' if dataset.chain is None else 'world'}'s frame"
-    )
+    lines.append(", ".join(f"{name} in {unit}" for name, unit in dataset.units.items()))
+    if any(measures.feature(name).moves for name in dataset.names):
+        lines.append(f"motion in the {'skin' if dataset.chain is None else 'world'}'s frame")
     if dataset.untouched:
         lines.append(
             f"left out: {len(dataset.untouched)} recordings without a contact above "

@@ -77,7 +77,9 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         parts.append(part)
         found.append(series)
     rng = np.random.default_rng(20120101)
-    own = np.stack([feature_vector(s, info.window_s, info.samples) for _, s in found])
+    own = np.stack(
+        [feature_vector(s, info.window_s, info.samples, info.features) for _, s in found]
+    )
     rows = X[rng.permutation(len(X))[: VECTORS // 2]]
     pairs = rng.integers(0, len(X), (VECTORS // 2, 2))
     weight = rng.uniform(-0.5, 1.5, (len(pairs), 1))
@@ -94,9 +96,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         "onset_s": np.array([onset for onset, _ in found]),
         "series_start": np.cumsum([0, *(len(s.t) for _, s in found)]),
         "series_t": np.concatenate([s.t for _, s in found]),
-        "series_counts": np.concatenate(
-            [np.column_stack([s.peak, s.area, s.sums]) for _, s in found]
-        ),
+        "series_counts": np.concatenate([s.integers for _, s in found]),
         "vectors": vectors,
     }
     if info.chain is not None:

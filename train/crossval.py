@@ -30,7 +30,7 @@ def fold_neighbours(
     scaling: str,
     max_components: int,
     max_k: int,
-    types: int = len(FEATURES),
+    features: Sequence[str] = FEATURES,
 ) -> NDArray[np.int64]:
     """Neighbours of one left-out trial for each number of components.
 
@@ -40,8 +40,8 @@ def fold_neighbours(
     """
     keep = np.arange(len(X)) != test
     train = X[keep]
-    _, gain = scale_of(train, scaling, types)
-    columns = np.repeat(gain, X.shape[1] // types)
+    _, gain = scale_of(train, scaling, features)
+    columns = np.repeat(gain, X.shape[1] // len(features))
     mean = train.mean(axis=0)
     scaled = (train - mean) * columns
     _, axes, _ = principal_axes(scaled)
@@ -97,6 +97,7 @@ def neighbours(
     scaling: str = "none",
     max_components: int = MAX_COMPONENTS,
     max_k: int = MAX_K,
+    features: Sequence[str] = FEATURES,
     jobs: int = 1,
     progress: bool = False,
 ) -> NDArray[np.int64]:
@@ -115,16 +116,23 @@ def neighbours(
         )
     k = min(max_k, n - 1)
     chunks = np.array_split(np.arange(n), min(n, max(jobs, 1) * 8))
-    work = (delayed(_chunk)(X, tests, scaling, max_components, k) for tests in chunks)
+    work = (
+        delayed(_chunk)(X, tests, scaling, max_components, k, tuple(features)) for tests in chunks
+    )
     parts = Parallel(n_jobs=jobs, return_as="generator")(work)
     bar = tqdm(parts, total=len(chunks), desc=f"scaling {scaling}", disable=not progress)
     return np.concatenate(list(bar))
 
 
 def _chunk(
-    X: NDArray[np.float64], tests: NDArray[np.int64], scaling: str, components: int, k: int
+    X: NDArray[np.float64],
+    tests: NDArray[np.int64],
+    scaling: str,
+    components: int,
+    k: int,
+    features: Sequence[str],
 ) -> NDArray[np.int64]:
-    return np.stack([fold_neighbours(X, int(i), scaling, components, k) for i in tests])
+    return np.stack([fold_neighbours(X, int(i), scaling, components, k, features) for i in tests])
 
 
 def accuracies(rows: NDArray[np.int64], y: NDArray[np.str_]) -> NDArray[np.float64]:
@@ -141,19 +149,28 @@ def leave_one_out(
     max_k: int = MAX_K,
     *,
     scaling: str = "none",
+    features: Sequence[str] = FEATURES,
     jobs: int = 1,
 ) -> NDArray[np.float64]:
     """Leave-one-out accuracies (components, k), entry [c - 1, k - 1]; exact, see the module.
 
     Args:
-        X: (n, 3 * samples) feature vectors.
+        X: (n, features * samples) feature vectors.
         y: (n,) labels.
         max_components: principal components tried, from 1.
         max_k: neighbours tried, from 1; at most n - 1.
         scaling: one of `train.pipeline.SCALINGS`, fitted inside each fold.
+        features: names of the feature types, in the order of X.
         jobs: processes.
     """
-    rows = neighbours(X, scaling=scaling, max_components=max_components, max_k=max_k, jobs=jobs)
+    rows = neighbours(
+        X,
+        scaling=scaling,
+        max_components=max_components,
+        max_k=max_k,
+        features=features,
+        jobs=jobs,
+    )
     return accuracies(rows, np.asarray(y))
 
 
@@ -172,6 +189,7 @@ def choose(
     scalings: Sequence[str] = SCALINGS,
     components: int | None = None,
     k: int | None = None,
+    features: Sequence[str] = FEATURES,
     jobs: int = 1,
     progress: bool = False,
 ) -> dict[str, Chosen]:
@@ -196,6 +214,7 @@ def choose(
             scaling=scaling,
             max_components=components or min(MAX_COMPONENTS, len(X) - 1),
             max_k=k or MAX_K,
+            features=features,
             jobs=jobs,
             progress=progress,
         )

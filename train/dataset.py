@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from edge import measures
 from edge.arm import Chain
 from edge.errors import InputError
 from edge.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
@@ -38,7 +39,9 @@ class DataSet:
         trials: in the order of the files' names.
         layout: the skin, with the thresholds that all trials were followed with.
         tracking: how contacts were followed.
-        chain: the arm, where every trial has joint angles; motion is then in the world's frame.
+        chain: the arm, where every trial has joint angles and a feature calls for them; motion
+            is then in the world's frame.
+        names: the features that were measured, by default the paper's three.
         untouched: recordings in which no contact was found.
         digest: SHA-256 over the recordings' bytes.
     """
@@ -49,6 +52,7 @@ class DataSet:
     chain: Chain | None
     untouched: tuple[Path, ...]
     digest: str
+    names: tuple[str, ...] = FEATURES
 
     @property
     def tasks(self) -> tuple[str, ...]:
@@ -60,18 +64,26 @@ class DataSet:
         """(n,) the trials' labels for a task."""
         return np.array([trial.labels[task] for trial in self.trials])
 
-    def features(self, window_s: float = WINDOW_S, samples: int = SAMPLES) -> NDArray[np.float64]:
-        """(n, 3 * samples) feature vectors (see `edge.features.feature_vector`)."""
-        return np.stack([feature_vector(t.series, window_s, samples) for t in self.trials])
+    def features(
+        self,
+        window_s: float = WINDOW_S,
+        samples: int = SAMPLES,
+        names: Sequence[str] | None = None,
+    ) -> NDArray[np.float64]:
+        """(n, features * samples) feature vectors (see `edge.features.feature_vector`).
+
+        Args:
+            window_s: seconds from onset.
+            samples: times per feature.
+            names: some of the features measured; all where None.
+        """
+        names = self.names if names is None else tuple(names)
+        return np.stack([feature_vector(t.series, window_s, samples, names) for t in self.trials])
 
     @property
     def units(self) -> dict[str, str]:
         """Of each feature."""
-        return {
-            FEATURES[0]: self.layout.force_unit,
-            FEATURES[1]: "taxel",
-            FEATURES[2]: self.layout.length_unit,
-        }
+        return {name: measures.feature(name).unit(self.layout) for name in self.names}
 
 
 def arm_of(recording: Recording, where: str) -> Chain | None:
@@ -116,6 +128,7 @@ def load_trials(
     onset: int | None = None,
     tracking: TrackSettings | None = None,
     horizon_s: float = 2.0,
+    features: Sequence[str] = FEATURES,
     progress: bool = False,
 ) -> DataSet:
     """Read recordings and follow the first contact of each.
@@ -127,11 +140,14 @@ def load_trials(
         onset: counts above which a contact begins; scaled with the threshold where None.
         tracking: how contacts begin and end.
         horizon_s: seconds from onset that are kept of each contact.
+        features: what is measured on each contact (see `edge.measures`).
         progress: show progress bars on stderr.
 
     Raises:
         InputError: a file cannot be used, the skins differ, or nothing is labelled or touched.
     """
+    names = tuple(feature.name for feature in measures.features(tuple(features)))
+    moving = any(measures.feature(name).moves for name in names)
     paths = find([str(path) for path in data])
     if not paths:
         raise InputError("no recordings given; name .npz files or a folder of them")
@@ -149,7 +165,7 @@ def load_trials(
         reference = replace(reference, onset_counts=onset)
     reference = replace(reference, dead=_dead(recordings))
     arms = [arm_of(r, str(p)) for r, p in zip(recordings, paths, strict=True)]
-    chain = arms[0] if None not in arms else None
+    chain = arms[0] if moving and None not in arms else None
     if chain is not None:
         for arm, path in zip(arms, paths, strict=True):
             if arm is not None and arm.to_dict() != chain.to_dict():
@@ -161,7 +177,7 @@ def load_trials(
     for recording, path in tqdm(both, desc="following", unit=" trials", disable=not progress):
         try:
             layout = for_device(reference, recording.layout)
-            tracker = Tracker(layout, settings, chain=chain, horizon_s=horizon_s)
+            tracker = Tracker(layout, settings, chain=chain, horizon_s=horizon_s, features=names)
             found = first_contact(recording, tracker)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
@@ -174,7 +190,7 @@ def load_trials(
             f"no contact in any of {len(paths)} recordings; lower the threshold "
             f"of {reference.threshold_counts} counts"
         )
-    dataset = DataSet(tuple(trials), reference, settings, chain, tuple(untouched), digest)
+    dataset = DataSet(tuple(trials), reference, settings, chain, tuple(untouched), digest, names)
     if not dataset.tasks:
         raise InputError(
             "the recordings share no label; give every one the same keys under meta.labels"

@@ -6,7 +6,7 @@ operation; `export/graph.py` writes it down.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +21,10 @@ SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
 
 WEIGHT_BITS = 20
-"""Components are kept to multiples of 2 ** -WEIGHT_BITS; see `Projection`."""
+"""Components of up to 128 columns are multiples of 2 ** -WEIGHT_BITS; see `Projection`."""
 HALF_BITS = 26
+MOST_COLUMNS = 1 << 12
+"""Beyond them too few bits are left for the components."""
 RANGE = 4.0
 """How far beyond the training set's range a query may lie and still be projected exactly."""
 SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
@@ -38,7 +40,7 @@ def _blocks(X: NDArray[np.float64], types: int) -> NDArray[np.float64]:
 
 
 def scale_of(
-    X: NDArray[np.float64], method: str, types: int = len(FEATURES)
+    X: NDArray[np.float64], method: str, features: Sequence[str] = FEATURES
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Offset and gain of each feature type: scaled = (x - offset) * gain.
 
@@ -47,13 +49,20 @@ def scale_of(
     it told nothing in training and must not dominate when it moves.
 
     Args:
-        X: (n, types * samples).
-        method: one of `SCALINGS`.
-        types: number of feature types; Method V scales the last one.
+        X: (n, features * samples).
+        method: one of `SCALINGS`. Method V brings contact_motion to the range of max_force and
+            contact_area and leaves all else alone; without them it is no scaling.
+        features: names of the types, in the order of X.
 
     Returns:
-        (types,) and (types,).
+        (features,) and (features,).
+
+    Raises:
+        InputError: the method is unknown, or X has no whole number of samples a feature.
     """
+    types = len(features)
+    if X.shape[1] % types:
+        raise InputError(f"{X.shape[1]} columns are no whole number of samples of {types} features")
     blocks = _blocks(X, types)
     mean = blocks.mean(axis=(0, 2))
     largest = np.abs(blocks).max(axis=(0, 2))
@@ -77,7 +86,10 @@ def scale_of(
         return mean, inverse(deviation)
     if method == "V":
         gain = ones.copy()
-        gain[-1] = largest[:-1].max() * inverse(largest)[-1]
+        ranges = [largest[i] for i, name in enumerate(features) if name in FEATURES[:2]]
+        if ranges and FEATURES[2] in features:
+            motion = list(features).index(FEATURES[2])
+            gain[motion] = max(ranges) * inverse(largest)[motion]
         return zeros, gain
     raise InputError(f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}")
 
@@ -87,15 +99,17 @@ class FeatureScaler(TransformerMixin, BaseEstimator):
 
     Args:
         method: one of `SCALINGS`.
+        features: names of the types, in the order of X.
     """
 
-    def __init__(self, method: str = "none") -> None:
+    def __init__(self, method: str = "none", features: Sequence[str] = FEATURES) -> None:
         self.method = method
+        self.features = features
 
     def fit(self, X: NDArray[np.float64], y: object = None) -> FeatureScaler:
-        """Take the statistics of X (n, 3 * samples)."""
+        """Take the statistics of X (n, features * samples)."""
         X = np.asarray(X, dtype=np.float64)
-        self.offset_, self.gain_ = scale_of(X, self.method)
+        self.offset_, self.gain_ = scale_of(X, self.method, self.features)
         self.n_features_in_ = X.shape[1]
         return self
 
@@ -234,6 +248,15 @@ class Choice:
     k: int
 
 
+def check_columns(columns: int) -> None:
+    """Raise InputError where feature vectors are too long for a `Projection`."""
+    if columns > MOST_COLUMNS:
+        raise InputError(
+            f"{columns} values a trial are more than the {MOST_COLUMNS} that a projection "
+            "adds up exactly; take fewer features or samples"
+        )
+
+
 class Projection:
     """Features to principal components, the same bits on every machine.
 
@@ -241,14 +264,15 @@ class Projection:
     of `HALF_BITS` bits each on a fixed grid, and components are multiples of 2^-WEIGHT_BITS.
     Each product then has at most 53 - 7 bits and sums of up to 128 of them are exact, in any
     order, with or without fused multiply-add: a query that equals a training row lies at
-    distance exactly 0, in any batch, on any processor. What is cut off lies 2^-52 below the
-    range of the training set. Queries more than `RANGE` times outside it are projected with
-    ordinary rounding.
+    distance exactly 0, in any batch, on any processor. Each doubling of the columns beyond 128
+    costs the components one bit. What is cut off lies 2^-52 below the range of the training
+    set. Queries more than `RANGE` times outside it are projected with ordinary rounding.
 
     Args:
-        X: (n, p) training vectors, p at most 128.
+        X: (n, p) training vectors, p at most `MOST_COLUMNS`.
         scaling: one of `SCALINGS`.
         components: how many are wanted; at most the numerical rank are kept.
+        features: names of the feature types, in the order of X.
 
     Attributes:
         mean: (p,) subtracted first.
@@ -259,16 +283,20 @@ class Projection:
         gap: smallest relative gap of squared singular values at any cut up to c.
     """
 
-    def __init__(self, X: NDArray[np.float64], scaling: str, components: int) -> None:
-        types = len(FEATURES)
-        _, gain = scale_of(X, scaling, types)
+    def __init__(
+        self,
+        X: NDArray[np.float64],
+        scaling: str,
+        components: int,
+        features: Sequence[str] = FEATURES,
+    ) -> None:
+        _, gain = scale_of(X, scaling, features)
         # Scaling shifts each type by a constant, which centring takes away again: the mean is
         # subtracted from the features themselves, where it loses nothing.
         self.mean = X.mean(axis=0)
-        self.gain = np.repeat(gain, X.shape[1] // types)
+        self.gain = np.repeat(gain, X.shape[1] // len(features))
         d = (X - self.mean) * self.gain
-        if X.shape[1] > 128:
-            raise InputError(f"a projection takes at most 128 features, not {X.shape[1]}")
+        check_columns(X.shape[1])
         largest = float(np.abs(d).max(initial=0.0))
         if largest > LARGEST_SCALE or 0.0 < largest < SMALLEST_SCALE:
             raise InputError(
@@ -278,7 +306,8 @@ class Projection:
         _, axes, values = principal_axes(d)
         self.rank = len(axes)
         axes = axes[:components]
-        self.weights = np.ascontiguousarray(np.rint(axes.T * 2.0**WEIGHT_BITS) / 2.0**WEIGHT_BITS)
+        unit = 2.0 ** (WEIGHT_BITS - max(0, (X.shape[1] - 1).bit_length() - 7))
+        self.weights = np.ascontiguousarray(np.rint(axes.T * unit) / unit)
         exponent = int(np.ceil(np.log2(RANGE * largest))) if largest > 0.0 else 0
         self.high = 1.5 * 2.0 ** (52 + exponent - HALF_BITS)
         self.low = 1.5 * 2.0 ** (52 + exponent - 2 * HALF_BITS)
@@ -299,6 +328,7 @@ class ContactClassifier(BaseEstimator):
 
     Args:
         choices: {task: Choice}.
+        features: names of the feature types, in the order of the vectors.
 
     Attributes:
         projections_: {scaling: Projection}, with the components of the task that has most.
@@ -307,8 +337,9 @@ class ContactClassifier(BaseEstimator):
         components_: {task: components kept}, at most the numerical rank.
     """
 
-    def __init__(self, choices: Mapping[str, Choice]) -> None:
+    def __init__(self, choices: Mapping[str, Choice], features: Sequence[str] = FEATURES) -> None:
         self.choices = choices
+        self.features = features
 
     def fit(self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]) -> ContactClassifier:
         """Fit every task on X (n, p) and its labels y[task] (n,)."""
@@ -325,7 +356,7 @@ class ContactClassifier(BaseEstimator):
                 raise InputError(f"k must be 1 to {len(X)} training trials, not {choice.k}")
             if choice.components < 1:
                 raise InputError(f"components must be at least 1, not {choice.components}")
-        self.projections_ = {s: Projection(X, s, c) for s, c in most.items()}
+        self.projections_ = {s: Projection(X, s, c, self.features) for s, c in most.items()}
         self.rows_ = {s: projection(X) for s, projection in self.projections_.items()}
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}

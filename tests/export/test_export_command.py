@@ -15,7 +15,8 @@ def test_the_report_says_what_was_fitted(recordings, tmp_path, capsys):
     table = [line.split() for line in out.err.splitlines() if line.startswith(("cat", "obj"))]
     assert [row[:3] for row in table] == [["category", "2", "16"], ["object", "4", "16"]]
     assert all(row[-1].endswith("%") for row in table)
-    assert "force in newtons, motion in metres in the world's frame" in out.err
+    assert "max_force in newton, contact_area in taxel, contact_motion in metre" in out.err
+    assert "motion in the world's frame" in out.err
     assert "reading: 100%" in out.err
     assert out.out.splitlines()[1].endswith("golden.npz")
 

@@ -1,0 +1,107 @@
+"""A frame's whole path and a decision as a share of 10 ms; cold start and memory."""
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from edge.features import feature_vector
+from edge.golden import first_series
+from edge.live import Watcher
+from edge.model import Model
+from edge.recording import load
+from export.__main__ import main as export
+
+ROOT = Path(__file__).parents[1]
+FRAME_S = 0.010
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory):
+    """(model path, data folder): the default simulated set, exported."""
+    from train.__main__ import main as train
+
+    folder = tmp_path_factory.mktemp("built")
+    data = folder / "data"
+    assert train(["simulate", str(ROOT / "train/scenes/cody18.toml"), "--out", str(data)]) == 0
+    assert export(["--data", str(data), "--out", str(folder)]) == 0
+    return folder / "model.onnx", data
+
+
+def bench_frame_in_contact(against, note, built):
+    path, data = built
+    model = Model(path)
+    recording = load(sorted(data.glob("*.npz"))[0])
+    frames = list(recording)[: round(1.2 / FRAME_S)]
+
+    def watch():
+        watcher = Watcher(model, recording.layout)
+        for frame in frames:
+            watcher.push(frame)
+
+    share = against(watch, {}, calls=1) / len(frames) / FRAME_S
+    note("a 10 ms frame", share, "at most 0.01")
+
+
+def bench_decision_of_all_tasks(against, note, built):
+    path, data = built
+    model = Model(path)
+    _, series = first_series(load(sorted(data.glob("*.npz"))[0]), model)
+    window, samples = model.info.window_s, model.info.samples
+    share = against(lambda: model.decide(feature_vector(series, window, samples)), {}) / FRAME_S
+    note("a 10 ms frame", share, "at most 0.01")
+
+
+SKLEARN = """
+    import sys
+    import numpy as np
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+    from sklearn.decomposition import PCA
+    from sklearn.neighbors import KNeighborsClassifier
+    X = np.load(sys.argv[1])["X"]
+    y = np.load(sys.argv[1])["y"]
+    model = make_pipeline(StandardScaler(), PCA(7), KNeighborsClassifier(2)).fit(X, y)
+    print(model.predict(X[:1]))
+"""
+
+
+def bench_cold_start(against, built, tmp_path):
+    """From the start of the process to its first decision."""
+    import numpy as np
+
+    from train.dataset import load_trials
+
+    path, data = built
+    trials = load_trials([data])
+    np.savez(tmp_path / "xy.npz", X=trials.features(), y=trials.labels("object"))
+    program = tmp_path / "usual.py"
+    program.write_text(textwrap.dedent(SKLEARN))
+    recording = sorted(data.glob("*.npz"))[0]
+    ours = [sys.executable, "-m", "edge.cli", "replay", "--model", str(path), str(recording)]
+    usual = [sys.executable, str(program), str(tmp_path / "xy.npz")]
+
+    def start(command):
+        return lambda: subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+
+    against(
+        start(ours),
+        {"scikit-learn's pipeline": start(usual)},
+        least={"scikit-learn's pipeline": 6},
+        calls=1,
+        rounds=7,
+    )
+
+
+def bench_peak_memory(note, built):
+    path, data = built
+    recording = sorted(data.glob("*.npz"))[0]
+    code = (
+        "import resource, sys; from edge.cli import main; main(sys.argv[1:]); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", code, "replay", "--model", str(path), str(recording)]
+    run = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+    note("60 MB", int(run.stderr.split()[-1]) / 1024 / 60, "at most 1")

@@ -1,0 +1,94 @@
+"""Threshold, largest region, peak, area and centroid of a 16 x 24 frame."""
+
+import cv2
+import numpy as np
+import pytest
+import scipy.ndimage
+
+from edge.region import largest_region
+
+
+def contact():
+    """The patch of the real contact frame (12 active taxels), in counts of 1000 a newton."""
+    frame = np.zeros((16, 24), dtype=np.uint16)
+    frame[6:10, 9:11] = [[1530, 1530], [1130, 560], [1360, 610], [1210, 1050]]
+    frame[14, 22:] = 80, 60
+    frame[15, 21:23] = 80, 100
+    return frame
+
+
+def large():
+    """A soft contact of 30 taxels, highest in the middle."""
+    rows, cols = np.mgrid[:16, :24]
+    force = 1200 - 250 * np.hypot((rows - 6) / 0.9, cols - 12)
+    return np.where(force > 50, force, 0).astype(np.uint16)
+
+
+def serpentine():
+    frame = np.zeros((16, 24), dtype=np.uint16)
+    frame[::2] = 900
+    frame[1::4, -1] = 900
+    frame[3::4, 0] = 900
+    return frame
+
+
+def spiral():
+    frame = np.zeros((16, 24), dtype=np.uint16)
+    top, left, bottom, right = 0, 0, 15, 23
+    while top <= bottom and left <= right:
+        frame[top, left : right + 1] = 900
+        frame[top : bottom + 1, right] = 900
+        frame[bottom, left : right + 1] = 900
+        frame[top + 2 : bottom + 1, left] = 900
+        frame[top + 2, left : left + 2] = 900
+        top, left, bottom, right = top + 2, left + 2, bottom - 2, right - 2
+    return frame
+
+
+FRAMES = {
+    "contact": contact(),
+    "soft contact": large(),
+    "full": np.full((16, 24), 900, dtype=np.uint16),
+    "checkerboard": (np.indices((16, 24)).sum(0) % 2 * 900).astype(np.uint16),
+    "serpentine": serpentine(),
+    "spiral": spiral(),
+    "empty": np.zeros((16, 24), dtype=np.uint16),
+}
+
+
+def ours(frame):
+    region = largest_region(frame, 50, wraps=True)
+    return None if region is None else (region.area, region.peak, region.centroid)
+
+
+def scipy_numpy(frame):
+    labels, n = scipy.ndimage.label(frame > 50)
+    if n == 0:
+        return None
+    areas = np.bincount(labels.ravel())[1:]
+    mask = labels == areas.argmax() + 1
+    rows, cols = np.nonzero(mask)
+    return areas.max(), frame[mask].max(), (rows.mean(), cols.mean())
+
+
+def opencv(frame):
+    _, labels, stats, centres = cv2.connectedComponentsWithStats(
+        (frame > 50).view(np.uint8), connectivity=4
+    )
+    if len(stats) < 2:
+        return None
+    i = stats[1:, cv2.CC_STAT_AREA].argmax() + 1
+    return stats[i, cv2.CC_STAT_AREA], frame[labels == i].max(), centres[i]
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def bench_region(name, against):
+    frame = FRAMES[name]
+    assert ours(frame) is None or ours(frame)[0] == scipy_numpy(frame)[0] == opencv(frame)[0]
+    touching = "contact" in name
+    against(
+        lambda: ours(frame),
+        {"scipy + numpy": lambda: scipy_numpy(frame), "OpenCV": lambda: opencv(frame)},
+        most={"scipy + numpy": 0.6, "OpenCV": 1.5} if touching else {},
+        calls=50,
+    )

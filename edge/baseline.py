@@ -1,0 +1,81 @@
+"""Counts above a baseline that follows slow drift; integers only, so that results repeat."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+SCALE_BITS = 8
+"""The baseline is kept in 1/256 counts, so that a slow drift is not lost to rounding."""
+FOLLOW_BITS = 2
+"""A step is at most 1/4 of the distance: noise moves the baseline little."""
+
+
+class Baseline:
+    """The rest values of n taxels.
+
+    Each call of `follow` lets them follow their taxels by at most `step_counts`, and by `limit`
+    counts away from the calibration; not to call it freezes them.
+    """
+
+    def __init__(
+        self,
+        rest: ArrayLike,
+        *,
+        sign: ArrayLike = 1,
+        dead_band: ArrayLike = 1,
+        step_counts: float = 0.0,
+        limit: int = 0,
+    ) -> None:
+        """Start from a calibration.
+
+        Args:
+            rest: (n,) raw counts with nothing touching.
+            sign: (n,) or one, 1 where a touch raises the raw value, -1 where it lowers it.
+            dead_band: (n,) or one, counts under which a taxel reads 0; at least 1.
+            step_counts: how far one step follows; rounded to 1/256 count, up.
+            limit: how many counts it may go from `rest`.
+        """
+        self._rest = np.array(rest, dtype=np.int32) << SCALE_BITS
+        n = self._rest.shape
+        self._now = self._rest.copy()
+        self._sign = np.broadcast_to(np.asarray(sign, dtype=np.int32), n)
+        self._dead = np.broadcast_to(np.maximum(np.asarray(dead_band, dtype=np.int32), 1), n)
+        self._rising = bool((self._sign == 1).all())
+        self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
+        self._low = self._rest - (limit << SCALE_BITS)
+        self._high = self._rest + (limit << SCALE_BITS)
+        self._counts = self._rounded()
+
+    def _rounded(self) -> NDArray[np.int32]:
+        return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
+
+    @property
+    def counts(self) -> NDArray[np.int32]:
+        """(n,) raw counts that it stands at."""
+        return self._counts
+
+    def above(self, raw: NDArray[np.uint16]) -> NDArray[np.uint16]:
+        """Counts above baseline (n,): sign and dead band applied, 0 to 65535."""
+        counts = raw.astype(np.int32)
+        counts -= self._counts
+        if not self._rising:
+            counts *= self._sign
+        counts *= counts >= self._dead
+        np.minimum(counts, 65535, out=counts)
+        return counts.astype(np.uint16)
+
+    def follow(self, raw: NDArray[np.uint16], fresh: NDArray[np.bool_]) -> None:
+        """Take a step after the drift of the `fresh` taxels; call it while nothing touches."""
+        error = raw.astype(np.int32)
+        error <<= SCALE_BITS
+        error -= self._now
+        error += 1 << (FOLLOW_BITS - 1)
+        error >>= FOLLOW_BITS
+        np.minimum(error, self._step, out=error)
+        np.maximum(error, -self._step, out=error)
+        error *= fresh
+        self._now += error
+        np.minimum(self._now, self._high, out=self._now)
+        np.maximum(self._now, self._low, out=self._now)
+        self._counts = self._rounded()

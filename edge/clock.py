@@ -1,0 +1,34 @@
+"""The clock that a skin and its loop go by; the fake has a virtual one (`edge.fake.clock`)."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Seconds that never go back."""
+
+    def now(self) -> float:
+        """Seconds since some fixed moment."""
+        ...
+
+    def sleep_until(self, t: float) -> None:
+        """Return at `t`, or at once where it has passed."""
+        ...
+
+
+class SystemClock:
+    """The kernel's monotonic clock.
+
+    >>> clock = SystemClock()
+    >>> clock.sleep_until(clock.now() + 0.001)
+    """
+
+    now = staticmethod(time.monotonic)
+
+    def sleep_until(self, t: float) -> None:
+        """Return at `t`, or at once where it has passed."""
+        left = t - time.monotonic()
+        if left > 0.0:
+            time.sleep(left)

@@ -1,0 +1,137 @@
+"""`edge-classify calibrate`: rest values and noise with nothing touching."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.commands.source import add_skin, open_skin
+from edge.errors import InputError
+from edge.loop import Loop
+from edge.skin import Skin
+from edge.skinfile import Calibration, save_calibration
+
+FRAMES = 1000
+"""As the lab took for its bias."""
+LEAST_FRAMES = 20
+RESTLESS = 10.0
+"""A taxel whose noise is so many times the median's is being touched, or broken."""
+RESTLESS_COUNTS = 5.0
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "calibrate",
+        help="measure rest values and noise with nothing touching, into the skin file",
+        description="Reads the skin while nothing touches it and writes each taxel's mean and "
+        "standard deviation into the skin file; the old file stays as skin.toml.bak.",
+    )
+    add_skin(parser)
+    parser.add_argument("--frames", type=int, default=FRAMES, help="default: %(default)s")
+    parser.add_argument("--force", action="store_true", help="write it even where a taxel moves")
+    parser.set_defaults(run=run)
+
+
+def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[Calibration, int]:
+    """Mean and standard deviation of each taxel's raw values, from sums of whole numbers.
+
+    Args:
+        skin: started, and touched by nothing.
+        frames: how many.
+        lasts_s: how long there is something to read.
+
+    Returns:
+        The calibration, and how many frames it is made of.
+    """
+    shape = skin.layout.shape
+    n = np.zeros(shape, dtype=np.int64)
+    total, squares = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    skin.following = False
+    seen = 0
+    for _ in Loop(skin, lasts_s=lasts_s).frames():
+        raw, valid = skin.raw()
+        # Squares of 16 bits over 2**31 frames still fit 63 bits.
+        values = np.where(valid, raw, 0).astype(np.int64)
+        n += valid
+        total += values
+        squares += values * values
+        seen += 1
+        if seen == frames:
+            break
+    skin.following = True
+    return Calibration(*mean_and_deviation(n, total, squares)), seen
+
+
+def mean_and_deviation(
+    n: NDArray[np.int64], total: NDArray[np.int64], squares: NDArray[np.int64]
+) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
+    """Rounded mean and sample standard deviation; 0 where there is none.
+
+    The sum of squared deviations is taken about a whole number next to the mean, all in whole
+    numbers, so that a large mean costs no digits.
+    """
+    some = np.maximum(n, 1)
+    mean = (2 * total + some) // (2 * some)
+    deviations = squares - 2 * mean * total + n * mean * mean
+    shift = total - n * mean  # what rounding the mean left over
+    variance = (deviations - shift * shift / some) / np.maximum(n - 1, 1)
+    return mean.astype(np.uint16), np.sqrt(np.maximum(variance, 0.0))
+
+
+def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Taxels (row, col) that move far more than the others, worst first."""
+    limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
+    places = np.argwhere(noise > limit)
+    order = np.argsort(-noise[noise > limit], kind="stable")
+    return [(int(r), int(c)) for r, c in places[order]]
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, judge, write."""
+    if arguments.skin is None:
+        raise InputError("give --skin skin.toml: the calibration is written into it")
+    if arguments.frames < LEAST_FRAMES:
+        raise InputError(f"--frames: at least {LEAST_FRAMES}, not {arguments.frames}")
+    with open_skin(arguments, calibrated=False) as opened:
+        print("edge-classify: let nothing touch the skin", file=sys.stderr)
+        calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
+        unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
+    if seen < LEAST_FRAMES:
+        raise InputError(f"only {seen} frames could be read, {LEAST_FRAMES} are the least")
+    moving = restless(calibration.noise)
+    if moving and not arguments.force:
+        row, col = moving[0]
+        raise InputError(
+            f"{len(moving)} taxels move while they should rest, most of all [{row}, {col}] by "
+            f"{calibration.noise[row, col]:.1f} counts: let nothing touch the skin, name them "
+            "under dead in [signal], or write it with --force"
+        )
+    taken = datetime.now(UTC).replace(microsecond=0)
+    backup = save_calibration(
+        arguments.skin, Calibration(calibration.baseline, calibration.noise, taken)
+    )
+    if unread:
+        print(f"edge-classify: {unread} taxels could not be read", file=sys.stderr)
+    print(
+        json.dumps(
+            {
+                "event": "calibrated",
+                "skin": arguments.skin,
+                "backup": str(backup),
+                "frames": seen,
+                "noise_median": round(float(np.median(calibration.noise)), 3),
+                "noise_largest": round(float(calibration.noise.max()), 3),
+                "unread": unread,
+                "moving": moving,
+            }
+        )
+    )
+    return 0

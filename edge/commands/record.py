@@ -1,0 +1,218 @@
+"""`edge-classify record`: one labelled trial a contact."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+import signal
+import sys
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from edge.commands.source import Opened, add_skin, open_joints, open_skin
+from edge.errors import InputError
+from edge.frame import Frame
+from edge.loop import Loop, stop_on
+from edge.recording import Recording, save
+from edge.track import Contact, Tracker, TrackSettings
+
+LEAD_S = 0.2
+LENGTH_S = 2.0
+"""The paper decides 1.2 s after onset; what comes later lets a longer window be tried."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "record",
+        help="wait for contacts and save each as a labelled trial",
+        description="Waits for a contact, saves it with a short lead-in as one .npz, and waits "
+        "for the next. Files that exist are never overwritten.",
+    )
+    add_skin(parser, joint_options=True)
+    parser.add_argument(
+        "--label",
+        action="append",
+        default=[],
+        type=_label,
+        metavar="TASK=LABEL",
+        help="what is being touched, as object=box; more than once for more tasks",
+    )
+    parser.add_argument(
+        "--out",
+        default="recordings",
+        metavar="FOLDER|FILE.npz",
+        help="where to: a folder for numbered trials (default: %(default)s), or the one file",
+    )
+    parser.add_argument("--trials", type=int, default=None, help="stop after so many")
+    parser.add_argument(
+        "--lead", type=float, default=LEAD_S, help="seconds before onset (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--length",
+        type=float,
+        default=LENGTH_S,
+        help="seconds after onset at most (default: %(default)s)",
+    )
+    parser.add_argument("--dof", type=int, default=None, help="joint angles a line, with --joints")
+    parser.set_defaults(run=run)
+
+
+def _label(text: str) -> tuple[str, str]:
+    task, equals, label = text.partition("=")
+    if not (task.strip() and equals and label.strip()):
+        raise argparse.ArgumentTypeError(f"must be TASK=LABEL, like object=box, not {text!r}")
+    return task.strip(), label.strip()
+
+
+class Trials:
+    """Cuts a stream of frames into trials, one a contact.
+
+    `push` returns the frames of a trial when it is complete: from the lead-in before onset to
+    the contact's end, or to `length_s` after onset; a contact that goes on is waited out.
+    """
+
+    def __init__(self, tracker: Tracker, *, lead_frames: int, length_s: float) -> None:
+        self._tracker, self._length = tracker, length_s
+        self._before: deque[Frame] = deque(maxlen=max(lead_frames, 0) + _DEBOUNCE)
+        self._frames: list[Frame] | None = None
+        self._saved: Contact | None = None
+
+    def push(self, frame: Frame) -> list[Frame] | None:
+        """Take in a frame."""
+        contact = self._tracker.push(frame)
+        if self._frames is None:
+            self._before.append(frame)
+            if contact is None or contact is self._saved:
+                return None
+            self._saved = contact
+            self._frames = list(self._before)
+        else:
+            self._frames.append(frame)
+        over = contact is None or contact.ended
+        if over or frame.t - self._saved_onset() >= self._length:
+            return self.rest()
+        return None
+
+    def _saved_onset(self) -> float:
+        return math.inf if self._saved is None else self._saved.onset_s
+
+    def rest(self) -> list[Frame] | None:
+        """What there is of a trial that has begun; then waits for the next contact."""
+        frames, self._frames = self._frames, None
+        self._before.clear()
+        return frames
+
+
+_DEBOUNCE = TrackSettings().debounce
+
+
+def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
+    """Frames as a recording; joint angles where every frame has them."""
+    valid = np.array(
+        [np.ones(f.counts.shape, bool) if f.valid is None else f.valid for f in frames]
+    )
+    joints = [f.joints for f in frames if f.joints is not None]
+    return Recording(
+        t=np.array([f.t - frames[0].t for f in frames]),
+        frames=np.array([f.counts for f in frames]),
+        joints=np.array(joints) if len(joints) == len(frames) else None,
+        valid=None if valid.all() else valid,
+        meta=meta,
+    )
+
+
+def trial_path(out: str, labels: dict[str, str]) -> Path:
+    """The file for the next trial: `out` itself, or the first number that is free in it.
+
+    Raises:
+        InputError: `out` is a file that exists.
+    """
+    path = Path(out)
+    if path.suffix == ".npz":
+        if path.exists():
+            raise InputError(f"{path}: exists already; choose another name or remove it")
+        return path
+    stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())) or "trial"
+    taken = {p.name for p in path.glob(f"{stem}-*.npz")} if path.is_dir() else set()
+    number = 1
+    while f"{stem}-{number:03}.npz" in taken:
+        number += 1
+    return path / f"{stem}-{number:03}.npz"
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Wait, save, say so."""
+    labels = dict(arguments.label)
+    if not labels:
+        raise InputError("give --label TASK=LABEL: a trial without a label teaches nothing")
+    if len(labels) < len(arguments.label):
+        raise InputError("--label: a task is named twice")
+    if not 0.0 <= arguments.lead <= 60.0 or not 0.1 <= arguments.length <= 600.0:
+        raise InputError("--lead must be 0 to 60 seconds, --length 0.1 to 600")
+    single = Path(arguments.out).suffix == ".npz"
+    wanted = 1 if single else arguments.trials
+    trial_path(arguments.out, labels)
+    if arguments.joints is not None and arguments.dof is None:
+        raise InputError("--joints needs --dof, how many angles a line has")
+    with (
+        stop_on(signal.SIGINT) as stop,
+        open_skin(arguments) as opened,
+        open_joints(arguments, opened, arguments.dof) as joints,
+    ):
+        skin = opened.skin
+        tracker = Tracker(skin.layout, TrackSettings(), horizon_s=0.0)
+        lead = round(arguments.lead / skin.period_s)
+        trials = Trials(tracker, lead_frames=lead, length_s=arguments.length)
+        loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
+        done = 0
+        print("edge-classify: waiting for a contact", file=sys.stderr)
+        for frame in loop.frames():
+            frames = trials.push(frame)
+            if frames is not None:
+                _save(frames, arguments.out, labels, opened, complete=True)
+                done += 1
+                if done == wanted:
+                    break
+        else:
+            frames = trials.rest()
+            if frames is not None:
+                _save(frames, arguments.out, labels, opened, complete=False)
+                done += 1
+    if done == 0:
+        print("edge-classify: no contact, nothing saved", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _save(
+    frames: list[Frame], out: str, labels: dict[str, str], opened: Opened, *, complete: bool
+) -> None:
+    path = trial_path(out, labels)
+    meta = {
+        "labels": labels,
+        "skin": opened.skin.layout.to_dict(),
+        "skin_name": opened.skin.file.name,
+        "source": opened.source,
+        "trial": path.stem,
+        "rate_hz": opened.skin.file.reading.rate_hz,
+        "complete": complete,
+    }
+    trial = recording(frames, meta)
+    save(path, trial, overwrite=False)
+    event = {
+        "event": "saved",
+        "file": str(path),
+        "labels": labels,
+        "frames": len(frames),
+        "seconds": round(frames[-1].t - frames[0].t, 3),
+        "joints": trial.joints is not None,
+        "missing_taxels": trial.valid is not None,
+        "complete": complete,
+    }
+    print(json.dumps(event, ensure_ascii=False), flush=True)

@@ -1,0 +1,60 @@
+"""`edge-classify scan`: which chips answer, as a map of the skin."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+import numpy as np
+
+from edge.commands.source import add_skin, open_skin
+from edge.skin import ChipStatus
+from edge.skinfile import UNUSED, SkinFile
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "scan",
+        help="which chips answer, as a map of the skin",
+        description="Sets every chip up and prints one line a chip, and a map of the taxels on "
+        "stderr. Exit status 1 where a chip is missing.",
+    )
+    add_skin(parser)
+    parser.set_defaults(run=run)
+
+
+def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:
+    """A line a row of the skin, elbow first: `#` answers, `.` does not, a space has no chip."""
+    marks = np.full(file.layout.rows * file.layout.cols, " ")
+    for status in statuses:
+        for taxel in status.taxels:
+            if taxel != UNUSED:
+                marks[taxel] = "#" if status.state == "running" else "."
+    rows = marks.reshape(file.layout.shape).tolist()
+    return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(rows))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print a line a chip and the map."""
+    with open_skin(arguments, calibrated=False) as opened:
+        statuses = opened.skin.status()
+        for status in statuses:
+            print(
+                json.dumps(
+                    {
+                        "event": "chip",
+                        "bus": status.bus,
+                        "place": status.place,
+                        "kind": status.kind,
+                        "state": status.state,
+                        "error": status.error or None,
+                    }
+                )
+            )
+        print(skin_map(opened.skin.file, statuses), file=sys.stderr)
+    missing = sum(status.state != "running" for status in statuses)
+    print(f"{len(statuses) - missing} of {len(statuses)} chips answer", file=sys.stderr)
+    return 1 if missing else 0

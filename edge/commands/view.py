@@ -1,0 +1,105 @@
+"""`edge-classify view`: the skin live in a terminal."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from typing import Any
+
+from edge import terminal
+from edge.commands.source import add_skin, check_joints, open_joints, open_skin
+from edge.errors import InputError
+from edge.frame import Frame
+from edge.layout import SkinLayout
+from edge.live import Event, Watcher
+from edge.loop import Loop, stop_on
+from edge.model import Model
+from edge.region import find_regions
+
+RATE_HZ = 10.0
+FULL_NEWTONS, FULL_FACTOR = 17.0, 50
+"""White: where the lab no longer trusts a reading, or so many times the threshold."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "view",
+        help="show the skin live in a terminal",
+        description="Draws the skin with its regions, and the last decision where a model is "
+        "given. Red to white is a region's force, grey is less than contact, blue cannot be "
+        "read. Two rows to a line, the elbow on top.",
+    )
+    parser.add_argument("--model", help="model.onnx, to show decisions too")
+    parser.add_argument(
+        "--rate", type=float, default=RATE_HZ, help="pictures a second (default: %(default)s)"
+    )
+    add_skin(parser, joint_options=True)
+    parser.set_defaults(run=run)
+
+
+def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[str]:
+    """The lines of one picture."""
+    threshold = layout.threshold_counts
+    regions = find_regions(frame.counts, threshold, valid=frame.valid, wraps=layout.wraps)
+    scale = layout.counts_per_newton
+    full = FULL_FACTOR * max(threshold, 1) if scale is None else round(FULL_NEWTONS * scale)
+    colour = terminal.colours(frame, regions, threshold, full)
+    said = [f"{task}: {text}" for task, text in decisions.items()]
+    return [terminal.picture(colour), terminal.caption(frame, regions, layout), *said]
+
+
+def spoken(event: Event) -> str:
+    """A decision for a person."""
+    text = f"{event['label']} ({event['confidence']:.0%})"
+    return f"{text} [{', '.join(event['flags'])}]" if event["flags"] else text
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read at the skin's rate, draw at the terminal's."""
+    if not 0.1 <= arguments.rate <= 60.0:
+        raise InputError(f"--rate must be 0.1 to 60 pictures a second, not {arguments.rate:g}")
+    arguments.real_time |= arguments.fake is not None and sys.stdout.isatty()
+    model = None if arguments.model is None else Model(arguments.model)
+    chain = None if model is None else model.info.chain
+    with stop_on(signal.SIGINT) as stop, open_skin(arguments) as opened:
+        if model is not None:
+            check_joints(model, arguments, opened)
+        dof = None if chain is None else chain.dof
+        with open_joints(arguments, opened, dof) as joints:
+            _show(arguments, opened.skin, model, Loop(
+                opened.skin,
+                joints=joints if chain is not None else None,
+                lasts_s=opened.lasts_s,
+                stop=stop,
+            ))  # fmt: skip
+    return 0
+
+
+def _show(arguments: argparse.Namespace, skin: Any, model: Model | None, loop: Loop) -> None:
+    watcher = None if model is None else Watcher(model, skin.layout)
+    layout = skin.layout if watcher is None else watcher.layout
+    tasks = () if model is None else tuple(model.info.tasks)
+    decisions = dict.fromkeys(tasks, "no contact yet")
+    due, before = -float("inf"), ""
+    out = sys.stdout
+    out.write(terminal.HIDE + terminal.CLEAR)
+    try:
+        for frame in loop.frames():
+            for event in watcher.push(frame) if watcher is not None else ():
+                if event["event"] == "onset":
+                    decisions = dict.fromkeys(tasks, "touching ...")
+                elif event["event"] == "decision":
+                    decisions[event["task"]] = spoken(event)
+            if frame.t < due:
+                continue
+            due = frame.t + 1.0 / arguments.rate - 0.5 * skin.period_s
+            text = terminal.screen(draw(frame, layout, decisions))
+            if text != before:
+                out.write(text)
+                out.flush()
+                before = text
+    finally:
+        out.write(terminal.PLAIN + terminal.SHOW)
+        out.flush()

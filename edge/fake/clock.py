@@ -1,0 +1,66 @@
+"""Virtual time: it passes when someone sleeps, or by the bits on a wire that is timed."""
+
+from __future__ import annotations
+
+import time
+
+
+class Hand:
+    """One bus's place in time; buses run side by side, so each has its own."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
+        self._t = clock.start
+
+    def now(self) -> float:
+        """Seconds."""
+        return max(self._t, self._clock.start)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass on this bus alone."""
+        self._t = self.now() + seconds
+
+
+class VirtualClock:
+    """A clock for a loop over fake buses; never waits.
+
+    >>> clock = VirtualClock()
+    >>> hand = clock.hand()
+    >>> hand.advance(0.007)
+    >>> clock.sleep_until(0.010)
+    >>> clock.now(), hand.now()
+    (0.01, 0.01)
+    """
+
+    def __init__(self, start: float = 0.0) -> None:
+        self.start = start
+        """When all hands last met: a bus that has done nothing since is here."""
+        self._hands: list[Hand] = []
+
+    def hand(self) -> Hand:
+        """A further bus's place in time."""
+        self._hands.append(Hand(self))
+        return self._hands[-1]
+
+    def now(self) -> float:
+        """The latest of all hands."""
+        return max((hand.now() for hand in self._hands), default=self.start)
+
+    def sleep_until(self, t: float) -> None:
+        """Let all hands meet at `t`, or now where it has passed."""
+        self.start = max(self.now(), t)
+
+
+class PacedClock(VirtualClock):
+    """Virtual time that runs no faster than real time, for a person to watch."""
+
+    def __init__(self, start: float = 0.0) -> None:
+        super().__init__(start)
+        self._ahead = time.monotonic() - start
+
+    def sleep_until(self, t: float) -> None:
+        """Let all hands meet at `t`, and wait until as much real time has passed."""
+        super().sleep_until(t)
+        left = t + self._ahead - time.monotonic()
+        if left > 0.0:
+            time.sleep(left)

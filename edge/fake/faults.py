@@ -1,0 +1,101 @@
+"""Faults by script: what goes wrong, on which transactions, repeatable by seed."""
+
+from __future__ import annotations
+
+import errno
+import math
+import random
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["error", "flip", "misroute", "reset", "hold"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that goes wrong.
+
+    A transaction meets it where every condition that is given holds.
+
+    Attributes:
+        kind: `error` fails it with `code`; `flip` turns one bit of what is read; `misroute`
+            makes a write to a mux select another channel; `reset` resets the chip before it;
+            `hold` makes the chip serve what it served before.
+        code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
+            bus from being opened again while the fault lasts.
+        at: numbers of transactions on the bus, counted from 0 when the script starts.
+        rate: probability per transaction.
+        during: seconds of the bus's clock, from and until.
+        bus: the bus's name.
+        address: the chip's address.
+        mux: address of the mux it is behind.
+        channel: the mux's channel.
+    """
+
+    kind: Kind = "error"
+    code: int = errno.EREMOTEIO
+    at: Collection[int] | None = None
+    rate: float = 1.0
+    during: tuple[float, float] = (-math.inf, math.inf)
+    bus: str | None = None
+    address: int | None = None
+    mux: int | None = None
+    channel: int | None = None
+
+
+NO_FAULTS: tuple[Fault, ...] = ()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a transaction goes: bus, address, and the mux and channel it passes."""
+
+    bus: str
+    address: int
+    mux: int | None = None
+    channel: int | None = None
+
+
+class Script:
+    """The faults of one bus.
+
+    >>> script = Script([Fault(at=[1])], "bus 0")
+    >>> [script.next(Place("bus 0", 0x2C), 0.0) is not None for _ in range(3)]
+    [False, True, False]
+    """
+
+    def __init__(self, faults: Sequence[Fault], bus: str, seed: int = 0) -> None:
+        self.faults = [f for f in faults if f.bus in (None, bus)]
+        self.met = 0
+        """How many transactions met a fault."""
+        self._n = -1
+        # A stream per bus, so that what one bus meets does not depend on the others' threads.
+        self.random = random.Random(f"faults/{seed}/{bus}")
+
+    def next(self, place: Place, t: float) -> Fault | None:
+        """The fault that the next transaction meets, the first of those that match."""
+        self._n += 1
+        for fault in self.faults:
+            if (
+                (fault.at is None or self._n in fault.at)
+                and fault.during[0] <= t < fault.during[1]
+                and fault.address in (None, place.address)
+                and fault.mux in (None, place.mux)
+                and fault.channel in (None, place.channel)
+                and (fault.rate >= 1.0 or self.random.random() < fault.rate)
+            ):
+                self.met += 1
+                return fault
+        return None
+
+    def unplugged(self, t: float) -> bool:
+        """Whether the adapter is gone at `t`."""
+        return any(
+            f.kind == "error"
+            and f.code == errno.ENODEV
+            and f.at is None
+            and f.rate >= 1.0
+            and f.during[0] <= t < f.during[1]
+            for f in self.faults
+        )

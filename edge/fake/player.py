@@ -1,0 +1,287 @@
+"""A fake skin: a recording, or any scene, played onto the registers of fake chips."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge import skinfile
+from edge.chips import ad7147, block
+from edge.errors import InputError
+from edge.fake.bus import FakeBus
+from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA9548A, Sense
+from edge.fake.clock import VirtualClock
+from edge.fake.faults import NO_FAULTS, Fault
+from edge.layout import SkinLayout
+from edge.recording import Recording
+from edge.skin import Skin
+from edge.skinfile import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
+
+Scene = Callable[[float], NDArray[np.uint16]]
+"""Counts above baseline (rows, cols) at a time in seconds since the start."""
+
+REST = {"ad7147": 20946, "mpr121": 600, "block": 20946}
+"""Raw rest value where the skin's file has no calibration; Cody's real skin rests at 20946."""
+
+
+class Playback:
+    """A recording as a scene: each frame holds until the next.
+
+    >>> recording = Recording(np.array([0.0, 0.01]), np.zeros((2, 4, 4), np.uint16))
+    >>> Playback(recording).ends
+    0.02
+    """
+
+    def __init__(self, recording: Recording, *, loop: bool = False) -> None:
+        """Play it once, or over and over.
+
+        Args:
+            recording: what the skin will feel.
+            loop: start again at its end.
+        """
+        t = recording.t - recording.t[0]
+        self._t, self._frames = t, recording.frames
+        self._joints = recording.joints
+        steps = np.diff(t)
+        last = float(np.median(steps)) if steps.size else 0.01
+        self._length = float(t[-1]) + last
+        self._loop = loop
+        self.start = 0.0
+        """When it began to play, on the skin's clock."""
+
+    @property
+    def ends(self) -> float:
+        """When it is over, in seconds; infinity where it loops."""
+        return math.inf if self._loop else self._length
+
+    @property
+    def dof(self) -> int | None:
+        """How many joint angles it has, or None."""
+        return None if self._joints is None else int(self._joints.shape[1])
+
+    def _index(self, t: float) -> int:
+        t -= self.start
+        if self._loop:
+            t %= self._length
+        # Half a microsecond: a time that is meant to be a frame's own finds that frame.
+        return max(0, int(np.searchsorted(self._t, t + 5e-7, side="right")) - 1)
+
+    def __call__(self, t: float) -> NDArray[np.uint16]:
+        """Counts above baseline (rows, cols) at `t`."""
+        frame: NDArray[np.uint16] = self._frames[self._index(t)]
+        return frame
+
+    def at(self, t: float) -> NDArray[np.float64] | None:
+        """Joint angles (dof,) at `t`, where the recording has them."""
+        return None if self._joints is None else self._joints[self._index(t)]
+
+
+def calibrated(file: SkinFile) -> SkinFile:
+    """The file, with a calibration: of fake chips that make no noise where it has none."""
+    if file.calibration is not None:
+        return file
+    baseline = np.zeros(file.layout.rows * file.layout.cols, dtype=np.uint16)
+    for chip in file.chips:
+        for taxel in chip.taxels:
+            if taxel != UNUSED:
+                baseline[taxel] = _rest(chip)
+    shape = file.layout.shape
+    return replace(file, calibration=Calibration(baseline.reshape(shape), np.zeros(shape)))
+
+
+def _rest(chip: ChipSpec) -> int:
+    return min(REST[chip.kind], 128 if chip.bits == 8 else 2048 if chip.bits == 12 else 65535)
+
+
+def _top(chip: ChipSpec) -> int:
+    if chip.kind == "mpr121":
+        return 1023
+    return (1 << chip.bits) - 1 if chip.kind == "block" else 65534
+
+
+def fake_buses(
+    file: SkinFile,
+    scene: Scene,
+    clock: VirtualClock,
+    *,
+    timed: bool = False,
+    noise_counts: float = 0.0,
+    faults: Sequence[Fault] = NO_FAULTS,
+    seed: int = 0,
+) -> list[FakeBus]:
+    """Fake chips on fake buses, as the skin's file lays them out.
+
+    Args:
+        file: what is where; its calibration, where it has one, is what the chips rest at.
+        scene: what they feel.
+        clock: shared by the buses.
+        timed: the clock advances by the bits on the wire, and chips convert in their own time.
+        noise_counts: standard deviation of the raw values, drawn anew at each conversion.
+        faults: see `edge.fake.faults`.
+        seed: of noise and faults.
+    """
+    rest = calibrated(file).calibration
+    assert rest is not None
+    buses = []
+    for b, spec in enumerate(file.buses):
+        bus = FakeBus(
+            spec.device,
+            clock=clock,
+            clock_hz=spec.clock_hz,
+            timed=timed,
+            timeout_s=file.reading.timeout_s,
+            faults=faults,
+            seed=seed,
+        )
+        felt = _Felt(spec, scene, rest.baseline.ravel())
+        for c, chip in enumerate(spec.chips):
+            stream = np.random.default_rng([seed, b, c]) if noise_counts > 0.0 else None
+            _attach(bus, chip, _model(chip, felt.sense(chip, noise_counts, stream), timed))
+        buses.append(bus)
+    return buses
+
+
+class _Felt:
+    """Raw values of all taxels that one bus reads: rest and sign turned back on."""
+
+    def __init__(self, spec: BusSpec, scene: Scene, rest: NDArray[np.uint16]) -> None:
+        self._scene = scene
+        # One place more than taxels, for stages that are none.
+        self._rest = np.append(rest, 0).astype(np.int64)
+        self._gain = np.zeros(len(self._rest), dtype=np.int64)
+        self._top = np.full(len(self._rest), 65534, dtype=np.int64)
+        for chip in spec.chips:
+            places = list(chip.taxels)
+            self._gain[places], self._top[places] = chip.sign, _top(chip)
+        self._gain[UNUSED], self._rest[UNUSED] = 0, _rest(spec.chips[0])
+        self._at, self._raw = math.nan, self._rest
+
+    def raw(self, t: float) -> NDArray[np.int64]:
+        """(taxels + 1,) raw values at a time; chips that ask for the same time share them."""
+        if t != self._at:
+            self._raw = self._rest.copy()
+            self._raw[:-1] += self._gain[:-1] * self._scene(t).reshape(-1)
+            np.minimum(self._raw, self._top, out=self._raw)
+            np.maximum(self._raw, 1, out=self._raw)
+            self._at = t
+        return self._raw
+
+    def sense(self, chip: ChipSpec, noise: float, stream: np.random.Generator | None) -> Sense:
+        """What one chip senses."""
+        places, top = np.array(chip.taxels), _top(chip)
+
+        def quiet(t: float) -> NDArray[np.uint16]:
+            return self.raw(t).take(places, mode="wrap").astype(np.uint16)
+
+        def noisy(t: float) -> NDArray[np.uint16]:
+            assert stream is not None
+            raw = self.raw(t).take(places, mode="wrap")
+            raw = raw + np.rint(noise * stream.standard_normal(len(places))).astype(np.int64)
+            return np.maximum(np.minimum(raw, top), 1).astype(np.uint16)
+
+        return quiet if stream is None else noisy
+
+
+def _model(chip: ChipSpec, sense: Sense, timed: bool) -> FakeChip:
+    if chip.kind == "ad7147":
+        return FakeAD7147(sense, refresh_s=ad7147.REFRESH_S[chip.decimation] if timed else 0.0)
+    if chip.kind == "mpr121":
+        return FakeMPR121(sense)
+    return FakeBlock(sense, taxels=len(chip.taxels), bits=chip.bits)
+
+
+def _attach(bus: FakeBus, chip: ChipSpec, model: FakeChip) -> None:
+    if chip.mux is None or chip.channel is None:
+        bus.chips[chip.address] = model
+        return
+    mux = bus.chips.setdefault(chip.mux, FakeTCA9548A())
+    assert isinstance(mux, FakeTCA9548A)
+    mux.channels[chip.channel][chip.address] = model
+
+
+def fake_skin(
+    file: SkinFile,
+    scene: Scene,
+    *,
+    clock: VirtualClock | None = None,
+    timed: bool = False,
+    noise_counts: float = 0.0,
+    faults: Sequence[Fault] = NO_FAULTS,
+    seed: int = 0,
+) -> Skin:
+    """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
+    clock = clock or VirtualClock()
+    file = calibrated(file)
+    buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed)
+    skin = Skin(file, buses, clock=clock)
+    skin.start()
+    clock.sleep_until(clock.now())
+    for bus in buses:
+        bus.inject(faults, seed)
+    return skin
+
+
+def still(file: SkinFile) -> Skin:
+    """A fake skin that nothing touches."""
+    silence = np.zeros(file.layout.shape, dtype=np.uint16)
+    return fake_skin(file, lambda t: silence)
+
+
+def play(
+    file: SkinFile,
+    recording: Recording,
+    *,
+    loop: bool = False,
+    clock: VirtualClock | None = None,
+) -> tuple[Skin, Playback]:
+    """A fake skin that feels a recording.
+
+    Raises:
+        InputError: the recording's shape is not the skin's.
+    """
+    if recording.frames.shape[1:] != file.layout.shape:
+        rows, cols = recording.frames.shape[1:]
+        raise InputError(
+            f"the recording has {rows} x {cols} taxels, the skin {file.name!r} "
+            f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
+        )
+    playback = Playback(recording, loop=loop)
+    skin = fake_skin(file, playback, clock=clock)
+    playback.start = skin.clock.now()
+    return skin, playback
+
+
+def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
+    """Bits on each bus's wire for so many frames, counted as the drivers send them."""
+    skin = still(file)
+    with skin:
+        buses = [reader.bus for reader in skin.readers]
+        before = [bus.bits for bus in buses]  # type: ignore[attr-defined]
+        for _ in range(frames):
+            skin.read()
+        return [bus.bits - b for bus, b in zip(buses, before, strict=True)]  # type: ignore[attr-defined]
+
+
+def skin_file(layout: SkinLayout) -> SkinFile:
+    """Fake wiring for a skin that has only a layout: Cody's chips where its shape is Cody's.
+
+    Else microcontrollers that serve 16-bit frames, one for each 4000 taxels.
+
+    Raises:
+        InputError: there are more taxels than a bus has addresses for.
+    """
+    cody = skinfile.load(skinfile.shipped("cody"))
+    if layout.shape == cody.layout.shape:
+        return replace(cody, name="fake", layout=layout)
+    taxels, most = layout.rows * layout.cols, block.MOST_TAXELS
+    chips = tuple(
+        ChipSpec("block", 0x08 + i, tuple(range(first, min(first + most, taxels))))
+        for i, first in enumerate(range(0, taxels, most))
+    )
+    if len(chips) > 100:
+        raise InputError(f"a fake skin has at most {100 * most} taxels, not {taxels}")
+    return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

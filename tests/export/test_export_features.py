@@ -1,0 +1,64 @@
+"""A model of other features: the board measures those that its metadata names."""
+
+import json
+
+import pytest
+
+from edge.cli import main as edge_classify
+from edge.model import Model
+from export.__main__ import main
+
+SIX = ["skin_force", "right_length", "left_width", "skin_slant", "regions", "contact_area_rate"]
+
+
+@pytest.fixture(scope="module")
+def six(recordings, tmp_path_factory):
+    out = tmp_path_factory.mktemp("six")
+    given = ["--data", str(recordings), "--out", str(out), "--jobs", "1", "--samples", "20"]
+    assert main([*given, "--scaling", "IV", "--features", *SIX]) == 0
+    return out
+
+
+def test_the_model_says_what_it_measures_and_in_which_units(six):
+    info = Model(six / "model.onnx").info
+    assert info.features == tuple(SIX)
+    assert (info.samples, info.width) == (20, 120)
+    assert info.units["skin_force"] == "newton"
+    assert info.units["contact_area_rate"] == "taxel/s"
+    assert (info.chain, info.motion_frame) == (None, "skin")
+
+
+def test_its_golden_file_holds(six, capsys):
+    files = ["--model", str(six / "model.onnx"), "--golden", str(six / "golden.npz")]
+    assert edge_classify(["verify", *files]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    counts = next(line for line in lines if line["name"] == "series counts")
+    assert counts["passed"]
+    assert counts["rows"] > 1000
+
+
+def test_replay_decides_with_it(six, recordings, capsys):
+    assert edge_classify(["replay", "--model", str(six / "model.onnx"), str(recordings)]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    decided = [line for line in lines if line["event"] == "decision"]
+    assert len(decided) == 32
+    assert all(line["label"] == line["expected"] for line in decided if line["task"] == "category")
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
+        (["--features", "regions", "regions"], "the feature regions is named twice"),
+        (["--samples", "1"], "--samples must be 2 to 1000"),
+        (["--features", *SIX, "--samples", "700"], "4200 values a trial are more than the 4096"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_sentence_and_writes_nothing(
+    given, sentence, recordings, tmp_path, capsys
+):
+    arguments = ["--data", str(recordings), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main([*arguments, "--components", "2", "-k", "1", *given]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert sentence in error
+    assert not (tmp_path / "out").exists()
