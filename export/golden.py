@@ -122,5 +122,6 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         seen = [outputs(model, rows, look) for look, rows in enumerate(at_looks)]
         for task, what in wanted(model):
             arrays[f"{task}_look_{what}"] = np.stack([one[f"{task}_{what}"] for one in seen])
-    meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": BOUNDS, "model": info.data_digest}
+    bounds = {key: BOUNDS[key] for key in BOUNDS if info.looks_s or key != "pvalues"}
+    meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays, meta, compress=True)
