@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo bench faults soak clean
+.PHONY: help venv test lint types export demo golden bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
@@ -61,6 +61,10 @@ demo: $(READY)
 	$(BIN)/edge-classify verify --model $(DEMO)/model.onnx --golden $(DEMO)/golden.npz > /dev/null
 	$(BIN)/edge-classify replay --model $(DEMO)/model.onnx --summary $(DEMO)/unseen
 	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
+
+# The committed model and outputs that the tests hold the edge to.
+golden: $(READY)
+	$(BIN)/python -m tests.golden.make
 
 BENCHVENV := $(VENV)/.bench
 
