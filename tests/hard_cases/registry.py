@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.hard_cases import neighbours, scaling
+from tests.hard_cases import frames, neighbours, scaling
 from tests.hard_cases.cases import Case
 
-CASES: list[Case] = [*neighbours.CASES, *scaling.CASES]
+CASES: list[Case] = [*neighbours.CASES, *scaling.CASES, *frames.CASES]
