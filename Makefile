@@ -4,7 +4,8 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench clean
+.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench faults \
+  soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
@@ -15,6 +16,8 @@ help:
 	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
 	@echo "make demo-data    the model and touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
+	@echo "make faults   what each fault on the skin's wires costs, as a table"
+	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -75,26 +78,8 @@ bench: $(BENCHVENV)
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
 
-# Stale copies of modules would go into the wheel.
-wheel: $(READY)
-	rm -rf build/lib build/bdist.* dist
-	PIP_CONSTRAINT=$(CURDIR)/constraints.txt SOURCE_DATE_EPOCH=1577836800 \
-	  $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w dist .
-
-wheel-test: wheel
-	$(BIN)/python -m pytest board/test_wheel.py
-
-board-test: wheel
-	$(BIN)/python -m pytest board/test_aarch64.py -rs --capture=tee-sys
-
-DEMODATA := build/demo-data
-
-demo-data: $(READY)
-	rm -rf $(DEMODATA)
-	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
-	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
-	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA)
-	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
+.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench faults \
+  soak clean
 
 clean:
 	rm -rf build dist

@@ -21,6 +21,8 @@ from edge.frame import Frame
 from edge.reader import NEVER, BusReader, Slot, State, frame_bytes
 from edge.skinfile import UNUSED, SkinFile, dead_band
 
+FOLLOW_FRAMES = 4
+"""The baseline takes a step every so many frames: drift is slow, and steps cost time."""
 NOISY = 1.0
 """Standard deviation in counts from which a chip's bytes change with every conversion."""
 MARGIN = 0.9
@@ -30,7 +32,7 @@ MARGIN = 0.9
 class Planner(Protocol):
     """Chooses which chips a frame reads; `edge.interest` has one."""
 
-    def plan(self, frame: Frame | None) -> Sequence[Sequence[int]]:
+    def plan(self, frame: Frame | None, touch_counts: int) -> Sequence[Sequence[int]]:
         """For each bus the indices of the chips to read next, in order."""
         ...
 
@@ -125,6 +127,8 @@ class Skin:
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
         self.planner: Planner | None = None
+        self.touch_counts = file.layout.threshold_counts
+        """A taxel above this is being touched: the baseline is frozen, its chip is of interest."""
         self.following = True
         """The baseline follows drift."""
         groups = _rows(file)
@@ -143,7 +147,8 @@ class Skin:
         self._wire(groups)
         self._file_signal()
         self._last: Frame | None = None
-        self._touched_at = -math.inf
+        self._touched_at = self._followed_at = -math.inf
+        self._untold = 0
         self._states = [slot.state for slot in self._slots]
         self._workers = [_Worker(reader) for reader in self.readers[1:]]
         self._closed = False
@@ -196,9 +201,11 @@ class Skin:
                         self._chip_of[taxel] = order[id(slot)]
                         self._sign[taxel] = slot.spec.sign
                     stage += 1
-        self._alive = np.ones(n, dtype=np.bool_)
+        self._served = self._chip_of < len(self._slots)
+        """Taxels that have a chip and are not dead."""
         for row, col in self.file.signal.dead:
-            self._alive[row * self.layout.cols + col] = False
+            self._served[row * self.layout.cols + col] = False
+        self._all_served = bool(self._served.all())
 
     def _file_signal(self) -> None:
         """Baseline, dead band and stuck chips from the file."""
@@ -209,7 +216,7 @@ class Skin:
             rest,
             sign=self._sign,
             dead_band=dead_band(self.file),
-            counts_per_frame=signal.drift_counts_per_s * self.period_s,
+            step_counts=signal.drift_counts_per_s * self.period_s * FOLLOW_FRAMES,
             limit=signal.drift_limit_counts,
         )
         if calibration is not None:
@@ -289,7 +296,7 @@ class Skin:
     def _transfer(self, t: float) -> None:
         jobs = self._every
         if self.planner is not None:
-            chosen = self.planner.plan(self._last)
+            chosen = self.planner.plan(self._last, self.touch_counts)
             jobs = [
                 [reader.slots[i] for i in indices]
                 for reader, indices in zip(self.readers, chosen, strict=True)
@@ -317,13 +324,18 @@ class Skin:
         good = np.array([slot.good for slot in slots] + [False])
         self._suspect(good, at >= t)
         good &= at >= t - self.oldest_s
-        valid = good[self._chip_of]
-        valid &= whole[self._stage_of]
-        valid &= self._alive
-        values = raw[self._stage_of]
+        values = raw.take(self._stage_of)
         counts = self.baseline.above(values)
-        counts *= valid
-        times = at[self._chip_of]
+        times = at.take(self._chip_of)
+        if whole[:-1].all() and good[:-1].all():
+            valid = self._served.copy()
+            if not self._all_served:
+                counts *= valid
+        else:
+            valid = good.take(self._chip_of)
+            valid &= whole.take(self._stage_of)
+            valid &= self._served
+            counts *= valid
         self._follow(values, counts, valid, times, t)
         shape = self.layout.shape
         self._last = Frame(
@@ -369,10 +381,15 @@ class Skin:
         """Let the baseline follow drift, unless something touches or has just touched."""
         if self.file.calibration is None or not self.following:
             return
-        if int(counts.max()) > self.layout.threshold_counts:
+        if int(counts.max()) > self.touch_counts:
             self._touched_at = t
-        elif t - self._touched_at >= self.file.signal.settle_s:
-            self.baseline.follow(values, valid & (times >= t))
+        self._untold += 1
+        if self._untold < FOLLOW_FRAMES:
+            return
+        self._untold = 0
+        if t - self._touched_at >= self.file.signal.settle_s:
+            self.baseline.follow(values, valid & (times >= self._followed_at))
+        self._followed_at = t
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""

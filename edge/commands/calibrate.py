@@ -101,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.frames < LEAST_FRAMES:
         raise InputError(f"--frames: at least {LEAST_FRAMES}, not {arguments.frames}")
     with open_skin(arguments, calibrated=False) as opened:
+        print("edge-classify: let nothing touch the skin", file=sys.stderr)
         calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
         unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
     if seen < LEAST_FRAMES:

@@ -81,6 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
         dof = None if chain is None else chain.dof
         with open_joints(arguments, opened, dof) as joints:
             watcher = Watcher(model, skin.layout)
+            # The model's threshold counts where it is the lower one.
+            skin.touch_counts = min(skin.touch_counts, watcher.layout.threshold_counts)
             loop = Loop(
                 skin,
                 joints=joints if chain is not None else None,

@@ -1,0 +1,111 @@
+"""A bench for the simulator's own step functions: one joint that pushes along a line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from train.simulate import base
+from train.simulate.effects import relaxation, sliding
+from train.simulate.plan import Build
+from train.simulate.scene import from_dict
+
+
+@dataclass
+class Trace:
+    """What the bench saw: (steps, n) each."""
+
+    t: np.ndarray
+    force: np.ndarray
+    q: np.ndarray
+    target: np.ndarray
+    slide: np.ndarray
+    speed: np.ndarray
+    depth: np.ndarray
+
+
+class Rig:
+    """n pushers of stiffness `arm_k` whose ends run at `speed` against beds of springs.
+
+    The step is the simulator's own; only the arm's geometry is left out (one joint of lever 1).
+    """
+
+    def __init__(
+        self,
+        *,
+        h,
+        arm_k=115.0,
+        arm_d=0.0,
+        speed=0.15,
+        slopes=((1e4,),),
+        intercepts=((0.0,),),
+        travel_s=1e9,
+        effects=(),
+        **values,
+    ):
+        given = [np.asarray(v, dtype=float) for v in values.values()]
+        slopes, intercepts = np.asarray(slopes, float), np.asarray(intercepts, float)
+        n = max([v.size for v in (*given, np.asarray(h), slopes[0])])
+        plan = Build(
+            from_dict({"object": [{"name": "x", "family": "rigid", "conditions": ["fixed"]}]}),
+            effects,
+        )
+        base.add(plan)
+        for effect in effects:
+            {"sliding": sliding, "relaxation": relaxation}[effect].add(plan)
+        self.steps = [f for s, _, f in sorted(plan.entries, key=lambda e: e[1]) if s == "step"]
+        h = np.broadcast_to(np.asarray(h, float), (n,))
+        k, d = np.full((1, 1), arm_k), np.full((1, 1), arm_d)
+        self.state = {
+            "n": n,
+            "h": h,
+            "t": np.zeros(n),
+            "start": np.zeros((1, n)),
+            "rate": np.full((1, 1), speed),
+            "travel_s": travel_s,
+            "held": d / h,
+            "give": 1.0 / (d / h + k),
+            "joint_k": k,
+            "q": np.zeros((1, n)),
+            "q_frame": np.zeros((1, n)),
+            "y_frame": (np.zeros(n),),
+            "jacobian": (np.ones((1, n)),),
+            "compliance": (np.broadcast_to(1.0 / (d / h + k), (1, n))[0],),
+            "slopes": np.broadcast_to(slopes, (len(slopes), n)),
+            "intercepts": np.broadcast_to(intercepts, (len(intercepts), n)),
+            "loads": (np.zeros(n),),
+            "values": {key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)},
+            "solve": plan.solve,
+        }
+        for s, _, f in sorted(plan.entries, key=lambda e: e[1]):
+            if s == "setup" and f in (sliding.stand, relaxation.begin):
+                f(self.state)
+
+    def run(self, steps: int) -> Trace:
+        seen = {name: [] for name in ("t", "force", "q", "target", "slide", "speed", "depth")}
+        state = self.state
+        n = state["n"]
+        for _ in range(steps):
+            for function in self.steps:
+                function(state)
+            now = {
+                "t": state["t"],
+                "force": state["loads"][0],
+                "q": state["q"][0],
+                "target": base.equilibrium(state, state["t"])[0],
+                "slide": state.get("slide", np.zeros(n)),
+                "speed": state.get("speed", np.zeros(n)),
+                "depth": state["depth"][0],
+            }
+            for name, value in now.items():
+                seen[name].append(np.broadcast_to(value, (n,)))
+        return Trace(**{name: np.array(v) for name, v in seen.items()})
+
+
+@pytest.fixture
+def tools():
+    """The bench, for tests that cannot import from beside themselves."""
+    return SimpleNamespace(Rig=Rig, Trace=Trace)

@@ -1,0 +1,239 @@
+"""An effect that is not called for costs nothing and changes nothing: six proofs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from train.simulate import plan as plans
+from train.simulate import streams
+from train.simulate.calls import callers
+from train.simulate.engine import begin, kind_of, run_batch, values_of
+from train.simulate.fields import EFFECTS
+from train.simulate.plan import STAGES, make_plan
+from train.simulate.run import kinds
+from train.simulate.scene import from_dict
+
+ROOT = Path(__file__).parents[3]
+MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
+
+
+def scene(*add, leave_out=(), objects=None, seed=3, **trials):
+    things = objects or [
+        {"name": "box", "family": "rigid", "conditions": ["fixed", "movable"], **MOVES}
+    ]
+    return from_dict(
+        {
+            "seed": seed,
+            "trials": {"count": 3, "after_s": 0.6, **trials},
+            "step_s": {"base": 0.01},
+            "spread": {"place_m": 0.01, "roll_deg": 5.0, "friction": 0.1},
+            "effects": {"add": list(add), "leave_out": list(leave_out)},
+            "object": things,
+        }
+    )
+
+
+def everything():
+    """One object of each family, with every key that calls for an effect."""
+    full = {**MOVES, "cover_n_m": 3000.0, "stribeck_m_s": 0.05, "base_m": 0.1, "height_m": 0.3}
+    return [
+        {"name": family, "family": family, "conditions": ["fixed", "movable"], **full}
+        for family in ("rigid", "foam", "pillow", "bubbles", "foliage")
+    ]
+
+
+def batch_of(one, index=0):
+    kind, trials = list(kinds(one).items())[index]
+    return run_batch(one, tuple(trials), 0.01), kind
+
+
+def test_1_an_effect_not_called_for_is_not_loaded():
+    program = (
+        "import json, sys\n"
+        "from train.simulate.scene import from_dict\n"
+        "from train.simulate.run import simulate\n"
+        "table = {'trials': {'count': 1, 'after_s': 0.2}, 'step_s': {'base': 0.01},"
+        "'object': [{'name': 'box', 'family': 'rigid', 'conditions': ['fixed']}]}\n"
+        "assert len(list(simulate(from_dict(table)))) == 1\n"
+        "print(json.dumps([m for m in sys.modules if m.startswith('train.simulate.effects.')]))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert json.loads(done.stdout) == []
+
+
+@pytest.mark.parametrize("add", [(), ("noise", "tilt")])
+def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
+    one = scene(*add)
+    before = [batch_of(one, i)[0] for i in range(2)]
+    for i, kind in enumerate(kinds(one)):
+        for name in EFFECTS:
+            if name not in kind.effects:
+                bomb = types.ModuleType(name)
+                bomb.__getattr__ = lambda attribute, name=name: pytest.fail(f"{name} was touched")
+                monkeypatch.setitem(sys.modules, f"train.simulate.effects.{name}", bomb)
+        after = batch_of(one, i)[0]
+        monkeypatch.undo()
+        assert before[i].counts.tobytes() == after.counts.tobytes()
+        assert before[i].joints.tobytes() == after.joints.tobytes()
+
+
+def test_3_the_state_holds_the_called_effects_keys_alone():
+    bare = scene(leave_out=["sliding"])
+    keys = set(batch_of(bare)[0].state)
+    own = {
+        "sliding": {"inertia", "hold", "drag", "speed", "slide"},
+        "tipping": {"tips", "tip_force", "tip_travel"},
+        "tilt": {"guess", "settled", "lever"},
+        "impact": {"touched", "impact_decay", "impact_omega", "impact_height", "impact_wave"},
+        "relaxation": {
+            "relax_decay",
+            "relax_rise",
+            "relax_gain",
+            "relax_load",
+            "relax_lever",
+        },
+        "dead_taxels": {"valid"},
+        "jitter": {"times"},
+        "dropped_frames": {"kept"},
+        "pop": {"alive", "burst"},
+        "noise": set(),
+        "stribeck": set(),
+        "cover": set(),
+    }
+    assert not keys & set.union(*own.values())
+    one = scene(
+        "tilt",
+        "impact",
+        "noise",
+        "dead_taxels",
+        "jitter",
+        "dropped_frames",
+        objects=[*everything()],
+    )
+    for i, kind in enumerate(kinds(one)):
+        if "stems" in kind.effects:
+            continue
+        state = set(batch_of(one, i)[0].state)
+        expected = keys.union(*(own.get(name, set()) for name in kind.effects))
+        assert state - expected == set(), kind.effects
+        for name in own:
+            if name not in kind.effects:
+                assert not state & own[name], (name, kind.effects)
+
+
+def test_4_adding_an_effect_leaves_the_others_draws():
+    one, two = scene("noise"), scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
+    trials = tuple(next(iter(kinds(one).values())))
+    a, b = values_of(one, trials), values_of(two, trials)
+    assert a.keys() == b.keys()
+    for key in a:
+        assert a[key].tobytes() == b[key].tobytes()
+    # Before the contact nothing but the noise's own draws is to be seen.
+    far = {"lead_s": 5.0, "after_s": 0.1}
+    one = scene("noise", **far)
+    two = scene("noise", "dropped_frames", "crosstalk", "tilt", "saturation", **far)
+    first, second = (batch_of(s)[0].counts[:, :499] for s in (one, two))
+    assert first.any()
+    np.testing.assert_array_equal(first, second)
+
+
+def test_4_streams_go_by_name_not_by_place():
+    draw = streams.stream(3, "noise", "box-fixed", 0).random(4)
+    streams.stream(3, "drift", "box-fixed", 0).random(9)
+    np.testing.assert_array_equal(draw, streams.stream(3, "noise", "box-fixed", 0).random(4))
+    for other in (
+        streams.stream(4, "noise", "box-fixed", 0),
+        streams.stream(3, "drift", "box-fixed", 0),
+        streams.stream(3, "noise", "box-movable", 0),
+        streams.stream(3, "noise", "box-fixed", 1),
+        streams.stream(3, "noise", "box-fixed"),
+    ):
+        assert (other.random(4) != draw).all()
+    # The same on every machine and in every version: the first words of the name's hash.
+    assert streams.key("noise") == (3232097007, 3611913630)
+
+
+def test_5_the_number_of_functions_is_exact():
+    bare = make_plan(scene(), ())
+    assert {s: len(getattr(bare, s)) for s in STAGES} == {
+        "setup": 5,
+        "frame": 1,
+        "step": 3,
+        "sample": 2,
+        "clock": 0,
+        "sensor": 0,
+    }
+    one = scene(
+        *[n for n in EFFECTS if n not in ("foundation", "relaxation", "pop", "stems")],
+        objects=everything(),
+    )
+    seen = set()
+    for kind in kinds(one):
+        plan = make_plan(one, kind.effects)
+        extra = sum(EFFECTS[name].functions for name in kind.effects)
+        if "pop" in kind.effects and "tilt" not in kind.effects:
+            extra += 1
+        assert len(plan) == len(bare) + extra, kind.effects
+        seen |= set(kind.effects)
+    assert seen == set(EFFECTS)
+
+
+@pytest.mark.parametrize("sensor", [False, True])
+def test_6_results_depend_on_neither_batch_nor_chunk(sensor):
+    add = ["tilt", "impact"]
+    if sensor:
+        add += [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
+    one = scene(*add, objects=everything(), after_s=0.4)
+    for kind, trials in kinds(one).items():
+        trials = tuple(trials)
+        whole = run_batch(one, trials, 0.01)
+        for part in (trials[:1], trials[::-1]):
+            some = run_batch(one, part, 0.01)
+            where = [trials.index(t) for t in part]
+            assert some.counts.tobytes() == whole.counts[where].tobytes(), kind.effects
+            assert some.joints.tobytes() == whole.joints[where].tobytes(), kind.effects
+            assert some.force.tobytes() == whole.force[where].tobytes(), kind.effects
+
+
+def test_who_called_is_told():
+    one = scene("noise", "stribeck", objects=everything())
+    foam = next(o for o in one.objects if o.family == "foam")
+    called = callers(one, foam, "movable")
+    assert called["relaxation"] == "family foam"
+    assert called["sliding"] == "movable"
+    assert called["cover"] == "cover_n_m"
+    assert called["tipping"] == "base_m and height_m"
+    assert called["noise"] == "effects.add"
+    assert "sliding" not in callers(one, foam, "fixed")
+    assert "stribeck" not in callers(one, foam, "fixed")
+    assert kind_of(one, foam, "fixed") != kind_of(one, foam, "movable")
+
+
+def test_leaving_out_what_is_implied():
+    one = scene(leave_out=["relaxation"], objects=everything())
+    foam = next(o for o in one.objects if o.family == "foam")
+    assert "relaxation" not in callers(one, foam, "fixed")
+    assert "foundation" in callers(one, foam, "fixed")
+
+
+def test_the_plan_is_flat():
+    plan = make_plan(scene("tilt"), ("tilt", "sliding"))
+    state = begin(
+        scene("tilt"),
+        plan,
+        t := tuple(list(kinds(scene("tilt")).values())[1]),
+        0.01,
+        values_of(scene("tilt"), t),
+    )
+    assert all(callable(f) for stage in STAGES for f in getattr(plan, stage))
+    assert state["slide"].shape == (3,)
+    assert plans.STAGES == STAGES

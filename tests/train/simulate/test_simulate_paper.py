@@ -1,0 +1,73 @@
+"""The default scene set, held to the paper's three headline accuracies (section IV-A)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from scipy.stats import binomtest
+
+from train.crossval import leave_one_out
+from train.dataset import load_trials
+from train.simulate import scene as scenes
+from train.simulate.convergence import measure
+from train.simulate.run import kinds, steps, total_trials, write
+
+SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
+PAPER = {"category": 112, "mobility": 128, "object": 101}
+"""Right of 140: 80 %, 91.43 %, 72.14 %."""
+
+
+@pytest.fixture(scope="module")
+def cody18():
+    return scenes.load(SCENE)
+
+
+@pytest.fixture(scope="module")
+def dataset(cody18, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cody18")
+    write(cody18, folder)
+    return load_trials([folder])
+
+
+def test_eighteen_objects_ten_in_both_conditions(cody18):
+    conditions = [o.conditions for o in cody18.objects]
+    assert len(conditions) == 18
+    assert conditions.count(("fixed", "movable")) == 10
+    assert conditions.count(("fixed",)) == 4
+    assert conditions.count(("movable",)) == 4
+    assert total_trials(cody18) == 140
+
+
+def test_each_trial_is_felt_and_long_enough(dataset):
+    assert dataset.untouched == ()
+    assert len(dataset.trials) == 140
+    assert dataset.tasks == ("category", "mobility", "object")
+    assert dataset.chain is not None
+    for trial in dataset.trials:
+        assert trial.onset_s > 0.1
+        assert trial.series.t[-1] >= 1.2 or trial.series.ended
+
+
+@pytest.mark.parametrize("task", PAPER)
+def test_headline_accuracies_lie_within_the_papers_binomial_interval(dataset, task):
+    right = leave_one_out(dataset.features(), dataset.labels(task)).max()
+    interval = binomtest(PAPER[task], 140).proportion_ci(0.95)
+    assert interval.low <= right <= interval.high
+
+
+def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
+    force, motion = dataset.features()[:, 39], dataset.features()[:, 119]
+    category = dataset.labels("category")
+    mean = {c: (force[category == c].mean(), motion[category == c].mean()) for c in set(category)}
+    assert mean["rigid-fixed"][0] > mean["rigid-movable"][0] > mean["soft-movable"][0]
+    assert mean["rigid-fixed"][0] > mean["soft-fixed"][0]
+    assert mean["rigid-movable"][1] > mean["rigid-fixed"][1]
+    assert mean["soft-movable"][1] > mean["soft-fixed"][1]
+
+
+def test_the_scenes_steps_are_the_measured_ones(cody18):
+    # Three kinds stand for all here; --explain measures every one.
+    step = steps(cody18)
+    for kind, trials in list(kinds(cody18).items())[2:10:3]:
+        assert step[kind] <= measure(cody18, tuple(trials)).step_s

@@ -1,0 +1,180 @@
+"""A scene's file: what it may say, and the sentence that each mistake gets."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from train.simulate import scene as scenes
+from train.simulate.fields import EFFECTS
+from train.simulate.scene import from_dict
+
+SCENES = Path(__file__).parents[3] / "train" / "scenes"
+GOOD = {
+    "name": "test",
+    "seed": 1,
+    "trials": {"count": 2, "lead_s": [0.1, 0.2]},
+    "step_s": {"base": 0.01, "sliding": 0.005},
+    "skin": {"taxel_n_m": 8000.0},
+    "spread": {"yaw_deg": 2.0},
+    "effects": {"add": ["tilt"], "noise": {"counts": 4.0}},
+    "object": [
+        {
+            "name": "box",
+            "family": "rigid",
+            "conditions": ["fixed", "movable"],
+            "mass_kg": [1.0, 2.0],
+            "friction_static": 0.5,
+            "friction_kinetic": 0.4,
+        }
+    ],
+}
+
+
+def broken(path, value):
+    table = copy.deepcopy(GOOD)
+    place = table
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return table
+
+
+@pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda p: p.stem)
+def test_the_shipped_scenes_are_good(path):
+    scene = scenes.load(path)
+    assert scene.name == path.stem
+    assert {o.family for o in scene.objects} >= {"rigid", "foam"}
+
+
+def test_values_ranges_and_defaults():
+    scene = from_dict(GOOD)
+    box = scene.objects[0]
+    assert (box.values["mass_kg"].low, box.values["mass_kg"].high) == (1.0, 2.0)
+    assert box.values["mass_kg"].varies
+    assert not box.values["friction_static"].varies
+    assert scene.settings == {"tilt": {}, "noise": {"counts": 4.0}}
+    assert scene.arm.dof == 5
+    assert scene.skin.shape == (16, 24)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "says"),
+    [
+        (("colour",), 1, "unknown key colour; allowed here: name, seed, trials"),
+        (("trials", "cuont"), 1, "unknown key trials.cuont; allowed here: count, lead_s"),
+        (("trials", "count"), 0, "trials.count must be at least 1"),
+        (("trials", "count"), 2.5, "trials.count must be a whole number"),
+        (("trials", "lead_s"), [0.3, 0.1], "trials.lead_s is a range turned round"),
+        (("trials", "lead_s"), [0.1], "trials.lead_s must be one number or a range"),
+        (("trials", "rate_hz"), float("nan"), "trials.rate_hz must be at least 1"),
+        (("seed",), -1, "seed must be a whole number"),
+        (("seed",), True, "seed must be a whole number"),
+        (("step_s", "sliding"), 0.003, "step_s.sliding must divide the frame's 0.01 s evenly"),
+        (("step_s", "soup"), 0.01, "unknown key step_s.soup"),
+        (("skin", "taxel_n_m"), 0.0, "skin.taxel_n_m must be above 0"),
+        (("skin", "threshold_counts"), 1.5, "skin.threshold_counts must be a whole number"),
+        (("spread", "yaw_deg"), 50, "spread.yaw_deg must be at least 0, at most 30"),
+        (("motion",), {"rate_deg_s": [0, 0, 0, 0, 0]}, "motion.rate_deg_s is all zero"),
+        (("motion",), {"start_deg": [-60, 0, 0, 0, 0]}, "motion.start_deg of shoulder_pitch"),
+        (("motion",), {"start_deg": [1, 2]}, "motion.start_deg must be 5 numbers"),
+        (("arm",), {"stiffness_nm_rad": [1, 1, 1, 1, -1]}, "arm.stiffness_nm_rad must be above 0"),
+        (("effects", "add"), ["tlit"], "effects.add has no 'tlit'; allowed: foundation"),
+        (("effects", "add"), ["stems"], "it needs an object of family foliage"),
+        (("effects", "add"), ["relaxation"], "it needs an object of family foam or pillow"),
+        (("effects", "add"), ["cover"], "it needs an object with cover_n_m"),
+        (("effects", "add"), ["noise", "noise"], "effects.add names one twice"),
+        (("effects", "leave_out"), ["tilt"], "effects both adds and leaves out tilt"),
+        (("effects", "tilt"), {"x": 1}, "unknown key effects.tilt.x"),
+        (("effects", "noise"), {"counts": -1}, "effects.noise.counts must be at least 0"),
+        (("effects", "noise"), 3, "effects.noise must be a table"),
+        (("object",), [], "object is missing"),
+        (("object", 0, "family"), "metal", "family must be one of rigid, foam"),
+        (("object", 0, "mass_kg"), -1.0, "object 'box': mass_kg must be above 0"),
+        (("object", 0, "friction_static"), -0.1, "friction_static must be at least 0"),
+        (("object", 0, "friction_kinetic"), 0.6, "must be at most friction_static (0.5)"),
+        (("object", 0, "mass_kg"), [2.0, 1.0], "mass_kg is a range turned round"),
+        (("object", 0, "mass_kg"), "heavy", "mass_kg must be a number (above 0"),
+        (("object", 0, "conditions"), ["flying"], "conditions has no 'flying'"),
+        (("object", 0, "conditions"), [], "conditions must name fixed, movable or both"),
+        (("object", 0, "modulus_pa"), 1e4, "unknown key object 'box'.modulus_pa"),
+        (("object", 0, "base_m"), 0.2, "tipping needs both base_m and height_m"),
+        (("object", 0, "name"), "", "name must be text"),
+    ],
+)
+def test_a_mistake_gets_one_sentence_with_the_key_and_what_is_allowed(path, value, says):
+    with pytest.raises(InputError) as error:
+        from_dict(broken(path, value), where="scene.toml")
+    assert str(error.value).startswith("scene.toml: ")
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_movable_object_needs_what_it_slides_on():
+    table = copy.deepcopy(GOOD)
+    del table["object"][0]["friction_static"]
+    with pytest.raises(InputError, match="friction_static is missing"):
+        from_dict(table)
+
+
+def test_two_objects_of_one_name():
+    table = copy.deepcopy(GOOD)
+    table["object"] = table["object"] * 2
+    with pytest.raises(InputError, match="'box' is there twice"):
+        from_dict(table)
+
+
+def test_files_that_are_no_scene(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        scenes.load(tmp_path / "none.toml")
+    path = tmp_path / "bad.toml"
+    path.write_bytes(b"a = [1\n\xff")
+    with pytest.raises(InputError, match="not TOML"):
+        scenes.load(path)
+
+
+LEAVES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=4),
+    st.lists(st.one_of(st.integers(-3, 3), st.floats(), st.text(max_size=3)), max_size=3),
+    st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
+)
+
+
+def paths(table, prefix=()):
+    found = [prefix] if prefix else []
+    items = table.items() if isinstance(table, dict) else enumerate(table)
+    for key, value in items:
+        found.append((*prefix, key))
+        if isinstance(value, dict | list):
+            found += paths(value, (*prefix, key))
+    return found
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.sampled_from([*paths(GOOD), *(("object", 0, k) for k in ("width_m", "cover_n_m"))]),
+    LEAVES,
+)
+def test_any_value_anywhere_is_taken_or_refused_in_one_sentence(path, value):
+    try:
+        from_dict(broken(path, value))
+    except InputError as error:
+        sentence = str(error)
+    else:
+        sentence = ""
+    assert "\n" not in sentence
+
+
+def test_every_effect_says_what_it_is():
+    assert all(
+        info.says and info.stage in ("contact", "sensor", "clock") for info in EFFECTS.values()
+    )

@@ -1,0 +1,358 @@
+"""The step holds where others blow up. "Finite" proves nothing: forces and energy are judged."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from train.simulate import contact
+from train.simulate.effects import tilt
+from train.simulate.effects.sliding import GRAVITY
+
+MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
+
+
+def cases():
+    """Stiffness x mass x step x friction: 1320 cases in one batch."""
+    grid = np.meshgrid(
+        10.0 ** np.arange(-3, 16, 2, dtype=float),
+        10.0 ** np.arange(-9, 10, 1.8),
+        [0.001, 0.01, 0.02, 0.05, 0.1, 0.2],
+        [0.05, 1.0],
+        indexing="ij",
+    )
+    return [g.ravel() for g in grid]
+
+
+def judge(trace, stiffness, mass, h, mu_s, mu_k):
+    """What must hold of any trace; returns the complaints."""
+    complaints = []
+    force = trace.force
+    if not all(np.isfinite(v).all() for v in vars(trace).values()):
+        complaints.append("not finite")
+        return complaints
+    if (force < 0.0).any():
+        complaints.append("a force pulls")
+    reach = trace.target - trace.slide
+    if not (force[reach > 0.0] > 0.0).all():
+        complaints.append("no force though pressed")
+    if (force > ARM_K * np.maximum(trace.target, 0.0) * (1 + 1e-12)).any():
+        complaints.append("more force than the arm can give")
+    # In the arm's spring and the bed's the force is the same.
+    gap = np.abs(ARM_K * (trace.target - trace.q) - force)
+    if (gap > 1e-12 * ARM_K * np.abs(trace.target)).any():
+        complaints.append("arm and contact disagree")
+    before = {"slide": np.vstack([np.zeros(force.shape[1]), trace.slide[:-1]])}
+    moved = trace.slide - before["slide"]
+    hold = mu_s * mass * GRAVITY
+    stuck = np.cumsum(moved > 0.0, axis=0) == 0
+    if (trace.slide[stuck] != 0.0).any():
+        complaints.append("creeps in stick")
+    if ((force > hold * (1 + 1e-12)) & stuck).any():
+        complaints.append("sticks under more than it holds")
+    # The ledger: the target's motion at fixed q puts energy in; after that nothing may add any.
+    q0 = np.vstack([np.zeros(force.shape[1]), trace.q[:-1]])
+    f0 = np.vstack([np.zeros(force.shape[1]), force[:-1]])
+    v0 = np.vstack([np.zeros(force.shape[1]), trace.speed[:-1]])
+    stored0 = 0.5 * f0**2 / stiffness + 0.5 * mass * v0**2
+    arm0 = 0.5 * ARM_K * (trace.target - q0) ** 2
+    stored1 = 0.5 * force**2 / stiffness + 0.5 * mass * trace.speed**2
+    arm1 = 0.5 * ARM_K * (trace.target - trace.q) ** 2
+    friction = mu_k * mass * GRAVITY * moved
+    lost = (stored0 + arm0) - (stored1 + arm1) - friction
+    scale = stored0 + arm0 + stored1 + arm1 + friction
+    if (lost < -1e-12 * scale).any():
+        complaints.append("energy made")
+    if (friction < 0.0).any():
+        complaints.append("friction gives energy")
+    return complaints
+
+
+class TestGrid:
+    def test_at_least_a_thousand_cases_with_friction(self, tools):
+        stiffness, mass, h, mu = cases()
+        assert stiffness.size >= 1000
+        rig = tools.Rig(
+            h=h,
+            speed=SPEED,
+            slopes=stiffness[None],
+            intercepts=np.zeros((1, stiffness.size)),
+            effects=("sliding",),
+            mass_kg=mass,
+            friction_static=mu,
+            friction_kinetic=0.8 * mu,
+        )
+        trace = rig.run(120)
+        for i in range(0, stiffness.size, 1):
+            one = type(trace)(**{k: v[:, i : i + 1] for k, v in vars(trace).items()})
+            found = judge(one, stiffness[i], mass[i], h[i], mu[i], 0.8 * mu[i])
+            assert not found, (stiffness[i], mass[i], h[i], mu[i], found)
+
+    def test_the_judge_rejects_a_finite_trace_that_reset_itself(self, tools):
+        # A general engine's soft body went NaN, reset itself and ended finite with zero force.
+        rig = tools.Rig(
+            h=0.01,
+            slopes=[[1e3]],
+            effects=("sliding",),
+            mass_kg=5.0,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
+        )
+        trace = rig.run(60)
+        assert judge(trace, 1e3, 5.0, 0.01, MU_S, MU_K) == []
+        trace.force[30:] = 0.0
+        trace.q[30:] = trace.target[30:]
+        assert all(np.isfinite(v).all() for v in vars(trace).values())
+        assert "no force though pressed" in judge(trace, 1e3, 5.0, 0.01, MU_S, MU_K)
+
+    def test_a_bed_of_many_springs_makes_no_energy(self, tools):
+        rng = np.random.default_rng(5)
+        n = 300
+        gaps = np.sort(rng.uniform(0.0, 0.05, (9, n)), axis=0)
+        gaps[0] = 0.0
+        k = 10.0 ** rng.uniform(0, 6, (9, n))
+        slopes, intercepts = contact.sort_bed(gaps, k)
+        mass = 10.0 ** rng.uniform(-3, 1, n)
+        rig = tools.Rig(
+            h=10.0 ** rng.uniform(-3, -1, n),
+            slopes=slopes,
+            intercepts=intercepts,
+            effects=("sliding",),
+            mass_kg=mass,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
+        )
+        trace = rig.run(100)
+
+        def stored(t):
+            inside = np.maximum(trace.depth[t] - gaps, 0.0)
+            return 0.5 * (k * inside**2).sum(axis=0) + 0.5 * mass * trace.speed[t] ** 2
+
+        for t in range(1, 100):
+            pulled = 0.5 * ARM_K * (trace.target[t] - trace.q[t - 1]) ** 2
+            left = 0.5 * ARM_K * (trace.target[t] - trace.q[t]) ** 2
+            friction = MU_K * mass * GRAVITY * (trace.slide[t] - trace.slide[t - 1])
+            lost = stored(t - 1) + pulled - stored(t) - left - friction
+            assert (lost >= -1e-9 * (pulled + stored(t))).all()
+
+
+class TestTraps:
+    """Each runs the naive scheme too, and shows that it breaks the bound that ours keeps."""
+
+    @pytest.mark.parametrize("scheme", ["explicit", "semi-implicit", "rk4"])
+    def test_explicit_schemes_are_usable_in_few_of_sixteen_cases(self, tools, scheme):
+        masses, springs = (1.0, 1e-3, 1e-6, 1e-9), (1e3, 1e6, 1e9, 1e12)
+        usable = sum(naive_push(scheme, k, m) for k in springs for m in masses)
+        assert usable <= 2
+        k, m = (g.ravel() for g in np.meshgrid(springs, masses, indexing="ij"))
+        rig = tools.Rig(
+            h=0.01,
+            slopes=k[None],
+            intercepts=np.zeros((1, 16)),
+            effects=("sliding",),
+            mass_kg=m,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
+        )
+        trace = rig.run(120)
+        ours = [
+            not judge(
+                type(trace)(**{key: v[:, i : i + 1] for key, v in vars(trace).items()}),
+                k[i],
+                m[i],
+                0.01,
+                MU_S,
+                MU_K,
+            )
+            for i in range(16)
+        ]
+        assert sum(ours) == 16
+
+    def test_regularised_friction_creeps_and_true_stick_does_not(self, tools):
+        mass, load = 2.0, 0.5 * MU_S * 2.0 * GRAVITY
+        for slip_speed in (0.001, 0.01):
+            creep = regularised_creep(load, MU_S * mass * GRAVITY, slip_speed, 1.2)
+            assert 0.0005 < creep < 0.0125
+        rig = tools.Rig(
+            h=0.01,
+            speed=load * (1 / ARM_K + 1e-4) / 0.3,
+            travel_s=0.3,
+            effects=("sliding",),
+            mass_kg=mass,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
+        )
+        trace = rig.run(150)
+        assert trace.force[-1, 0] == pytest.approx(load, rel=1e-9)
+        assert (trace.slide == 0.0).all()
+
+    def test_explicit_lugre_blows_up(self):
+        assert lugre(0.01, explicit=True) > 1e6
+        assert lugre(0.001, explicit=True) > 1e6
+        assert lugre(0.01, explicit=False) <= 1.0 + 1e-12
+        assert lugre(0.001, explicit=False) <= 1.0 + 1e-12
+
+    def test_explicit_relaxation_blows_up_and_ours_is_exact(self, tools):
+        h, ratio, k = 0.01, 1.5, 1e3
+        for tau in (1e-6, 1e-3, 0.004, 0.05, 2.0, 1e5):
+            z = exact = 0.0
+            for _ in range(200):
+                z += h * (-z / tau) + ratio * k * 1e-4
+                exact = exact * math.exp(-h / tau) + ratio * k * 1e-4 * tau / h * -math.expm1(
+                    -h / tau
+                )
+            if tau < h / 2:
+                assert not abs(z) < 1e6 * exact
+            # A pusher so stiff that it sets the depth: the force is then elastic + z, exactly.
+            rig = tools.Rig(
+                h=h,
+                arm_k=1e18,
+                speed=1e-4 / h,
+                slopes=[[k]],
+                effects=("relaxation",),
+                relax_ratio=ratio,
+                relax_s=tau,
+            )
+            trace = rig.run(200)
+            want = k * 1e-4 * 200 + exact
+            assert trace.force[-1, 0] == pytest.approx(want, rel=1e-12)
+
+    def test_taxel_forces_as_stiffness_times_depth_lose_digits(self, tools):
+        n, stiff = 200, 1e15
+        rng = np.random.default_rng(2)
+        gaps = np.sort(rng.uniform(0.0, 1e-3, (7, n)), axis=0)
+        gaps[0] = 0.0
+        k = np.full((7, n), stiff)
+        slopes, intercepts = contact.sort_bed(gaps, k)
+        rig = tools.Rig(h=0.01, slopes=slopes, intercepts=intercepts)
+        trace = rig.run(50)
+        force, depth = trace.force[-1], trace.depth[-1]
+        loads = contact.spring_loads(depth[None], gaps, k, np.ones((1, n)))
+        naive = np.abs(loads.sum(axis=(0, 1)) / force - 1.0).max()
+        assert naive > 1e-4
+        shared = contact.share_out(force, loads.copy()).sum(axis=(0, 1))
+        held = loads.sum(axis=(0, 1)) > 0.0
+        np.testing.assert_allclose(shared[held], force[held], rtol=1e-14)
+
+    def test_newton_on_the_tilt_needs_its_line_search(self, monkeypatch):
+        state, free, c = tilt_cases(600, seed=1)
+        left = tilt_error(state, free, c, tilt.solve(state, free, c))
+        assert left.max() < 1e-9
+        monkeypatch.setattr(tilt, "guarded", lambda state, y, free, c, open_: y)
+        without = tilt_error(state, free, c, tilt.solve(state, free, c))
+        assert (without > 1e-6).sum() >= 1
+
+    def test_backward_euler_at_10_ms_loses_stick_slip_and_1_ms_keeps_it(self, tools):
+        mass, mu_s, mu_k, speed = 1.0, 0.6, 0.3, 0.02
+        normal = mass * GRAVITY
+        d = (mu_s - mu_k) * normal / ARM_K
+        omega = math.sqrt(ARM_K / mass)
+        tau = 2.0 * (math.pi - math.atan(omega * d / speed)) / omega
+        want = speed * tau + 2.0 * d
+        first = {}
+        for h in (0.01, 0.001):
+            rig = tools.Rig(
+                h=h,
+                speed=speed,
+                slopes=[[1e7]],
+                effects=("sliding",),
+                mass_kg=mass,
+                friction_static=mu_s,
+                friction_kinetic=mu_k,
+            )
+            trace = rig.run(round(6.0 / h))
+            moving = trace.speed[:, 0] > 0.0
+            start = int(np.argmax(moving))
+            stop = start + int(np.argmin(moving[start:]))
+            first[h] = trace.slide[stop, 0] if stop > start else math.inf
+        assert abs(first[0.01] / want - 1.0) > 0.05
+        assert first[0.001] == pytest.approx(want, rel=0.02)
+
+
+def naive_push(scheme, k, m, h=0.01, steps=120):
+    """A mass pushed through a unilateral spring by a moving end; is the result usable?"""
+    drag = MU_K * m * GRAVITY
+
+    def rates(x, v, t):
+        force = max(k * (SPEED * t - x), 0.0)
+        rub = drag if v > 0.0 else min(force, MU_S * m * GRAVITY)
+        return v, (force - rub) / m, force
+
+    x = v = t = 0.0
+    for _ in range(steps):
+        if scheme == "rk4":
+            a1 = rates(x, v, t)
+            a2 = rates(x + h / 2 * a1[0], v + h / 2 * a1[1], t + h / 2)
+            a3 = rates(x + h / 2 * a2[0], v + h / 2 * a2[1], t + h / 2)
+            a4 = rates(x + h * a3[0], v + h * a3[1], t + h)
+            dx, dv = ((a1[i] + 2 * a2[i] + 2 * a3[i] + a4[i]) / 6 for i in (0, 1))
+            x, v = x + h * dx, v + h * dv
+        elif scheme == "explicit":
+            dx, dv, _ = rates(x, v, t)
+            x, v = x + h * dx, v + h * dv
+        else:
+            v += h * rates(x, v, t)[1]
+            x += h * v
+        t += h
+        v = max(v, 0.0)
+        if not (math.isfinite(x) and math.isfinite(v)):
+            return False
+    # Usable: the mass is where the end pushes it, within the spring's give at the drag.
+    return abs(SPEED * t - x) <= 3.0 * drag / k + SPEED * h and abs(v - SPEED) <= 0.5 * SPEED
+
+
+def regularised_creep(load, hold, slip_speed, seconds):
+    """How far tanh friction lets a thing creep under a load that true friction holds."""
+    speed = slip_speed * math.atanh(load / hold)
+    return speed * seconds
+
+
+def lugre(h, *, explicit, v=0.2, sigma=1e5, hold=1.0):
+    """Largest bristle force over a slide, as a part of the most that friction can give."""
+    z = worst = 0.0
+    g = hold / sigma
+    for _ in range(400):
+        z = z + h * (v - abs(v) / g * z) if explicit else (z + h * v) / (1.0 + h * abs(v) / g)
+        worst = max(worst, abs(sigma * z) / hold)
+        if worst > 1e12:
+            break
+    return worst
+
+
+def tilt_cases(n, seed):
+    """Forearms of 16 rows and 7 columns against faces, from soft to very stiff."""
+    rng = np.random.default_rng(seed)
+    angles = np.radians(15.0 * np.arange(-3, 4))[:, None]
+    lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
+    c00 = 10.0 ** rng.uniform(-3, 0, n)
+    c11 = 10.0 ** rng.uniform(-2, 0.5, n)
+    state = {
+        "n": n,
+        "lever": lever,
+        "line_gap": lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
+        "gaps": 0.046 * (1.0 - np.cos(angles)) + np.zeros(n),
+        "stiffness": 10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1)),
+        "weight": np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
+        "lines": slice(0, 16),
+        "bed": contact.line_forces,
+        "guess": (np.zeros(n), np.zeros(n)),
+    }
+    free = (rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n))
+    c = (c00, rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11), c11)
+    return state, free, c
+
+
+def tilt_error(state, free, c, loads):
+    """Distance from the one answer, metres at the skin: the step that exact Newton would take.
+
+    The energy is strictly convex, so a point with no step left is its minimum.
+    """
+    y = (
+        free[0] - (c[0] * loads[0] + c[1] * loads[1]),
+        free[1] - (c[1] * loads[0] + c[2] * loads[1]),
+    )
+    bed, h = tilt.answer(state, y)
+    p = tilt.newton_step(c, tilt.residual(y, free, c, bed), h)
+    return np.abs(p[0]) + 0.1 * np.abs(p[1])

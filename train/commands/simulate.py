@@ -1,0 +1,68 @@
+"""`python -m train simulate`: a scene to recordings, or what the scene calls for."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="simulate a scene into recordings",
+        description="Simulate the touches that a scene file describes, and only the effects it "
+        "calls for. The same scene gives the same files, whatever the batch or the machine.",
+    )
+    parser.add_argument("scene", help="a TOML file like train/scenes/cody18.toml")
+    parser.add_argument("--out", metavar="DIR", help="folder for the recordings")
+    parser.add_argument(
+        "--explain", action="store_true", help="print what runs, what called for it and its cost"
+    )
+    parser.add_argument("--seed", type=int, help="in place of the scene's")
+    parser.add_argument("--trials", type=int, metavar="N", help="of each object and condition")
+    parser.add_argument("--batch", type=int, default=256, help="trials simulated together")
+    parser.add_argument("--jobs", type=int, default=1, help="processes; -1 for all cores")
+    parser.add_argument(
+        "--backend", choices=("local", "dask"), default="local", help="where the batches run"
+    )
+    parser.add_argument("--address", help="of a Dask scheduler, like tcp://127.0.0.1:8786")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate, or explain."""
+    from edge.errors import InputError
+    from train.simulate import scene as scenes
+
+    scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
+    if not arguments.out and not arguments.explain:
+        raise InputError("simulate: give --out DIR, --explain or both")
+    if arguments.address and arguments.backend != "dask":
+        raise InputError("simulate: --address needs --backend dask")
+    if arguments.backend == "dask" and not arguments.address:
+        raise InputError("simulate: --backend dask needs --address, like tcp://127.0.0.1:8786")
+    if arguments.jobs == 0 or arguments.jobs < -1:
+        raise InputError(f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}")
+    if arguments.explain:
+        from train.simulate.explain import explain
+
+        print(explain(scene))
+    if arguments.out:
+        from tqdm import tqdm
+
+        from train.simulate.run import total_trials, write
+
+        with tqdm(total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr) as bar:
+            paths = write(
+                scene,
+                arguments.out,
+                batch=arguments.batch,
+                jobs=arguments.jobs,
+                backend=arguments.backend,
+                address=arguments.address,
+                progress=bar.update,
+            )
+        print(f"{len(paths)} recordings in {arguments.out}", file=sys.stderr)
+    return 0

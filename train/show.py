@@ -1,0 +1,204 @@
+"""A recording as a picture: frames, the region found on them, the three features, the arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from edge.arm import Chain
+from edge.errors import InputError
+from edge.features import WINDOW_S
+from edge.files import write_whole
+from edge.golden import first_contact
+from edge.layout import SkinLayout
+from edge.recording import Recording
+from edge.region import largest_region
+from edge.track import FeatureSeries, Tracker
+from train.dataset import arm_of
+
+FRAMES = 6
+HORIZON_S = 2.0
+
+
+def draw(
+    recording: Recording,
+    out: Path,
+    *,
+    where: str = "recording",
+    scene: bool = False,
+    threshold: int | None = None,
+) -> None:
+    """Draw a recording into a PNG.
+
+    Args:
+        where: names the recording in errors.
+        scene: add the arm and the contact's path, seen from the side.
+        threshold: counts above which a taxel is in contact, in place of the skin's.
+
+    Raises:
+        InputError: the sketch is asked for and the arm is not known, or `out` cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    layout = recording.layout
+    if threshold is not None:
+        layout = replace(
+            layout, threshold_counts=threshold, onset_counts=max(threshold, layout.onset)
+        )
+    chain = arm_of(recording, where)
+    if scene and chain is None:
+        raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
+    found = first_contact(recording, Tracker(layout, chain=chain, horizon_s=HORIZON_S))
+    rows = 3 if scene else 2
+    heights = [1.7, 3.2, 4.0][:rows]
+    figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
+    figure.suptitle(_title(recording))
+    grid = figure.add_gridspec(rows, FRAMES, height_ratios=heights)
+    onset = found[0] if found is not None else float(recording.t[0])
+    shown = np.linspace(0.0, min(WINDOW_S, float(recording.t[-1]) - onset), FRAMES - 1)
+    times = [max(onset - 0.05, float(recording.t[0])), *(onset + shown)]
+    shown_frames = recording.frames[
+        np.searchsorted(recording.t, times).clip(0, len(recording.t) - 1)
+    ]
+    top = max(int(shown_frames.max()), 1)
+    axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
+    image = None
+    for axis, t in zip(axes, times, strict=True):
+        image = _frame(axis, recording, layout, float(t), onset, top)
+        axis.label_outer()
+    if image is not None:
+        bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
+        bar.set_label(f"{layout.force_unit} a taxel")
+    series = None if found is None else found[1]
+    third = FRAMES // 3
+    for i, (name, unit) in enumerate(
+        (
+            ("max_force", layout.force_unit),
+            ("contact_area", "taxel"),
+            ("contact_motion", layout.length_unit),
+        )
+    ):
+        _feature(figure.add_subplot(grid[1, third * i : third * (i + 1)]), series, name, unit)
+    if scene and chain is not None:
+        side = figure.add_subplot(grid[2, : FRAMES // 2])
+        _side(side, recording, chain, layout, onset, series)
+        _path(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, layout, onset)
+    with write_whole(out) as file:
+        figure.savefig(file, format="png", dpi=110)
+
+
+def _title(recording: Recording) -> str:
+    labels = ", ".join(f"{task}: {label}" for task, label in sorted(recording.labels.items()))
+    return f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
+
+
+def _frame(
+    axis: Any, recording: Recording, layout: SkinLayout, t: float, onset: float, top: int
+) -> Any:
+    k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
+    counts = recording.frames[k]
+    valid = recording.valid
+    if valid is not None and valid.ndim == 3:
+        valid = valid[k]
+    scale = layout.counts_per_newton or 1.0
+    shown = np.ma.masked_array(counts / scale, mask=False if valid is None else ~valid)
+    image = axis.imshow(shown, vmin=0.0, vmax=top / scale, cmap="viridis", aspect="equal")
+    region = largest_region(counts, layout.threshold_counts, valid=valid, wraps=layout.wraps)
+    title = f"{recording.t[k] - onset:+.2f} s"
+    if region is not None:
+        axis.contour(region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2)
+        row, col = region.centroid
+        axis.plot(col % layout.cols, row, "r+", markersize=9)
+        title += f", {region.area} taxels"
+    axis.set_title(title, fontsize=10)
+    axis.set_xlabel("column (around)")
+    axis.set_ylabel("row, from elbow")
+    return image
+
+
+def _feature(axis: Any, series: FeatureSeries | None, name: str, unit: str) -> None:
+    axis.set_title(name)
+    axis.set_xlabel("seconds from onset")
+    axis.set_ylabel(unit)
+    if series is None:
+        axis.text(0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes)
+        return
+    axis.plot(series.t, getattr(series, name))
+    axis.axvspan(0.0, WINDOW_S, color="tab:green", alpha=0.08)
+    axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
+    axis.set_ylim(bottom=0.0)
+
+
+def _links(chain: Chain, q: Any) -> np.ndarray:
+    """(links, 3) places of the chain's joints and its tip, metres."""
+    points = []
+    moving = 0
+    for i in range(len(chain.joints)):
+        part = Chain(chain.joints[: i + 1])
+        moving = part.dof
+        points.append(part.pose(q[:moving])[:3, 3])
+    return np.vstack([np.zeros(3), *points])
+
+
+def _side(
+    axis: Any,
+    recording: Recording,
+    chain: Chain,
+    layout: SkinLayout,
+    onset: float,
+    series: FeatureSeries | None,
+) -> None:
+    """The arm at the onset and at the window's end, in the torso's x-z plane."""
+    joints = recording.joints
+    assert joints is not None
+    for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
+        k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
+        points = _links(chain, joints[k])
+        axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
+        place = _contact(recording, chain, layout, k)
+        if place is not None:
+            axis.plot(place[0], place[2], "*", color=style, markersize=13)
+    simulated = recording.meta.get("simulation")
+    if isinstance(simulated, dict):
+        family = simulated.get("family", "")
+        effects = ", ".join(simulated.get("effects", []))
+        values = simulated.get("values", {})
+        mass = values.get("mass_kg")
+        what = f"{family}" + (f", {mass:.2g} kg" if mass is not None else "")
+        axis.set_title(f"seen from the side: {what}\n{effects}", fontsize=9)
+    else:
+        axis.set_title("seen from the side", fontsize=9)
+    axis.set_xlabel("x, metres forward of the torso")
+    axis.set_ylabel("z, metres up")
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.legend(fontsize=8)
+
+
+def _contact(recording: Recording, chain: Chain, layout: SkinLayout, k: int) -> np.ndarray | None:
+    """World place of the region's centroid on frame k."""
+    region = largest_region(recording.frames[k], layout.threshold_counts, wraps=layout.wraps)
+    if region is None or recording.joints is None:
+        return None
+    pose = chain.pose(recording.joints[k])
+    return np.asarray(pose[:3, :3] @ layout.position(*region.centroid) + pose[:3, 3])
+
+
+def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:
+    """Push and joint angles over time."""
+    t = recording.t - onset
+    scale = layout.counts_per_newton or 1.0
+    push = recording.frames.reshape(len(t), -1).sum(axis=1, dtype=np.int64) / scale
+    axis.plot(t, push, color="black", lw=2)
+    axis.set_ylabel(f"sum of all taxels, {layout.force_unit} (black)")
+    axis.set_xlabel("seconds from onset")
+    axis.set_title("push and joint angles")
+    joints = recording.joints
+    if joints is not None:
+        other = axis.twinx()
+        for j in range(joints.shape[1]):
+            other.plot(t, np.degrees(joints[:, j] - joints[0, j]), lw=1, label=f"j{j}")
+        other.set_ylabel("joint angles from their start, degrees")
+        other.legend(fontsize=8, loc="lower left")

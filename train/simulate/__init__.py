@@ -1,0 +1,1 @@
+"""Scenes to recordings: only the effects that a scene calls for are loaded and run."""

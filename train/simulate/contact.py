@@ -1,0 +1,107 @@
+"""The bed of springs between skin and object: its law, and the step that cannot blow up.
+
+A bed is L lines (rows of the skin, or stems) of C springs (columns around the forearm). At
+depth d a line bears sum_c k_c max(0, d - line_gap - gap_c) times its weight. As a function of
+the depth a of the whole bed this is convex and piecewise linear, phi(a) = max_s(K_s a - B_s),
+so an implicit step has a closed form (`closed_form`).
+
+Coordinates of a contact are y = (a,), or (a, tilt) where the forearm pivots; loads are (F,),
+or (F, M); C = (c00,) or (c00, c01, c11) is what a unit load takes off y within the step.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+State = dict[str, Any]
+Coordinates = tuple[Array, ...]
+
+
+def relieve(y: Coordinates, c: Coordinates, loads: Coordinates) -> Coordinates:
+    """y - C loads."""
+    if len(loads) == 1:
+        return (y[0] - c[0] * loads[0],)
+    force, moment = loads
+    return y[0] - (c[0] * force + c[1] * moment), y[1] - (c[1] * force + c[2] * moment)
+
+
+def running_sum(values: Array) -> Array:
+    """Sums along the first axis, one term after the other."""
+    return np.add.accumulate(values, axis=0)
+
+
+def total(values: Array) -> Array:
+    """The sum over the first axis, one term after the other: the same bits in any batch.
+
+    `np.sum` adds so too, unless the batch is one wide: then it adds in pairs.
+    """
+    if values.shape[-1] == 1:
+        return np.asarray(np.add.accumulate(values, axis=0)[-1])
+    return np.asarray(np.add.reduce(values, axis=0))
+
+
+def sort_bed(gaps: Array, stiffness: Array) -> tuple[Array, Array]:
+    """Slopes K and intercepts B, (E, n) each, of phi(a) = max(0, max_s(K_s a - B_s))."""
+    order = np.argsort(gaps, axis=0, kind="stable")
+    gaps = np.take_along_axis(gaps, order, axis=0)
+    stiffness = np.take_along_axis(stiffness, order, axis=0)
+    return running_sum(stiffness), running_sum(stiffness * gaps)
+
+
+def closed_form(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
+    """The force F = phi(y - c F): exact, without iteration, and never negative.
+
+    F = max(0, max_s (K_s y - B_s) / (1 + c K_s)), the closed form of the notes on physics:
+    along each line of phi the equation is linear, and of the lines the largest answer holds.
+    """
+    slopes, intercepts = state["slopes"], state["intercepts"]
+    force = slopes * y[0]
+    force -= intercepts
+    force /= slopes * c[0] + 1.0
+    return (np.maximum(force.max(axis=0), 0.0),)
+
+
+def touching(gaps: Array, deepest: Array) -> slice:
+    """The columns of `gaps` (C, n), as one run, that any trial touches at `deepest` (n,).
+
+    The others add exact zeros, so leaving them out changes no bit.
+    """
+    touched = np.nonzero(np.any(gaps < deepest, axis=1))[0]
+    return slice(int(touched[0]), int(touched[-1]) + 1) if touched.size else slice(0, 0)
+
+
+def line_forces(state: State, depths: Array) -> tuple[Array, Array]:
+    """(L, n) force and stiffness of each line at its depth (L, n)."""
+    some = touching(state["gaps"], depths.max(axis=0))
+    if some.stop == 0:
+        return np.zeros_like(depths), np.zeros_like(depths)
+    inside = depths - state["gaps"][some, None]
+    held = (inside > 0.0) * state["stiffness"][some, None]
+    inside *= held
+    weight = state["weight"]
+    return total(inside) * weight, total(held) * weight
+
+
+def spring_loads(depths: Array, gaps: Array, stiffness: Array, weight: Array) -> Array:
+    """(L, C, n) load of each spring at the lines' depths (L, n), before sharing out."""
+    inside = depths[:, None] - gaps
+    np.maximum(inside, 0.0, out=inside)
+    inside *= weight[:, None] * stiffness
+    return inside
+
+
+def share_out(force: Array, loads: Array) -> Array:
+    """The force (n,) shared among springs as their loads (L, C, n) stand to each other (in
+    place).
+
+    Not the loads themselves: at a stiffness of 1e15 N/m they lose digits that the force has.
+    """
+    if not loads.shape[1]:
+        return loads
+    whole = total(total(loads))
+    loads *= force / np.where(whole > 0.0, whole, 1.0)
+    return loads

@@ -1,0 +1,24 @@
+"""Each taxel reads a part of what its four neighbours bear; the seam joins first and last."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from train.simulate.contact import State
+from train.simulate.plan import Build
+
+
+def add(build: Build) -> None:
+    """Add it to the frames."""
+    part = np.float32(build.settings("crosstalk")["part"])
+
+    def couple(state: State) -> None:
+        """Counts + part * (sum of the neighbours' counts)."""
+        counts = state["counts"]
+        leak = counts * part
+        counts[:, :, 1:] += leak[:, :, :-1]
+        counts[:, :, :-1] += leak[:, :, 1:]
+        counts += np.roll(leak, 1, axis=3)
+        counts += np.roll(leak, -1, axis=3)
+
+    build.put("sensor", 10, couple)

@@ -1,0 +1,208 @@
+"""Run a batch of trials through its plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from train.simulate import streams
+from train.simulate.arm import Array, Kinematics
+from train.simulate.calls import callers
+from train.simulate.contact import State
+from train.simulate.fields import SPREAD, STIFFNESSES
+from train.simulate.film import Film
+from train.simulate.plan import Plan, make_plan
+from train.simulate.scene import Scene, SceneObject
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial of an object in a condition."""
+
+    thing: SceneObject
+    condition: str
+    number: int
+
+    @property
+    def key(self) -> str:
+        """Names the object and its condition in streams and files."""
+        return f"{self.thing.slug}-{self.condition}"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Trials that run the same plan on beds of the same form, and so can share a batch."""
+
+    effects: tuple[str, ...]
+    curved: bool
+    """Rows lie at different depths; a flat bed's law needs one line a column only."""
+    stems: int
+
+
+def kind_of(scene: Scene, thing: SceneObject, condition: str) -> Kind:
+    """What an object's trials have in common with others that can share their batch."""
+    effects = tuple(callers(scene, thing, condition))
+    curved = "radius_m" in thing.given and "tilt" not in effects
+    stems = int(thing.values["stem_count"].low) if "stem_count" in thing.values else 0
+    return Kind(effects, curved, stems)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a batch of n trials gave, `frames` frames each.
+
+    Attributes:
+        t: (frames,) seconds.
+        times: (n, frames) seconds, where a clock effect shifts them; None elsewhere.
+        kept: (n, frames) bool, where frames are dropped; None elsewhere.
+        counts: (n, frames, rows, cols) uint16.
+        valid: (n, rows, cols) bool, or None.
+        joints: (n, frames, dof) radians.
+        force: (n, frames) newtons.
+        slide: (n, frames) metres that the object has moved; None where nothing can.
+        state: what the plan left behind.
+    """
+
+    trials: tuple[Trial, ...]
+    t: Array
+    counts: NDArray[np.uint16]
+    joints: Array
+    force: Array
+    times: Array | None
+    kept: NDArray[np.bool_] | None
+    valid: NDArray[np.bool_] | None
+    slide: Array | None
+    state: State
+
+
+def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
+    """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
+
+    Where an object has no such value (a fixed one its mass), it is NaN and nothing reads it.
+    """
+    groups: dict[str, list[int]] = {}
+    for i, trial in enumerate(trials):
+        groups.setdefault(trial.key, []).append(i)
+    out: dict[str, Array] = {}
+    for key, members in groups.items():
+        where = np.array(members)
+        numbers = np.array([trials[i].number for i in members], dtype=np.int64)
+        thing = trials[members[0]].thing
+
+        def spread(name: str, key: str = key, numbers: Any = numbers) -> Any:
+            amount = scene.spread[name]
+            if amount == 0.0:
+                return 0.0
+            return amount * streams.draws(scene.seed, f"spread.{name}", key, numbers, "normal")
+
+        own = {**thing.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m}
+        for name, value in own.items():
+            drawn: Any = value.low
+            if value.varies:
+                part = streams.draws(scene.seed, f"value.{name}", key, numbers, "uniform")
+                drawn = value.low + (value.high - value.low) * part
+            if name in STIFFNESSES:
+                drawn = drawn * np.exp(spread("stiffness"))
+            elif name in ("friction_static", "friction_kinetic"):
+                drawn = drawn * np.exp(spread("friction"))
+            elif name == "mass_kg":
+                drawn = drawn * np.exp(spread("mass"))
+            elif name in ("taxel_n_m", "cover_n_m"):
+                drawn = drawn * np.exp(spread("cover"))
+            out.setdefault(name, np.full(len(trials), np.nan))[where] = drawn
+        for name in SPREAD:
+            if name in ("place_m", "yaw_deg", "roll_deg"):
+                out.setdefault(name, np.full(len(trials), np.nan))[where] = spread(name)
+    return out
+
+
+def frame_count(scene: Scene) -> int:
+    """Frames of a trial: the longest lead, what follows, and the frame at t = 0."""
+    duration = scene.lead.high + scene.trials["after_s"]
+    return round(duration * scene.trials["rate_hz"]) + 1
+
+
+def begin(
+    scene: Scene, plan: Plan, trials: tuple[Trial, ...], step_s: float, values: dict[str, Array]
+) -> State:
+    """The state of a batch before its first step."""
+    state: State = {
+        "scene": scene,
+        "trials": trials,
+        "n": len(trials),
+        "h": step_s,
+        "values": values,
+        "kinematics": Kinematics(scene.arm),
+        "solve": plan.solve,
+    }
+    for function in plan.setup:
+        function(state)
+    return state
+
+
+def run_batch(
+    scene: Scene,
+    trials: tuple[Trial, ...],
+    step_s: float,
+    *,
+    plan: Plan | None = None,
+    values: dict[str, Array] | None = None,
+    images: bool = True,
+) -> Batch:
+    """Simulate trials of one kind together; each comes out as it would alone, bit by bit.
+
+    Args:
+        step_s: the physics' step; a whole number of them makes a frame.
+        plan: the kind's, where it is at hand.
+        values: {name: (n,)} in place of the scene's draws.
+        images: False for the physics alone (forces, joints); `counts` are then empty.
+    """
+    first = trials[0]
+    kind = kind_of(scene, first.thing, first.condition)
+    plan = plan or make_plan(scene, kind.effects)
+    values = values_of(scene, trials) if values is None else values
+    frames = frame_count(scene)
+    rate_hz = scene.trials["rate_hz"]
+    substeps = max(1, round(1.0 / (rate_hz * step_s)))
+    step_s = 1.0 / (rate_hz * substeps)
+    state = begin(scene, plan, trials, step_s, values)
+    n, dof = len(trials), len(scene.stiffness)
+    joints = np.empty((frames, dof, n))
+    force = np.zeros((frames, n))
+    slide = np.zeros((frames, n)) if "slide" in state else None
+    film = Film(scene, plan, state, frames if images else 0)
+    joints[0] = state["q"]
+    sample = plan.sample if images else plan.sample[:1]
+    for k in range(1, frames):
+        for function in plan.frame:
+            function(state)
+        for _ in range(substeps):
+            for function in plan.step:
+                function(state)
+        state["t"] = k / rate_hz
+        for function in sample:
+            function(state)
+        joints[k] = state["q"]
+        force[k] = state["force"]
+        if slide is not None:
+            slide[k] = state["slide"]
+        if images:
+            film.expose(k, state)
+    state["frame_t"] = np.arange(frames) / rate_hz
+    state["joints"] = np.ascontiguousarray(joints.transpose(2, 0, 1))
+    counts, times, kept, valid = film.develop(state, plan)
+    return Batch(
+        trials=trials,
+        t=state["frame_t"],
+        counts=counts,
+        joints=state["joints"],
+        force=np.ascontiguousarray(force.T),
+        times=times,
+        kept=kept,
+        valid=valid,
+        slide=None if slide is None else np.ascontiguousarray(slide.T),
+        state=state,
+    )

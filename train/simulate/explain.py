@@ -1,0 +1,106 @@
+"""Which effects a scene's trials run, what called for each, and what each costs here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from train.simulate.calls import callers
+from train.simulate.convergence import Convergence, measure
+from train.simulate.engine import Trial, kind_of, run_batch
+from train.simulate.fields import EFFECTS
+from train.simulate.plan import STAGES, Plan, make_plan
+from train.simulate.run import kinds, steps
+from train.simulate.scene import Scene
+
+MEASURED = 64
+"""Trials in a batch that is timed."""
+REPEATS = 2
+
+
+class Clock:
+    """Time spent in functions that call each other, each with its own share alone."""
+
+    def __init__(self) -> None:
+        """Nothing measured yet."""
+        self.spent: dict[str, float] = {}
+        self._inside: list[float] = []
+
+    def around(self, owner: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The same function, timed for `owner`."""
+
+        def timed(*arguments: Any) -> Any:
+            self._inside.append(0.0)
+            begin = time.perf_counter()
+            result = function(*arguments)
+            took = time.perf_counter() - begin
+            self.spent[owner] = self.spent.get(owner, 0.0) + took - self._inside.pop()
+            if self._inside:
+                self._inside[-1] += took
+            return result
+
+        return timed
+
+
+def timed_plan(scene: Scene, effects: tuple[str, ...], clock: Clock) -> Plan:
+    """A plan whose functions report their time under the effect that they belong to."""
+    plan = make_plan(scene, effects, around=clock.around)
+    stages: dict[str, Any] = {
+        stage: tuple(clock.around(plan.owners[f], f) for f in getattr(plan, stage))
+        for stage in STAGES
+    }
+    return replace(plan, **stages)
+
+
+def costs(scene: Scene, trials: tuple[Trial, ...], step_s: float) -> dict[str, float]:
+    """{effect, or `base`: microseconds a trial} of one kind, the better of two runs.
+
+    An effect that takes the place of a base function is charged with all that it does there.
+    """
+    first = trials[0]
+    effects = kind_of(scene, first.thing, first.condition).effects
+    many = tuple(replace(trials[i % len(trials)], number=i) for i in range(MEASURED))
+    best: dict[str, float] = {}
+    for _ in range(REPEATS):
+        clock = Clock()
+        run_batch(scene, many, step_s, plan=timed_plan(scene, effects, clock))
+        for name, spent in clock.spent.items():
+            best[name] = min(best.get(name, spent), spent)
+    return {name: best.get(name, 0.0) / MEASURED * 1e6 for name in ("base", *effects)}
+
+
+def explain(scene: Scene) -> str:
+    """The account that `simulate --explain` prints."""
+    lines = [f"{scene.name}: {sum(len(t) for t in kinds(scene).values())} trials"]
+    step = steps(scene)
+    seen: set[str] = set()
+    for kind, trials in kinds(scene).items():
+        found = measure(scene, tuple(trials))
+        spent = costs(scene, tuple(trials), step[kind])
+        keys = sorted({trial.key for trial in trials})
+        lines += ["", ", ".join(keys), *_step_lines(step[kind], found, scene)]
+        lines.append(f"  {'effect':<16}{'us/trial':>9}  called for by")
+        lines.append(f"  {'(base)':<16}{spent['base']:>9.0f}")
+        first = {trial.key: trial for trial in trials}
+        for effect in kind.effects:
+            seen.add(effect)
+            why = sorted({callers(scene, t.thing, t.condition)[effect] for t in first.values()})
+            lines.append(f"  {effect:<16}{spent[effect]:>9.0f}  {', '.join(why)}")
+        plan = make_plan(scene, kind.effects)
+        lines.append("  functions: " + ", ".join(f"{len(getattr(plan, s))} {s}" for s in STAGES))
+    left = [name for name in EFFECTS if name not in seen]
+    lines += ["", "not called for, not loaded: " + (", ".join(left) or "none")]
+    return "\n".join(lines)
+
+
+def _step_lines(step_s: float, found: Convergence, scene: Scene) -> list[str]:
+    tried = ", ".join(
+        f"{1e3 * s:g} ms {100.0 * e:.2g} %"
+        for s, e in zip(found.steps_s, found.errors, strict=False)
+    )
+    return [
+        f"  step {1e3 * step_s:g} ms; measured: {1e3 * found.step_s:g} ms is enough for "
+        f"{100.0 * scene.trials['tolerance']:g} % (order {found.order:.1f}; error {tried})"
+    ]

@@ -1,0 +1,228 @@
+"""What a scene file may say: keys, units, limits, defaults, and the effects there are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+INF = math.inf
+
+
+@dataclass(frozen=True)
+class Field:
+    """A number of a scene: where it must lie, and what it is where the file is silent."""
+
+    low: float
+    high: float
+    default: float | None
+    says: str
+    open_low: bool = False
+    """The lower limit itself is not allowed."""
+
+
+@dataclass(frozen=True)
+class EffectInfo:
+    """An effect without its code, which is loaded only where a scene calls for it."""
+
+    says: str
+    stage: str
+    """`contact` (part of the step), `sensor` (on the frames) or `clock` (on their times)."""
+    functions: int
+    """How many functions it adds to the plan (0: it takes the place of one, or wraps one)."""
+    settings: dict[str, Field] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+    """Effects without which it means nothing."""
+    excludes: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()
+    """Object families that support it; empty for all."""
+    keys: tuple[str, ...] = ()
+    """Object keys without which it means nothing; giving one of them calls for it."""
+
+
+RIGID, FOAM, PILLOW, BUBBLES, FOLIAGE = "rigid", "foam", "pillow", "bubbles", "foliage"
+SOFT_FAMILIES = (FOAM, PILLOW, BUBBLES, FOLIAGE)
+FAMILIES = (RIGID, *SOFT_FAMILIES)
+CONDITIONS = ("fixed", "movable")
+
+TRIALS = {
+    "count": Field(1, 1_000_000, 5, "trials of each object in each condition"),
+    "lead_s": Field(0.02, 10.0, 0.2, "time before the skin reaches the object"),
+    "after_s": Field(0.1, 60.0, 2.2, "time after it"),
+    "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
+    "tolerance": Field(1e-5, 0.5, 0.01, "what the step may cost, as a part of the peak force"),
+}
+SKIN = {
+    "counts_per_newton": Field(0.0, 1e6, 1000.0, "counts", open_low=True),
+    "threshold_counts": Field(0, 65535, 100, "a taxel above it is in contact"),
+    "onset_counts": Field(0, 65535, 200, "a contact begins when its peak is above it"),
+    "taxel_n_m": Field(0.0, 1e18, 10_000.0, "stiffness of a taxel", open_low=True),
+}
+SPREAD = {
+    "place_m": Field(0.0, 0.08, 0.0, "where along the forearm the object is met"),
+    "yaw_deg": Field(0.0, 30.0, 0.0, "angle between the object's face and the forearm"),
+    "roll_deg": Field(0.0, 60.0, 0.0, "forearm roll: which columns touch"),
+    "stiffness": Field(0.0, 1.0, 0.0, "of the object, as a part of its value"),
+    "friction": Field(0.0, 1.0, 0.0, "of both coefficients together, as a part of their value"),
+    "mass": Field(0.0, 1.0, 0.0, "as a part of its value"),
+    "cover": Field(0.0, 1.0, 0.0, "of the skin's and the cover's stiffness, as a part"),
+}
+OBJECT = {
+    "mass_kg": Field(0.0, 1e12, None, "kilograms", open_low=True),
+    "friction_static": Field(0.0, 5.0, None, "mu_s"),
+    "friction_kinetic": Field(0.0, 5.0, None, "mu_k, at most friction_static"),
+    "width_m": Field(0.0, 10.0, 1.0, "the face along the forearm", open_low=True),
+    "breadth_m": Field(0.0, 10.0, 10.0, "the face across the forearm", open_low=True),
+    "radius_m": Field(0.0, 1e6, 1e6, "how the face curves along the forearm", open_low=True),
+    "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
+    "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
+    "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
+    "modulus_pa": Field(0.0, 1e18, None, "of the elastic foundation", open_low=True),
+    "depth_m": Field(0.0, 10.0, None, "of the elastic foundation", open_low=True),
+    "relax_ratio": Field(0.0, 100.0, None, "k1 / k_inf of the standard linear solid"),
+    "relax_s": Field(0.0, 1e6, None, "its time", open_low=True),
+    "stem_count": Field(1, 200, None, "stems the forearm can meet"),
+    "stem_n_m": Field(0.0, 1e12, None, "stiffness of a stem, 3 E I / L^3", open_low=True),
+    "stem_spread_m": Field(0.0, 1.0, None, "depth over which the stems stand"),
+    "stem_slip_m": Field(0.0, 10.0, None, "bend at which a stem slips off", open_low=True),
+    "stem_damping": Field(0.0, 1.0, None, "damping ratio of a stem"),
+    "stem_kg": Field(0.0, 10.0, 0.02, "moving mass of a stem", open_low=True),
+    "bubble_n_m": Field(0.0, 1e12, None, "stiffness of a bubble at rest", open_low=True),
+    "bubble_m": Field(0.0, 0.1, 0.004, "height of a bubble", open_low=True),
+    "pop_n": Field(0.0, 1e6, None, "force at which a bubble bursts", open_low=True),
+    "cover_n_m": Field(0.0, 1e12, None, "stiffness of a sleeve, per taxel", open_low=True),
+    "cover_spread": Field(0.0, 0.2, 0.1, "part of a taxel's load each neighbour takes"),
+}
+STIFFNESSES = ("modulus_pa", "stem_n_m", "bubble_n_m")
+FAMILY_KEYS: dict[str, dict[str, float]] = {
+    RIGID: {},
+    FOAM: {"modulus_pa": 12e3, "depth_m": 0.10, "relax_ratio": 0.6, "relax_s": 0.5},
+    PILLOW: {"modulus_pa": 3e3, "depth_m": 0.15, "relax_ratio": 0.4, "relax_s": 0.8},
+    BUBBLES: {"bubble_n_m": 2000.0, "bubble_m": 0.004, "pop_n": 10.0},
+    FOLIAGE: {
+        "stem_count": 12,
+        "stem_n_m": 15.0,
+        "stem_spread_m": 0.06,
+        "stem_slip_m": 0.12,
+        "stem_damping": 0.15,
+        "stem_kg": 0.02,
+    },
+}
+"""Keys that belong to one family alone, with what they are where the object is silent (the
+middle of the ranges in the notes on physics, derived there)."""
+
+ELASTIC = (FOAM, PILLOW)
+EFFECTS: dict[str, EffectInfo] = {
+    # In the order in which they take their place in the step and on the frames.
+    "foundation": EffectInfo("elastic foundation under each taxel", "contact", 1, families=ELASTIC),
+    "cover": EffectInfo(
+        "a sleeve over the skin, in series and spreading the load",
+        "contact",
+        2,
+        keys=("cover_n_m",),
+    ),
+    "pop": EffectInfo(
+        "bubbles: the gas law, no stiffness after the burst", "contact", 2, families=(BUBBLES,)
+    ),
+    "stems": EffectInfo(
+        "foliage: stems that bend, damp and slip off", "contact", 1, families=(FOLIAGE,)
+    ),
+    "tilt": EffectInfo(
+        "the forearm pivots about the contact",
+        "contact",
+        2,
+        families=(RIGID, FOAM, PILLOW, BUBBLES),
+    ),
+    "relaxation": EffectInfo("standard linear solid", "contact", 2, families=ELASTIC),
+    "impact": EffectInfo(
+        "the arm's inertia when it meets the object, in closed form",
+        "contact",
+        3,
+        {
+            "mass_kg": Field(0.0, 1e6, 1.5, "the arm's, as the contact feels it", open_low=True),
+            "damping": Field(0.0, 10.0, 0.3, "damping ratio of the rebound"),
+        },
+        excludes=("stems",),
+    ),
+    "sliding": EffectInfo("sticks, then slides on the floor", "contact", 3),
+    "stribeck": EffectInfo(
+        "friction that falls with speed", "contact", 1, needs=("sliding",), keys=("stribeck_m_s",)
+    ),
+    "tipping": EffectInfo(
+        "tips over its edge where that takes less than sliding",
+        "contact",
+        1,
+        needs=("sliding",),
+        keys=("base_m", "height_m"),
+    ),
+    "crosstalk": EffectInfo(
+        "each taxel feels its neighbours",
+        "sensor",
+        1,
+        {"part": Field(0.0, 0.2, 0.02, "of each of the four neighbours")},
+    ),
+    "hysteresis": EffectInfo(
+        "the reading lags behind the load, either way",
+        "sensor",
+        1,
+        {"counts": Field(0.0, 65535, 30.0, "half the width of the loop")},
+    ),
+    "drift": EffectInfo(
+        "a baseline that wanders, its own for each taxel",
+        "sensor",
+        1,
+        {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of the taxels' slopes")},
+    ),
+    "noise": EffectInfo(
+        "normal noise on each reading",
+        "sensor",
+        1,
+        {"counts": Field(0.0, 65535, 8.0, "standard deviation")},
+    ),
+    "saturation": EffectInfo(
+        "no reading above a limit",
+        "sensor",
+        1,
+        {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)},
+    ),
+    "dead_band": EffectInfo(
+        "small readings are zero",
+        "sensor",
+        1,
+        {"counts": Field(0.0, 65535, 50.0, "readings below it are zero")},
+    ),
+    "quantisation": EffectInfo(
+        "coarse steps of the converter",
+        "sensor",
+        1,
+        {"counts": Field(1.0, 65535, 4.0, "size of a step")},
+    ),
+    "dead_taxels": EffectInfo(
+        "taxels that read nothing in a trial",
+        "sensor",
+        1,
+        {
+            "part": Field(0.0, 1.0, 0.01, "of all taxels"),
+            "known": Field(0, 1, 1, "1: the recording marks them invalid; 0: they read zero"),
+        },
+    ),
+    "jitter": EffectInfo(
+        "frames come early or late",
+        "clock",
+        1,
+        {"s": Field(0.0, 1.0, 0.001, "standard deviation, cut at 0.45 of a frame")},
+    ),
+    "dropped_frames": EffectInfo(
+        "frames that are lost",
+        "clock",
+        1,
+        {"part": Field(0.0, 0.9, 0.02, "of all frames")},
+    ),
+}
+STEP = Field(1e-6, 1.0, None, "the physics' step")
+IMPLIED_BY_FAMILY = {
+    FOAM: ("foundation", "relaxation"),
+    PILLOW: ("foundation", "relaxation"),
+    BUBBLES: ("pop",),
+    FOLIAGE: ("stems",),
+}
+IMPLIED_BY_CONDITION = {"movable": ("sliding",)}

@@ -1,0 +1,460 @@
+"""A scene's TOML file, checked: arm, motion, skin, objects, trials, spreads and effects."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from edge.arm import Chain
+from edge.errors import InputError
+from edge.layout import SkinLayout
+from train.simulate import fields
+from train.simulate.fields import EFFECTS, Field
+
+CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
+CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
+"""Nm/rad and Nms/rad of j0 to j4: the gains of the lab's impedance controller."""
+CODY_START_DEG = (-44.0, 5.0, 0.0, 42.0, 0.0)
+CODY_RATE_DEG_S = (20.0, 0.0, 0.0, 0.0, 0.0)
+"""A swing of the shoulder at the lab's 20 deg/s with the elbow bent to 42 degrees: there the
+gains above give the 115 N/m at mid-forearm that the lab's arm has."""
+
+COLUMN_ANGLES_DEG = (
+    *(-82.05, -67.25, -52.44, -37.22, -22.42, -7.61, 7.61, 22.42, 37.22, 52.44, 67.25, 82.05),
+    *(97.95, 112.75, 127.56, 142.78, 157.58, 172.39),
+    *(-172.39, -157.58, -142.78, -127.56, -112.75, -97.95),
+)
+CODY_SKIN: dict[str, Any] = {
+    "rows": 16,
+    "cols": 24,
+    "wraps": True,
+    "pitch_m": [0.0108, 0.01205],
+    "radius_m": 0.04604,
+    "row0_z_m": 0.18432,
+    "column_angles_deg": list(COLUMN_ANGLES_DEG),
+}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number of a scene: the same in every trial, or drawn evenly between two limits."""
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """The value of a trial without variation."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is drawn anew in each trial."""
+        return self.high > self.low
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """A thing that the arm meets."""
+
+    name: str
+    family: str
+    conditions: tuple[str, ...]
+    values: dict[str, Value]
+    given: frozenset[str]
+    """Keys that the file gives; the others are the family's."""
+
+    @property
+    def slug(self) -> str:
+        """The name, fit for a file."""
+        return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that a simulation needs; `load` reads it from TOML."""
+
+    name: str
+    seed: int
+    trials: dict[str, float]
+    step_s: dict[str, float]
+    """{effect, or `base`: the largest step that its trials may take}; empty: to be measured."""
+    lead: Value
+    arm: Chain
+    stiffness: tuple[float, ...]
+    damping: tuple[float, ...]
+    start: tuple[float, ...]
+    """(dof,) radians, the equilibrium point at t = 0."""
+    rate: tuple[float, ...]
+    """(dof,) rad/s."""
+    travel_s: float
+    """How long the equilibrium point moves."""
+    skin: SkinLayout
+    taxel_n_m: Value
+    place_m: float
+    """z in the skin's link of the point that meets the object."""
+    spread: dict[str, float]
+    objects: tuple[SceneObject, ...]
+    add: tuple[str, ...]
+    leave_out: tuple[str, ...]
+    settings: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Trials of each object in each condition."""
+        return int(self.trials["count"])
+
+
+class _Reader:
+    """Checks one table of the file; each complaint names file, key and allowed values."""
+
+    def __init__(self, where: str) -> None:
+        self.where = where
+
+    def fail(self, key: str, what: str) -> InputError:
+        return InputError(f"{self.where}: {key} {what}")
+
+    def table(self, value: object, key: str) -> Mapping[str, Any]:
+        if not isinstance(value, Mapping):
+            raise self.fail(key, f"must be a table ([{key}]), not {value!r}")
+        return value
+
+    def known(self, table: Mapping[str, Any], key: str, allowed: tuple[str, ...]) -> None:
+        for name in table:
+            if name not in allowed:
+                prefix = f"{key}." if key else ""
+                raise self.fail(
+                    f"unknown key {prefix}{name};", f"allowed here: {', '.join(allowed)}"
+                )
+
+    def number(self, value: object, key: str, limits: Field) -> float:
+        between = f"{'above' if limits.open_low else 'at least'} {limits.low:g}"
+        if limits.high < math.inf:
+            between += f", at most {limits.high:g}"
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(key, f"must be a number ({between}), not {value!r}")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        low_ok = number > limits.low if limits.open_low else number >= limits.low
+        if not (math.isfinite(number) and low_ok and number <= limits.high):
+            raise self.fail(key, f"must be {between}, not {value!r}")
+        return number
+
+    def value(self, value: object, key: str, limits: Field) -> Value:
+        if isinstance(value, list):
+            if len(value) != 2:
+                raise self.fail(key, f"must be one number or a range [low, high], not {value!r}")
+            low, high = (self.number(v, key, limits) for v in value)
+            if low > high:
+                raise self.fail(
+                    key, f"is a range turned round, [{low:g}, {high:g}]; write [{high:g}, {low:g}]"
+                )
+            return Value(low, high)
+        number = self.number(value, key, limits)
+        return Value(number, number)
+
+    def numbers(self, value: object, key: str, count: int, limits: Field) -> tuple[float, ...]:
+        if not isinstance(value, list) or len(value) != count:
+            raise self.fail(key, f"must be {count} numbers, one a joint, not {value!r}")
+        return tuple(self.number(v, key, limits) for v in value)
+
+    def text(self, value: object, key: str) -> str:
+        if not isinstance(value, str) or not value.strip():
+            raise self.fail(key, f"must be text, not {value!r}")
+        return value
+
+    def names(self, value: object, key: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
+        if not isinstance(value, list):
+            raise self.fail(key, f"must be a list of names ({', '.join(allowed)}), not {value!r}")
+        for name in value:
+            if not isinstance(name, str) or name not in allowed:
+                raise self.fail(key, f"has no {name!r}; allowed: {', '.join(allowed)}")
+        if len(set(value)) != len(value):
+            raise self.fail(key, f"names one twice: {', '.join(value)}")
+        return tuple(value)
+
+
+def load(
+    path: str | os.PathLike[str], *, seed: int | None = None, count: int | None = None
+) -> Scene:
+    """Read a scene; `seed` and `count` (trials) take the place of the file's.
+
+    Raises:
+        InputError: the file cannot be read, a key is unknown, a value makes no sense, or an
+            effect is named that the scene cannot support.
+    """
+    name = os.fspath(path)
+    try:
+        with open(name, "rb") as file:
+            table = tomllib.load(file)
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{name}: not TOML: {error}") from None
+    if seed is not None:
+        table["seed"] = seed
+    if count is not None and isinstance(table.setdefault("trials", {}), dict):
+        table["trials"]["count"] = count
+    return from_dict(table, where=name)
+
+
+TOP = ("name", "seed", "trials", "step_s", "arm", "motion", "skin", "spread", "effects", "object")
+
+
+def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
+    """Check a scene given as the table that TOML gives; `where` names the file in errors.
+
+    Raises:
+        InputError: as `load`.
+    """
+    read = _Reader(where)
+    read.known(table, "", TOP)
+    seed = table.get("seed", 0)
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
+        raise read.fail("seed", f"must be a whole number of 0 to 2^63 - 1, not {seed!r}")
+    trials, lead = _trials(read, read.table(table.get("trials", {}), "trials"))
+    step_s = _steps(read, read.table(table.get("step_s", {}), "step_s"), trials["rate_hz"])
+    chain, stiffness, damping = _arm(read, read.table(table.get("arm", {}), "arm"))
+    start, rate, travel_s, place = _motion(
+        read, read.table(table.get("motion", {}), "motion"), chain
+    )
+    skin, taxel = _skin(read, read.table(table.get("skin", {}), "skin"))
+    spread = _fields(read, table.get("spread", {}), "spread", fields.SPREAD)
+    objects = _objects(read, table.get("object"))
+    add, leave_out, settings = _effects(read, table.get("effects", {}))
+    scene = Scene(
+        name=read.text(table.get("name", Path(where).stem or "scene"), "name"),
+        seed=seed,
+        trials=trials,
+        step_s=step_s,
+        lead=lead,
+        arm=chain,
+        stiffness=stiffness,
+        damping=damping,
+        start=start,
+        rate=rate,
+        travel_s=travel_s,
+        skin=skin,
+        taxel_n_m=taxel,
+        place_m=place,
+        spread=spread,
+        objects=objects,
+        add=add,
+        leave_out=leave_out,
+        settings=settings,
+    )
+    from train.simulate.calls import check_supported
+
+    check_supported(scene, where)
+    return scene
+
+
+def _fields(read: _Reader, value: object, key: str, known: dict[str, Field]) -> dict[str, float]:
+    table = read.table(value, key)
+    read.known(table, key, tuple(known))
+    return {
+        name: read.number(table[name], f"{key}.{name}", limits)
+        if name in table
+        else float(limits.default or 0.0)
+        for name, limits in known.items()
+    }
+
+
+def _trials(read: _Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], Value]:
+    read.known(table, "trials", tuple(fields.TRIALS))
+    out = {
+        name: read.number(table.get(name, limits.default), f"trials.{name}", limits)
+        for name, limits in fields.TRIALS.items()
+        if name != "lead_s"
+    }
+    if out["count"] != int(out["count"]):
+        raise read.fail("trials.count", f"must be a whole number, not {out['count']!r}")
+    limits = fields.TRIALS["lead_s"]
+    return out, read.value(table.get("lead_s", limits.default), "trials.lead_s", limits)
+
+
+def _steps(read: _Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, float]:
+    read.known(table, "step_s", ("base", *EFFECTS))
+    if table and "base" not in table:
+        raise read.fail("step_s.base", "is missing: the step of trials without the others named")
+    frame = 1.0 / rate_hz
+    out: dict[str, float] = {}
+    for name, value in table.items():
+        step = read.number(value, f"step_s.{name}", fields.STEP)
+        ratio = frame / step
+        if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+            raise read.fail(
+                f"step_s.{name}", f"must divide the frame's {frame:g} s evenly, not {step:g}"
+            )
+        out[name] = step
+    return out
+
+
+def _arm(
+    read: _Reader, table: Mapping[str, Any]
+) -> tuple[Chain, tuple[float, ...], tuple[float, ...]]:
+    read.known(table, "arm", ("chain", "stiffness_nm_rad", "damping_nms_rad"))
+    name = read.text(table.get("chain", "cody"), "arm.chain")
+    chain = Chain.cody() if name == "cody" else Chain.from_toml(Path(read.where).parent / name)
+    positive = Field(0.0, math.inf, None, "", open_low=True)
+    gains: list[tuple[float, ...]] = []
+    for key, cody, limits in (
+        ("stiffness_nm_rad", CODY_STIFFNESS, positive),
+        ("damping_nms_rad", CODY_DAMPING, Field(0.0, math.inf, None, "")),
+    ):
+        if key not in table and name != "cody":
+            raise read.fail(f"arm.{key}", "is missing: one number a joint of arm.chain")
+        gains.append(read.numbers(table.get(key, list(cody)), f"arm.{key}", chain.dof, limits))
+    return chain, gains[0], gains[1]
+
+
+def _motion(
+    read: _Reader, table: Mapping[str, Any], chain: Chain
+) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
+    read.known(table, "motion", ("start_deg", "rate_deg_s", "travel_s", "place_m"))
+    angle = Field(-720.0, 720.0, None, "")
+    out: list[tuple[float, ...]] = []
+    for key, cody in (("start_deg", CODY_START_DEG), ("rate_deg_s", CODY_RATE_DEG_S)):
+        if key not in table and chain.dof != len(cody):
+            raise read.fail(f"motion.{key}", "is missing: one number a joint of arm.chain")
+        degrees = read.numbers(table.get(key, list(cody)), f"motion.{key}", chain.dof, angle)
+        out.append(tuple(math.radians(d) for d in degrees))
+    if not any(out[1]):
+        raise read.fail("motion.rate_deg_s", "is all zero: the arm would never reach an object")
+    travel = read.number(
+        table.get("travel_s", 1e6), "motion.travel_s", Field(0.0, 1e6, None, "", open_low=True)
+    )
+    place = read.number(table.get("place_m", 0.103), "motion.place_m", Field(-10.0, 10.0, None, ""))
+    for (joint, limits), angle0 in zip(
+        zip(chain.names, chain.limits, strict=True), out[0], strict=True
+    ):
+        if limits is not None and not limits[0] - 1e-9 <= angle0 <= limits[1] + 1e-9:
+            low, high = (math.degrees(v) for v in limits)
+            raise read.fail(
+                "motion.start_deg",
+                f"of {joint} must be {low:g} to {high:g}, not {math.degrees(angle0):g}",
+            )
+    return out[0], out[1], travel, place
+
+
+def _skin(read: _Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
+    shape = tuple(CODY_SKIN)
+    read.known(table, "skin", (*shape, *fields.SKIN))
+    layout: dict[str, Any] = {**CODY_SKIN, **{k: table[k] for k in shape if k in table}}
+    for name in ("counts_per_newton", "threshold_counts", "onset_counts"):
+        limits = fields.SKIN[name]
+        number = read.number(table.get(name, limits.default), f"skin.{name}", limits)
+        if name != "counts_per_newton":
+            if number != int(number):
+                raise read.fail(f"skin.{name}", f"must be a whole number, not {table[name]!r}")
+            layout[name] = int(number)
+        else:
+            layout[name] = number
+    skin = SkinLayout.from_dict(layout, where=read.where)
+    if skin.radius_m is None or skin.column_angles_deg is None or not skin.wraps:
+        raise read.fail("skin", "must be a cylinder: radius_m, column_angles_deg, wraps = true")
+    taxel = read.value(
+        table.get("taxel_n_m", fields.SKIN["taxel_n_m"].default),
+        "skin.taxel_n_m",
+        fields.SKIN["taxel_n_m"],
+    )
+    return skin, taxel
+
+
+def _objects(read: _Reader, value: object) -> tuple[SceneObject, ...]:
+    if not isinstance(value, list) or not value:
+        raise read.fail("object", "is missing: give at least one [[object]]")
+    objects = tuple(_object(read, entry, i) for i, entry in enumerate(value))
+    slugs = [o.slug for o in objects]
+    for o, slug in zip(objects, slugs, strict=True):
+        if slugs.count(slug) > 1:
+            raise read.fail(f"object {o.name!r}", "is there twice; give each its own name")
+    return objects
+
+
+def _object(read: _Reader, entry: object, index: int) -> SceneObject:
+    table = read.table(entry, f"object {index}")
+    name = read.text(table.get("name", ""), f"object {index}: name")
+    key = f"object {name!r}:"
+    if not any(c.isalnum() for c in name):
+        raise read.fail(key, "name needs a letter or a digit")
+    plain = ("name", "family", "conditions")
+    family = table.get("family")
+    if family not in fields.FAMILIES:
+        raise read.fail(
+            f"{key} family", f"must be one of {', '.join(fields.FAMILIES)}, not {family!r}"
+        )
+    family = str(family)
+    of_others = {
+        k
+        for other, keys in fields.FAMILY_KEYS.items()
+        if other != family
+        for k in keys
+        if k not in fields.FAMILY_KEYS[family]
+    }
+    allowed = tuple(k for k in fields.OBJECT if k not in of_others)
+    read.known(table, f"object {name!r}", (*plain, *allowed))
+    conditions = read.names(table.get("conditions"), f"{key} conditions", fields.CONDITIONS)
+    if not conditions:
+        raise read.fail(f"{key} conditions", "must name fixed, movable or both")
+    values: dict[str, Value] = {}
+    for k in allowed:
+        limits = fields.OBJECT[k]
+        if k in table:
+            values[k] = read.value(table[k], f"{key} {k}", limits)
+        elif k in fields.FAMILY_KEYS[family]:
+            default = fields.FAMILY_KEYS[family][k]
+            values[k] = Value(default, default)
+        elif limits.default is not None and k not in fields.FAMILY_KEYS[fields.FOLIAGE]:
+            values[k] = Value(limits.default, limits.default)
+    if "movable" in conditions:
+        for k in ("mass_kg", "friction_static", "friction_kinetic"):
+            if k not in values:
+                raise read.fail(f"{key} {k}", "is missing: a movable object slides on it")
+    _check_pairs(read, key, values)
+    return SceneObject(name, family, conditions, values, frozenset(table) & set(fields.OBJECT))
+
+
+def _check_pairs(read: _Reader, key: str, values: dict[str, Value]) -> None:
+    static, kinetic = values.get("friction_static"), values.get("friction_kinetic")
+    if static is not None and kinetic is not None and kinetic.high > static.low:
+        raise read.fail(
+            f"{key} friction_kinetic",
+            f"must be at most friction_static ({static.low:g}), not {kinetic.high:g}",
+        )
+    if ("base_m" in values) != ("height_m" in values):
+        raise read.fail(f"{key}", "tipping needs both base_m and height_m")
+    count = values.get("stem_count")
+    if count is not None and (count.varies or count.low != int(count.low)):
+        raise read.fail(f"{key} stem_count", "must be one whole number")
+
+
+def _effects(
+    read: _Reader, value: object
+) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, dict[str, float]]]:
+    table = read.table(value, "effects")
+    read.known(table, "effects", ("add", "leave_out", *EFFECTS))
+    add = read.names(table.get("add", []), "effects.add", tuple(EFFECTS))
+    leave_out = read.names(table.get("leave_out", []), "effects.leave_out", tuple(EFFECTS))
+    settings = {
+        name: _fields(read, table.get(name, {}), f"effects.{name}", info.settings)
+        for name, info in EFFECTS.items()
+        if name in add or name in table
+    }
+    for name in table:
+        if name in EFFECTS and not EFFECTS[name].settings:
+            raise read.fail(
+                f"effects.{name}", "has no settings; name it in effects.add, or the object's keys"
+            )
+    add = (*add, *(n for n in EFFECTS if n in table and n not in add))
+    both = [n for n in add if n in leave_out]
+    if both:
+        raise read.fail("effects", f"both adds and leaves out {both[0]}")
+    return add, leave_out, settings
