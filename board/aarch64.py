@@ -145,12 +145,10 @@ def _root(target: Path) -> None:
 
 def _site(target: Path, version: str, constraints: Path) -> None:
     tags = [f"--platform={platform}_aarch64" for platform in PLATFORMS]
-    _run(
-        [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        + ["--target", str(target), "--only-binary=:all:", "--implementation=cp", *tags]
-        + ["--python-version", version, "-c", str(constraints), *BOARD, *TESTING],
-        "pip cannot fetch the aarch64 wheels",
-    )
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    into = ["--target", str(target), "--only-binary=:all:", "--implementation=cp"]
+    into += [*tags, "--python-version", version, "-c", str(constraints)]
+    _run([*pip, *into, *BOARD, *TESTING], "pip cannot fetch the aarch64 wheels")
 
 
 def _wrapper(folder: Path, python: Path) -> Path:
