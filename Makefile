@@ -4,12 +4,17 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo golden bench faults soak clean
+.PHONY: help venv test lint types export demo demo-data golden wheel wheel-test board-test \
+  hard-cases bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
+	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
+	@echo "make wheel-test   the wheel in an empty environment, away from here"
+	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
+	@echo "make demo-data    the model and touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
@@ -82,11 +87,8 @@ bench: $(BENCHVENV)
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
 
-faults: $(READY)
-	$(BIN)/python -m bench.faults
-
-soak: $(READY)
-	$(BIN)/python -m bench.soak
+.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench faults \
+  soak clean
 
 clean:
 	rm -rf build dist
