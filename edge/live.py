@@ -12,7 +12,7 @@ from edge.features import feature_vector
 from edge.frame import Frame
 from edge.layout import SkinLayout
 from edge.model import Decision, Model
-from edge.track import Contact, Tracker, for_device
+from edge.track import Contact, Tracker, Tracks, for_device
 
 Event = dict[str, Any]
 """One JSON object; `event` says which."""
@@ -23,6 +23,7 @@ class _Waiting:
     """A contact that has yet to be decided for some tasks."""
 
     contact: Contact
+    number: int
     look: int
     """The next of the model's looks."""
     tasks: list[str]
@@ -53,6 +54,10 @@ class Watcher:
     measured on the skin, though the model's is in the world: see `run --without-joints`),
     `out_of_range` (`label` is
     None: the features are too large to be measured against the training rows).
+
+    With `several`, every region is followed on its own, and each event says of which `contact`
+    it is (counted from 1 in the order of their events); a decision then has its `place` too
+    ([x, y, z], see `edge.track.Contact.place`), None where it is not known.
     """
 
     def __init__(
@@ -62,6 +67,7 @@ class Watcher:
         *,
         error: float | None = None,
         alarms: float = ALARMS,
+        several: bool = False,
     ) -> None:
         """Watch with a model.
 
@@ -71,6 +77,7 @@ class Watcher:
             error: how often a label may be wrong, in (0, 1), to decide as soon as that allows;
                 None decides at the full window.
             alarms: how often a trained thing may be called unknown for lying far from all.
+            several: follow every region, not the largest alone.
 
         Raises:
             InputError: the skin is not the one that the model was made for, a rate is outside
@@ -87,7 +94,8 @@ class Watcher:
                 )
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
-        self.tracker = Tracker(
+        self.several = several
+        self.tracker = (Tracks if several else Tracker)(
             self.layout,
             info.tracking,
             chain=info.chain,
@@ -96,18 +104,19 @@ class Watcher:
         )
         self.error, self.alarms = error, alarms
         self._waiting: list[_Waiting] = []
-        self._current: Contact | None = None
-        self._last_s: float | None = None
+        self._current: dict[int, Contact] = {}
+        """Contacts under way by their number."""
+        self._begun = 0
 
-    def _begin(self, contact: Contact) -> _Waiting:
+    def _begin(self, contact: Contact, number: int) -> _Waiting:
         tasks = self.model.info.tasks
         if self.error is None:
-            return _Waiting(contact, len(self.model.looks_s) - 1, list(tasks))
+            return _Waiting(contact, number, len(self.model.looks_s) - 1, list(tasks))
         left = {
             name: Candidates(len(task.labels), self.error, self.alarms)
             for name, task in tasks.items()
         }
-        return _Waiting(contact, 0, list(tasks), left)
+        return _Waiting(contact, number, 0, list(tasks), left)
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -117,16 +126,23 @@ class Watcher:
         """
         began = time.perf_counter()
         events: list[Event] = []
-        contact = self.tracker.push(frame)
-        self._last_s = frame.t
-        if contact is not None:
-            if contact is not self._current:
-                self._current = contact
-                self._waiting.append(self._begin(contact))
-                events.append({"event": "onset", "onset_s": contact.onset_s})
+        for contact in self.tracker.follow(frame):
+            number = self._number(contact)
+            if number is None:
+                self._begun += 1
+                number = self._begun
+                self._current[number] = contact
+                self._waiting.append(self._begin(contact, number))
+                events.append({"event": "onset", **self._which(number), "onset_s": contact.onset_s})
             if contact.ended:
+                del self._current[number]
                 events.append(
-                    {"event": "release", "onset_s": contact.onset_s, "release_s": frame.t}
+                    {
+                        "event": "release",
+                        **self._which(number),
+                        "onset_s": contact.onset_s,
+                        "release_s": frame.t,
+                    }
                 )
         for waiting in list(self._waiting):
             age = frame.t - waiting.contact.onset_s
@@ -135,6 +151,15 @@ class Watcher:
             if not waiting.tasks:
                 self._waiting.remove(waiting)
         return events
+
+    def _number(self, contact: Contact) -> int | None:
+        for number, known in self._current.items():
+            if known is contact:
+                return number
+        return None
+
+    def _which(self, number: int) -> Event:
+        return {"contact": number} if self.several else {}
 
     def finish(self) -> list[Event]:
         """The stream has ended: decide what is still waiting, flagged `short`."""
@@ -150,7 +175,15 @@ class Watcher:
         window = self.model.looks_s[look]
         contact = waiting.contact
         vector = feature_vector(contact.series(), window, info.samples, info.features)
-        common: Event = {"event": "decision", "window_s": window, "onset_s": contact.onset_s}
+        common: Event = {
+            "event": "decision",
+            **self._which(waiting.number),
+            "window_s": window,
+            "onset_s": contact.onset_s,
+        }
+        if self.several:
+            place = contact.place()
+            common["place"] = None if place is None else [round(x, 6) for x in place.tolist()]
         flags = [
             flag
             for flag, raised in (
