@@ -4,12 +4,13 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo bench clean
+.PHONY: help venv test lint types export demo study bench clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
+	@echo "make study    every analysis of the paper, ours beside it: build/study/report.html; DATA= for yours"
 	@echo "make bench    speed, side by side with the alternatives"
 
 $(READY): pyproject.toml constraints.txt
@@ -65,6 +66,14 @@ BENCHVENV := $(VENV)/.bench
 $(BENCHVENV): $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .[bench]
 	@touch $@
+
+ifndef DATA
+study: $(SIMULATED)/.made
+STUDIED := --scene $(SCENE)
+endif
+
+study: $(READY)
+	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
 
 bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \

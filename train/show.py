@@ -172,13 +172,9 @@ def _side(
     axis.legend(fontsize=8)
 
 
-def _contact(
-    recording: Recording, chain: Chain, layout: SkinLayout, k: int
-) -> np.ndarray | None:
+def _contact(recording: Recording, chain: Chain, layout: SkinLayout, k: int) -> np.ndarray | None:
     """World place of the region's centroid on frame k."""
-    region = largest_region(
-        recording.frames[k], layout.threshold_counts, wraps=layout.wraps
-    )
+    region = largest_region(recording.frames[k], layout.threshold_counts, wraps=layout.wraps)
     if region is None or recording.joints is None:
         return None
     pose = chain.pose(recording.joints[k])

@@ -54,9 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         from train.simulate.run import total_trials, write
 
-        with tqdm(
-            total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr
-        ) as bar:
+        with tqdm(total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr) as bar:
             paths = write(
                 scene,
                 arguments.out,
