@@ -4,14 +4,21 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo study bench clean
+.PHONY: help venv test lint types export demo demo-data study golden wheel wheel-test board-test \
+  hard-cases bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
 	@echo "make study    every analysis of the paper, ours beside it: build/study/report.html; DATA= for yours"
+	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
+	@echo "make wheel-test   the wheel in an empty environment, away from here"
+	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
+	@echo "make demo-data    the model and touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
+	@echo "make faults   what each fault on the skin's wires costs, as a table"
+	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -61,6 +68,15 @@ demo: $(READY)
 	$(BIN)/edge-classify replay --model $(DEMO)/model.onnx --summary $(DEMO)/unseen
 	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
 
+# The committed model and outputs that the tests hold the edge to.
+golden: $(READY)
+	$(BIN)/python -m tests.golden.make
+
+# The README's picture.
+docs/touch.png: $(READY)
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
+	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --scene --out $@
+
 BENCHVENV := $(VENV)/.bench
 
 $(BENCHVENV): $(READY)
@@ -79,6 +95,9 @@ bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
+
+.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench faults \
+  soak clean
 
 clean:
 	rm -rf build dist

@@ -7,15 +7,15 @@ from numpy.typing import ArrayLike, NDArray
 
 SCALE_BITS = 8
 """The baseline is kept in 1/256 counts, so that a slow drift is not lost to rounding."""
-FOLLOW_BITS = 4
-"""A step is at most 1/16 of the distance: noise moves the baseline little."""
+FOLLOW_BITS = 2
+"""A step is at most 1/4 of the distance: noise moves the baseline little."""
 
 
 class Baseline:
     """The rest values of n taxels.
 
-    While nothing touches, each follows its taxel by at most `step` a frame and `limit` counts
-    away from the calibration; `hold` freezes them all.
+    Each call of `follow` lets them follow their taxels by at most `step_counts`, and by `limit`
+    counts away from the calibration; not to call it freezes them.
     """
 
     def __init__(
@@ -24,7 +24,7 @@ class Baseline:
         *,
         sign: ArrayLike = 1,
         dead_band: ArrayLike = 1,
-        counts_per_frame: float = 0.0,
+        step_counts: float = 0.0,
         limit: int = 0,
     ) -> None:
         """Start from a calibration.
@@ -33,7 +33,7 @@ class Baseline:
             rest: (n,) raw counts with nothing touching.
             sign: (n,) or one, 1 where a touch raises the raw value, -1 where it lowers it.
             dead_band: (n,) or one, counts under which a taxel reads 0; at least 1.
-            counts_per_frame: how fast the baseline follows; rounded to 1/256 count, up.
+            step_counts: how far one step follows; rounded to 1/256 count, up.
             limit: how many counts it may go from `rest`.
         """
         self._rest = np.array(rest, dtype=np.int32) << SCALE_BITS
@@ -41,7 +41,8 @@ class Baseline:
         self._now = self._rest.copy()
         self._sign = np.broadcast_to(np.asarray(sign, dtype=np.int32), n)
         self._dead = np.broadcast_to(np.maximum(np.asarray(dead_band, dtype=np.int32), 1), n)
-        self._step = int(np.ceil(counts_per_frame * (1 << SCALE_BITS)))
+        self._rising = bool((self._sign == 1).all())
+        self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
         self._low = self._rest - (limit << SCALE_BITS)
         self._high = self._rest + (limit << SCALE_BITS)
         self._counts = self._rounded()
@@ -58,13 +59,17 @@ class Baseline:
         """Counts above baseline (n,): sign and dead band applied, 0 to 65535."""
         counts = raw.astype(np.int32)
         counts -= self._counts
-        counts *= self._sign
-        counts[counts < self._dead] = 0
-        return np.minimum(counts, 65535).astype(np.uint16)
+        if not self._rising:
+            counts *= self._sign
+        counts *= counts >= self._dead
+        np.minimum(counts, 65535, out=counts)
+        return counts.astype(np.uint16)
 
     def follow(self, raw: NDArray[np.uint16], fresh: NDArray[np.bool_]) -> None:
-        """Follow one frame's drift, where the taxels are `fresh`; call it while nothing touches."""
-        error = (raw.astype(np.int32) << SCALE_BITS) - self._now
+        """Take a step after the drift of the `fresh` taxels; call it while nothing touches."""
+        error = raw.astype(np.int32)
+        error <<= SCALE_BITS
+        error -= self._now
         error += 1 << (FOLLOW_BITS - 1)
         error >>= FOLLOW_BITS
         np.minimum(error, self._step, out=error)

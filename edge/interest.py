@@ -64,7 +64,6 @@ class Planner:
             taxels: for each bus and chip its flat taxel indices.
         """
         self._wires = wires
-        self._threshold, self._wraps = layout.threshold_counts, layout.wraps
         self._near = []
         for chips in taxels:
             near = np.zeros((len(chips), *layout.shape), dtype=np.bool_)
@@ -92,12 +91,17 @@ class Planner:
             taxels.append([chip.taxels for chip in spec.chips])
         return cls(skin.layout, wires, taxels)
 
-    def plan(self, frame: Frame | None) -> list[list[int]]:
-        """For each bus the indices of the chips to read next, in wire order."""
+    def plan(self, frame: Frame | None, touch_counts: int = 0) -> list[list[int]]:
+        """For each bus the indices of the chips to read next, in wire order.
+
+        Args:
+            frame: the last one, or None before the first.
+            touch_counts: a taxel above this feels something.
+        """
         self._tick += 1
         felt: NDArray[np.bool_] | None = None
         if frame is not None:
-            felt = frame.counts.reshape(-1) > self._threshold
+            felt = frame.counts.reshape(-1) > touch_counts
             if not felt.any():
                 felt = None
         return [self._plan(b, felt) for b in range(len(self._wires))]

@@ -10,7 +10,7 @@ from edge.features import feature_vector
 from edge.frame import Frame
 from edge.layout import SkinLayout
 from edge.model import Model
-from edge.track import Contact, Tracker, for_device
+from edge.track import Contact, Tracker, Tracks, for_device
 
 Event = dict[str, Any]
 """One JSON object; `event` says which."""
@@ -32,14 +32,21 @@ class Watcher:
     measured on the skin, though the model's is in the world: see `run --without-joints`),
     `out_of_range` (`label` is
     None: the features are too large to be measured against the training rows).
+
+    With `several`, every region is followed on its own, and each event says of which `contact`
+    it is (counted from 1 in the order of their events); a decision then has its `place` too
+    ([x, y, z], see `edge.track.Contact.place`), None where it is not known.
     """
 
-    def __init__(self, model: Model, layout: SkinLayout | None = None) -> None:
+    def __init__(
+        self, model: Model, layout: SkinLayout | None = None, *, several: bool = False
+    ) -> None:
         """Watch with a model.
 
         Args:
             model: what decides.
             layout: the skin that gives the frames; the model's own where None.
+            several: follow every region, not the largest alone.
 
         Raises:
             InputError: the skin is not the one that the model was made for.
@@ -47,7 +54,8 @@ class Watcher:
         info = model.info
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
-        self.tracker = Tracker(
+        self.several = several
+        self.tracker = (Tracks if several else Tracker)(
             self.layout,
             info.tracking,
             chain=info.chain,
@@ -55,8 +63,9 @@ class Watcher:
             features=info.features,
         )
         self._waiting: list[Contact] = []
-        self._current: Contact | None = None
-        self._last_s: float | None = None
+        self._current: dict[int, Contact] = {}
+        """Contacts under way by their number."""
+        self._begun = 0
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -66,23 +75,49 @@ class Watcher:
         """
         began = time.perf_counter()
         events: list[Event] = []
-        contact = self.tracker.push(frame)
-        self._last_s = frame.t
-        if contact is not None:
-            if contact is not self._current:
-                self._current = contact
+        for contact in self.tracker.follow(frame):
+            number = self._number(contact)
+            if number is None:
+                self._begun += 1
+                number = self._begun
+                self._current[number] = contact
                 self._waiting.append(contact)
-                events.append({"event": "onset", "onset_s": contact.onset_s})
+                events.append({"event": "onset", **self._which(number), "onset_s": contact.onset_s})
             if contact.ended:
                 events.append(
-                    {"event": "release", "onset_s": contact.onset_s, "release_s": frame.t}
+                    {
+                        "event": "release",
+                        **self._which(number),
+                        "onset_s": contact.onset_s,
+                        "release_s": frame.t,
+                    }
                 )
         if self._waiting:
             window = self.model.info.window_s
-            for waiting in [c for c in self._waiting if frame.t - c.onset_s >= window]:
-                self._waiting.remove(waiting)
-                events += self._decide(waiting, began, short=False)
+            due = [c for c in self._waiting if frame.t - c.onset_s >= window]
+            if due:
+                self._waiting = [c for c in self._waiting if frame.t - c.onset_s < window]
+            for contact in due:
+                events += self._decide(contact, began, short=False)
+        if self._current:
+            self._forget()
         return events
+
+    def _number(self, contact: Contact) -> int | None:
+        for number, known in self._current.items():
+            if known is contact:
+                return number
+        return None
+
+    def _forget(self) -> None:
+        """Contacts that are over and decided."""
+        waiting = {id(contact) for contact in self._waiting}
+        for number, contact in list(self._current.items()):
+            if contact.ended and id(contact) not in waiting:
+                del self._current[number]
+
+    def _which(self, number: int | None) -> Event:
+        return {"contact": number} if self.several else {}
 
     def finish(self) -> list[Event]:
         """The stream has ended: decide what is still waiting, flagged `short`."""
@@ -103,7 +138,15 @@ class Watcher:
             )
             if raised
         ]
-        common = {"event": "decision", "window_s": info.window_s, "onset_s": contact.onset_s}
+        common: Event = {
+            "event": "decision",
+            **self._which(self._number(contact)),
+            "window_s": info.window_s,
+            "onset_s": contact.onset_s,
+        }
+        if self.several:
+            place = contact.place()
+            common["place"] = None if place is None else [round(x, 6) for x in place.tolist()]
         try:
             decisions = self.model.decide(vector)
         except InputError:

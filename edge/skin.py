@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 
 from edge.baseline import Baseline
 from edge.bus import Bus, BusError, LinuxBus
-from edge.chips.chip import Parsed
+from edge.calibration import dead_band
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError
 from edge.frame import Frame
-from edge.reader import NEVER, BusReader, Slot, State, frame_bytes
-from edge.skinfile import UNUSED, SkinFile, dead_band
+from edge.groups import Buffers, ChipGroup, buffers
+from edge.reader import NEVER, BusReader, Slot, State
+from edge.skinfile import UNUSED, SkinFile
 
+FOLLOW_FRAMES = 4
+"""The baseline takes a step every so many frames: drift is slow, and steps cost time."""
 NOISY = 1.0
 """Standard deviation in counts from which a chip's bytes change with every conversion."""
 MARGIN = 0.9
@@ -30,7 +33,7 @@ MARGIN = 0.9
 class Planner(Protocol):
     """Chooses which chips a frame reads; `edge.interest` has one."""
 
-    def plan(self, frame: Frame | None) -> Sequence[Sequence[int]]:
+    def plan(self, frame: Frame | None, touch_counts: int) -> Sequence[Sequence[int]]:
         """For each bus the indices of the chips to read next, in order."""
         ...
 
@@ -54,30 +57,6 @@ class ChipStatus:
     state: str
     error: str
     recoveries: int
-
-
-class _Group:
-    """Chips that one parse call serves: of one kind, with the same number of taxels."""
-
-    def __init__(
-        self, slots: Sequence[Slot], chips: Sequence[int], rows: NDArray[np.uint8], first: int
-    ) -> None:
-        self.slots, self.rows = slots, rows
-        self.chips = np.array(chips, dtype=np.intp)
-        n = len(slots[0].spec.taxels)
-        self.stages = slice(first, first + len(slots) * n)
-        self.shape = (len(slots), n)
-        self.before = rows.copy()
-        self.unchanged = np.zeros(len(slots), dtype=np.int64)
-        """Readings in a row that gave the same bytes."""
-        self.noisy = np.zeros(len(slots), dtype=np.bool_)
-        self.any_noisy = False
-
-    def parse(self) -> Parsed | None:
-        for slot in self.slots:
-            if slot.chip is not None:
-                return slot.chip.parse(self.rows)
-        return None
 
 
 class _Worker(threading.Thread):
@@ -125,9 +104,11 @@ class Skin:
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
         self.planner: Planner | None = None
+        self.touch_counts = file.layout.threshold_counts
+        """A taxel above this is being touched: the baseline is frozen, its chip is of interest."""
         self.following = True
         """The baseline follows drift."""
-        groups = _rows(file)
+        groups = buffers(file)
         self.readers = [
             BusReader(
                 bus,
@@ -143,7 +124,8 @@ class Skin:
         self._wire(groups)
         self._file_signal()
         self._last: Frame | None = None
-        self._touched_at = -math.inf
+        self._touched_at = self._followed_at = -math.inf
+        self._untold = 0
         self._states = [slot.state for slot in self._slots]
         self._workers = [_Worker(reader) for reader in self.readers[1:]]
         self._closed = False
@@ -172,11 +154,12 @@ class Skin:
             raise
         return skin
 
-    def _wire(self, groups: _Rows) -> None:
+    def _wire(self, groups: Buffers) -> None:
         """Index arrays from stages and chips to taxels."""
         n = self.layout.rows * self.layout.cols
+        limit = self.file.reading.stuck_frames
         self._groups = [
-            _Group([self._slots[i] for i in chips], chips, rows, first)
+            ChipGroup([self._slots[i] for i in chips], chips, rows, first, limit)
             for chips, rows, first in groups.groups
         ]
         total = sum(g.shape[0] * g.shape[1] for g in self._groups)
@@ -196,9 +179,11 @@ class Skin:
                         self._chip_of[taxel] = order[id(slot)]
                         self._sign[taxel] = slot.spec.sign
                     stage += 1
-        self._alive = np.ones(n, dtype=np.bool_)
+        self._served = self._chip_of < len(self._slots)
+        """Taxels that have a chip and are not dead."""
         for row, col in self.file.signal.dead:
-            self._alive[row * self.layout.cols + col] = False
+            self._served[row * self.layout.cols + col] = False
+        self._all_served = bool(self._served.all())
 
     def _file_signal(self) -> None:
         """Baseline, dead band and stuck chips from the file."""
@@ -209,15 +194,16 @@ class Skin:
             rest,
             sign=self._sign,
             dead_band=dead_band(self.file),
-            counts_per_frame=signal.drift_counts_per_s * self.period_s,
+            step_counts=signal.drift_counts_per_s * self.period_s * FOLLOW_FRAMES,
             limit=signal.drift_limit_counts,
         )
         if calibration is not None:
             noisy = np.zeros(len(self._slots) + 1, dtype=np.bool_)
             np.logical_or.at(noisy, self._chip_of, calibration.noise.ravel() >= NOISY)
             for group in self._groups:
-                group.noisy = noisy[group.chips]
-                group.any_noisy = bool(group.noisy.any())
+                if group.slots[0].spec.kind != "block":
+                    group.noisy = noisy[group.chips]
+                    group.any_noisy = bool(group.noisy.any())
 
     def start(self) -> list[ChipStatus]:
         """Identify and set up all chips.
@@ -289,7 +275,7 @@ class Skin:
     def _transfer(self, t: float) -> None:
         jobs = self._every
         if self.planner is not None:
-            chosen = self.planner.plan(self._last)
+            chosen = self.planner.plan(self._last, self.touch_counts)
             jobs = [
                 [reader.slots[i] for i in indices]
                 for reader, indices in zip(self.readers, chosen, strict=True)
@@ -317,13 +303,18 @@ class Skin:
         good = np.array([slot.good for slot in slots] + [False])
         self._suspect(good, at >= t)
         good &= at >= t - self.oldest_s
-        valid = good[self._chip_of]
-        valid &= whole[self._stage_of]
-        valid &= self._alive
-        values = raw[self._stage_of]
+        values = raw.take(self._stage_of)
         counts = self.baseline.above(values)
-        counts *= valid
-        times = at[self._chip_of]
+        times = at.take(self._chip_of)
+        if whole[:-1].all() and good[:-1].all():
+            valid = self._served.copy()
+            if not self._all_served:
+                counts *= valid
+        else:
+            valid = good.take(self._chip_of)
+            valid &= whole.take(self._stage_of)
+            valid &= self._served
+            counts *= valid
         self._follow(values, counts, valid, times, t)
         shape = self.layout.shape
         self._last = Frame(
@@ -341,7 +332,6 @@ class Skin:
 
     def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
         """Judge chips by what they serve: damaged words, or bytes that never change."""
-        limit = self.file.reading.stuck_frames
         for group in self._groups:
             if not self._whole[group.stages].all():
                 bad = ~self._whole[group.stages].reshape(group.shape).all(axis=1)
@@ -353,8 +343,8 @@ class Skin:
             np.copyto(group.before, group.rows)
             group.unchanged += fresh[group.chips]
             group.unchanged *= same & group.noisy
-            if int(group.unchanged.max()) >= limit:
-                for i in np.flatnonzero(group.unchanged >= limit).tolist():
+            if int(group.unchanged.max()) >= group.limit:
+                for i in np.flatnonzero(group.unchanged >= group.limit).tolist():
                     group.slots[i].suspect = True
                     good[group.chips[i]] = False
 
@@ -369,10 +359,15 @@ class Skin:
         """Let the baseline follow drift, unless something touches or has just touched."""
         if self.file.calibration is None or not self.following:
             return
-        if int(counts.max()) > self.layout.threshold_counts:
+        if int(counts.max()) > self.touch_counts:
             self._touched_at = t
-        elif t - self._touched_at >= self.file.signal.settle_s:
-            self.baseline.follow(values, valid & (times >= t))
+        self._untold += 1
+        if self._untold < FOLLOW_FRAMES:
+            return
+        self._untold = 0
+        if t - self._touched_at >= self.file.signal.settle_s:
+            self.baseline.follow(values, valid & (times >= self._followed_at))
+        self._followed_at = t
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""
@@ -391,29 +386,3 @@ class Skin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Buffers: for each bus its chips' rows; the groups as (chips, rows, first stage)."""
-
-    by_bus: list[list[NDArray[np.uint8]]]
-    groups: list[tuple[list[int], NDArray[np.uint8], int]]
-
-
-def _rows(file: SkinFile) -> _Rows:
-    """One array for all chips of a kind, so that one call parses them."""
-    chips = file.chips
-    alike: dict[tuple[str, int, int], list[int]] = {}
-    for i, chip in enumerate(chips):
-        alike.setdefault((chip.kind, len(chip.taxels), chip.bits), []).append(i)
-    own: dict[int, NDArray[np.uint8]] = {}
-    groups, first = [], 0
-    for indices in alike.values():
-        rows = np.zeros((len(indices), frame_bytes(chips[indices[0]])), dtype=np.uint8)
-        own.update(zip(indices, rows, strict=True))
-        groups.append((indices, rows, first))
-        first += len(indices) * len(chips[indices[0]].taxels)
-    numbered = iter(range(len(chips)))
-    by_bus = [[own[next(numbered)] for _ in bus.chips] for bus in file.buses]
-    return _Rows(by_bus, groups)

@@ -32,7 +32,7 @@ sines and cosines that differ by an ulp between C libraries: below 100 ulp of me
 leave a factor of 40 and more."""
 
 
-def trials_of(dataset: DataSet, count: int = TRIALS) -> list[int]:
+def trials_of(dataset: DataSet, count: int) -> list[int]:
     """Trials spread evenly over the labels of the finest task."""
     finest = max(dataset.tasks, key=lambda task: len(set(dataset.labels(task))))
     order = np.argsort(dataset.labels(finest), kind="stable")
@@ -68,7 +68,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     info = model.info
     parts: list[Recording] = []
     found: list[tuple[float, Any]] = []
-    for i in trials_of(dataset):
+    for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
         part = trimmed(load(trial.path), trial.onset_s, model)
         series = first_series(part, model)

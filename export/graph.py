@@ -7,6 +7,7 @@ obeys the tie rule, and answers what is not finite with label -1.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ SHORTLIST_ROWS = 1024
 """From so many training rows on, a float32 product picks a shortlist that is measured exactly."""
 SHORTLIST = 24
 """How many more rows than voters a shortlist has, so that its check rarely fails."""
+FLOAT32_FIT = (2.0**-16, 2.0**16)
+"""Lengths of rows whose float32 squares and products need no scaling."""
 
 
 class Builder:
@@ -113,6 +116,17 @@ def _measured(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> list
     )
 
 
+def _unit(rows: NDArray[np.float64]) -> float:
+    """The power of two that brings the longest row near length 1; 1 where float32 needs none.
+
+    A float32 square vanishes below 1e-23 and overflows above 1.8e19.
+    """
+    longest = float(np.sqrt((rows**2).sum(axis=1)).max(initial=0.0))
+    if longest == 0.0 or FLOAT32_FIT[0] <= longest <= FLOAT32_FIT[1]:
+        return 1.0
+    return math.ldexp(1.0, 1 - math.frexp(longest)[1])
+
+
 def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> list[str]:
     """As `_measured`, where a float32 product first picks the rows worth measuring.
 
@@ -122,8 +136,14 @@ def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> l
     Accuracy and Stability, section 3.1). Every row outside the shortlist is at least as far as
     its last entry says, less e; where the k-th measured distance is below that, no row outside
     can be among the k nearest. Where it is not (many near-duplicates), all rows are measured.
+    That holds as long as float32 neither overflows nor loses squares, so rows of another size
+    are scaled by a power of two first.
     """
     c = rows.shape[1]
+    unit = _unit(rows)
+    if unit != 1.0:
+        rows = rows * unit
+        z = build.node("Mul", [z, build.constant(unit)])
     lengths = (rows**2).sum(axis=1)
     u = (c + 8) * 2.0**-23
     slack = 2.0 * u * float(lengths.max())
@@ -159,13 +179,16 @@ def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> l
     outputs = {"squares": TensorProto.DOUBLE, "rows": TensorProto.INT64}
     then = build.branch("shortlisted", outputs, lambda: [short, found])
     other = build.branch("measured", outputs, lambda: _measured(build, z, rows, k))
-    return build.nodes(
+    near_squares, near_rows = build.nodes(
         "If",
         [build.node("Cast", [all_sure], to=TensorProto.BOOL)],
         ["", ""],
         then_branch=then,
         else_branch=other,
     )
+    if unit != 1.0:
+        near_squares = build.node("Mul", [near_squares, build.constant(unit**-2)])
+    return [near_squares, near_rows]
 
 
 def _first(build: Builder, values: str, have: int, want: int) -> str:
@@ -223,7 +246,9 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     for (scaling, components), k in groups.items():
         rows = model.rows_[scaling]
         z = _first(build, points[scaling], rows.shape[1], components)
-        find = _shortlisted if len(rows) >= SHORTLIST_ROWS else _measured
+        # A shortlist of most rows saves nothing.
+        short = len(rows) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows)
+        find = _shortlisted if short else _measured
         near[scaling, components] = find(build, z, rows[:, :components], k)
     for task, choice in model.choices.items():
         key = (choice.scaling, model.components_[task])

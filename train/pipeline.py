@@ -27,11 +27,13 @@ MOST_COLUMNS = 1 << 12
 """Beyond them too few bits are left for the components."""
 RANGE = 4.0
 """How far beyond the training set's range a query may lie and still be projected exactly."""
-SMALLEST_SCALE, LARGEST_SCALE = 1e-100, 1e100
-"""Squares of features outside these would vanish or overflow in a distance."""
+SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
+"""Above these, squares overflow in a distance. Below, ONNX Runtime's optimiser takes the grids of
+a `Projection` for the 0 that they are in float32, and leaves their rounding out."""
 CLOSE_EIGENVALUES = 1e-6
 WELL_CONDITIONED = 1e-8
 """Variance, as a part of the largest, down to which eigenvectors of a covariance are trusted."""
+SAME_SIZE = 1e-6
 
 
 def _blocks(X: NDArray[np.float64], types: int) -> NDArray[np.float64]:
@@ -162,8 +164,9 @@ def principal_axes(
 
     By a full singular value decomposition in float64, which keeps small singular values that the
     covariance would lose. A component's entry of largest magnitude is positive (of equal ones
-    the first), so that the same data gives the same file. A column without variance gets no
-    weight at all.
+    the first, where equal is to within SAME_SIZE: a feature that is constant in time has forty
+    equal entries but for rounding), so that the same data gives the same file. A column without
+    variance gets no weight at all.
 
     Returns:
         (p,), (rank, p) and (rank,), the largest singular value first.
@@ -174,7 +177,8 @@ def principal_axes(
     rank = int(np.count_nonzero(values > limit))
     axes = axes[:rank]
     axes[:, still] = 0.0
-    top = np.argmax(np.abs(axes), axis=1)
+    sizes = np.abs(axes)
+    top = np.argmax(sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True), axis=1)
     axes *= np.sign(axes[np.arange(rank), top])[:, None]
     return mean, axes, values[:rank]
 

@@ -53,19 +53,24 @@ def draw(
         raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
     found = first_contact(recording, Tracker(layout, chain=chain, horizon_s=HORIZON_S))
     rows = 3 if scene else 2
-    figure = Figure(figsize=(13.0, 3.6 * rows), layout="constrained")
+    heights = [1.7, 3.2, 4.0][:rows]
+    figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
     figure.suptitle(_title(recording))
-    grid = figure.add_gridspec(rows, FRAMES)
+    grid = figure.add_gridspec(rows, FRAMES, height_ratios=heights)
     onset = found[0] if found is not None else float(recording.t[0])
     shown = np.linspace(0.0, min(WINDOW_S, float(recording.t[-1]) - onset), FRAMES - 1)
     times = [max(onset - 0.05, float(recording.t[0])), *(onset + shown)]
-    top = max(int(recording.frames.max()), 1)
+    shown_frames = recording.frames[
+        np.searchsorted(recording.t, times).clip(0, len(recording.t) - 1)
+    ]
+    top = max(int(shown_frames.max()), 1)
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
     image = None
     for axis, t in zip(axes, times, strict=True):
         image = _frame(axis, recording, layout, float(t), onset, top)
+        axis.label_outer()
     if image is not None:
-        bar = figure.colorbar(image, ax=axes, shrink=0.8)
+        bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
         bar.set_label(f"{layout.force_unit} a taxel")
     series = None if found is None else found[1]
     third = FRAMES // 3
@@ -99,7 +104,7 @@ def _frame(
     if valid is not None and valid.ndim == 3:
         valid = valid[k]
     scale = layout.counts_per_newton or 1.0
-    shown = np.ma.masked_array(counts / scale, mask=None if valid is None else ~valid)
+    shown = np.ma.masked_array(counts / scale, mask=False if valid is None else ~valid)
     image = axis.imshow(shown, vmin=0.0, vmax=top / scale, cmap="viridis", aspect="equal")
     region = largest_region(counts, layout.threshold_counts, valid=valid, wraps=layout.wraps)
     title = f"{recording.t[k] - onset:+.2f} s"
@@ -110,7 +115,7 @@ def _frame(
         title += f", {region.area} taxels"
     axis.set_title(title, fontsize=10)
     axis.set_xlabel("column (around)")
-    axis.set_ylabel("row (elbow to wrist)")
+    axis.set_ylabel("row, from elbow")
     return image
 
 
@@ -186,8 +191,8 @@ def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> 
     t = recording.t - onset
     scale = layout.counts_per_newton or 1.0
     push = recording.frames.reshape(len(t), -1).sum(axis=1, dtype=np.int64) / scale
-    axis.plot(t, push, color="tab:red")
-    axis.set_ylabel(f"sum of all taxels, {layout.force_unit}", color="tab:red")
+    axis.plot(t, push, color="black", lw=2)
+    axis.set_ylabel(f"sum of all taxels, {layout.force_unit} (black)")
     axis.set_xlabel("seconds from onset")
     axis.set_title("push and joint angles")
     joints = recording.joints
@@ -196,4 +201,4 @@ def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> 
         for j in range(joints.shape[1]):
             other.plot(t, np.degrees(joints[:, j] - joints[0, j]), lw=1, label=f"j{j}")
         other.set_ylabel("joint angles from their start, degrees")
-        other.legend(fontsize=8, loc="upper left")
+        other.legend(fontsize=8, loc="lower left")

@@ -62,8 +62,10 @@ def parse(data: NDArray[np.uint8]) -> Parsed:
         (n, 12) values and which of them are whole.
     """
     values = data.view(">u2").astype(np.uint16)
-    driven = (values != 0xFFFF).any(axis=1, keepdims=True)
-    return values, (values != 0) & driven
+    whole = values != 0
+    if int(values.max(initial=0)) == 0xFFFF:
+        whole &= (values != 0xFFFF).any(axis=1, keepdims=True)
+    return values, whole
 
 
 class AD7147:

@@ -111,6 +111,7 @@ class Channel:
         self.mux, self.n = mux, n
         self.name = f"{mux.bus.name}, mux {mux.address:#04x} channel {n}"
         self.now, self.sleep = mux.bus.now, mux.bus.sleep
+        self._send = mux.bus.transfer
 
     def prepare(self, *messages: Message) -> Transfer:
         """Build a call's structures once."""
@@ -126,7 +127,7 @@ class Channel:
         if mux.selected != self.n:
             mux.select(self.n)
         try:
-            mux.bus.transfer(prepared)
+            self._send(prepared)
         except BusError:
             mux.forget()
             raise

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.calibration import save_calibration
 from edge.commands.source import add_skin, open_skin
 from edge.errors import InputError
 from edge.loop import Loop
 from edge.skin import Skin
-from edge.skinfile import Calibration, save_calibration
+from edge.skinfile import Calibration
 
 FRAMES = 1000
 """As the lab took for its bias."""
@@ -101,6 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.frames < LEAST_FRAMES:
         raise InputError(f"--frames: at least {LEAST_FRAMES}, not {arguments.frames}")
     with open_skin(arguments, calibrated=False) as opened:
+        print("edge-classify: let nothing touch the skin", file=sys.stderr)
         calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
         unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
     if seen < LEAST_FRAMES:

@@ -12,6 +12,7 @@ from typing import Any
 
 from edge import interest, joints, skinfile
 from edge.errors import InputError
+from edge.fake.clock import PacedClock, VirtualClock
 from edge.fake.player import Playback, play, skin_file
 from edge.live import require_joints
 from edge.loop import JointSource
@@ -28,6 +29,11 @@ def add_skin(parser: argparse.ArgumentParser, *, joint_options: bool = False) ->
         metavar="REC.npz",
         help="no hardware: play a recording onto fake chips, in virtual time; without --skin "
         "they are laid out as its frames call for",
+    )
+    parser.add_argument(
+        "--real-time",
+        action="store_true",
+        help="play it no faster than it was recorded (a terminal's view always does)",
     )
     parser.add_argument("--loop", action="store_true", help="play the recording over and over")
     parser.add_argument(
@@ -96,13 +102,14 @@ def open_skin(arguments: argparse.Namespace, *, calibrated: bool = True) -> Iter
                 file = skin_file(recording.layout)
             else:
                 file = skinfile.load(arguments.skin)
-            skin, playback = play(file, recording, loop=arguments.loop)
+            clock = PacedClock() if arguments.real_time else VirtualClock()
+            skin, playback = play(file, recording, loop=arguments.loop, clock=clock)
             stack.enter_context(skin)
             lasts = min(playback.ends, arguments.seconds)
             opened = Opened(skin, lasts, playback, f"fake {arguments.fake}")
         else:
-            if arguments.loop:
-                raise InputError("--loop needs --fake: only a recording can start again")
+            if arguments.loop or arguments.real_time:
+                raise InputError("--loop and --real-time need --fake, a recording to play")
             if arguments.skin is None:
                 raise InputError("give --skin skin.toml, or --fake REC.npz for no hardware")
             file = skinfile.load(arguments.skin)

@@ -60,6 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Read at the skin's rate, draw at the terminal's."""
     if not 0.1 <= arguments.rate <= 60.0:
         raise InputError(f"--rate must be 0.1 to 60 pictures a second, not {arguments.rate:g}")
+    arguments.real_time |= arguments.fake is not None and sys.stdout.isatty()
     model = None if arguments.model is None else Model(arguments.model)
     chain = None if model is None else model.info.chain
     with stop_on(signal.SIGINT) as stop, open_skin(arguments) as opened:

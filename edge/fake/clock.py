@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 
 class Hand:
     """One bus's place in time; buses run side by side, so each has its own."""
@@ -47,3 +49,18 @@ class VirtualClock:
     def sleep_until(self, t: float) -> None:
         """Let all hands meet at `t`, or now where it has passed."""
         self.start = max(self.now(), t)
+
+
+class PacedClock(VirtualClock):
+    """Virtual time that runs no faster than real time, for a person to watch."""
+
+    def __init__(self, start: float = 0.0) -> None:
+        super().__init__(start)
+        self._ahead = time.monotonic() - start
+
+    def sleep_until(self, t: float) -> None:
+        """Let all hands meet at `t`, and wait until as much real time has passed."""
+        super().sleep_until(t)
+        left = t + self._ahead - time.monotonic()
+        if left > 0.0:
+            time.sleep(left)

@@ -231,7 +231,13 @@ def still(file: SkinFile) -> Skin:
     return fake_skin(file, lambda t: silence)
 
 
-def play(file: SkinFile, recording: Recording, *, loop: bool = False) -> tuple[Skin, Playback]:
+def play(
+    file: SkinFile,
+    recording: Recording,
+    *,
+    loop: bool = False,
+    clock: VirtualClock | None = None,
+) -> tuple[Skin, Playback]:
     """A fake skin that feels a recording.
 
     Raises:
@@ -244,7 +250,7 @@ def play(file: SkinFile, recording: Recording, *, loop: bool = False) -> tuple[S
             f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
         )
     playback = Playback(recording, loop=loop)
-    skin = fake_skin(file, playback)
+    skin = fake_skin(file, playback, clock=clock)
     playback.start = skin.clock.now()
     return skin, playback
 

@@ -30,21 +30,21 @@ def test_the_whole_range_fits():
 
 
 def test_it_follows_by_no_more_than_its_rate():
-    baseline = Baseline([1000, 1000, 1000], counts_per_frame=0.25, limit=500)
+    baseline = Baseline([1000, 1000, 1000], step_counts=0.25, limit=500)
     for _ in range(100):
         baseline.follow(raw(1400, 600, 1000), EVERY)
     assert baseline.counts.tolist() == [1025, 975, 1000]
 
 
 def test_it_stops_at_its_limit():
-    baseline = Baseline([1000, 1000, 1000], counts_per_frame=4.0, limit=50)
+    baseline = Baseline([1000, 1000, 1000], step_counts=4.0, limit=50)
     for _ in range(1000):
         baseline.follow(raw(3000, 0, 1010), EVERY)
     assert baseline.counts.tolist() == [1050, 950, 1010]
 
 
 def test_a_taxel_that_is_not_fresh_is_left_alone():
-    baseline = Baseline([1000, 1000, 1000], counts_per_frame=1.0, limit=50)
+    baseline = Baseline([1000, 1000, 1000], step_counts=1.0, limit=50)
     for _ in range(64):
         baseline.follow(raw(1200, 1200, 1200), np.array([True, False, True]))
     assert baseline.counts.tolist() == [1050, 1000, 1050]
@@ -52,7 +52,7 @@ def test_a_taxel_that_is_not_fresh_is_left_alone():
 
 def test_drift_slower_than_a_count_a_frame_is_followed_exactly():
     """0.01 counts a frame over 10,000 frames: 100 counts, none lost to rounding."""
-    baseline = Baseline([1000] * 3, counts_per_frame=0.2, limit=500)
+    baseline = Baseline([1000] * 3, step_counts=0.2, limit=500)
     worst = 0
     for i in range(10_000):
         baseline.follow(raw(*[1000 + i // 100] * 3), EVERY)
@@ -62,7 +62,7 @@ def test_drift_slower_than_a_count_a_frame_is_followed_exactly():
 
 def test_noise_does_not_carry_it_away():
     draw = np.random.default_rng(7)
-    baseline = Baseline([1000] * 400, counts_per_frame=0.2, limit=500)
+    baseline = Baseline([1000] * 400, step_counts=0.2, limit=500)
     for _ in range(2000):
         noisy = np.rint(1000 + 10 * draw.standard_normal(400)).astype(np.uint16)
         baseline.follow(noisy, np.ones(400, dtype=bool))

@@ -2,11 +2,19 @@
 
 import errno
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from bench.faults import Fault, positions, run, scripts
 from edge import skinfile
+from edge.commands.run import chip_event
+from edge.fake.player import Playback, fake_skin
+from edge.live import Watcher
+from edge.loop import Loop
+from edge.model import Model
+from edge.recording import load
 
 ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
 UNKNOWABLE = [name for name in ROWS if name.endswith("*")]
@@ -69,6 +77,44 @@ def test_the_same_seed_gives_the_same_outcome():
     first, again, other = (run("", file, faults, seed=s, seconds=1.2) for s in (3, 3, 4))
     assert first == again or (math.isnan(first.recovery_s) and first.met == again.met)
     assert first.met != other.met
+
+
+def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):
+    """A chip far from the contact does not answer for half a second of it."""
+    trial = load(recordings / "hard_0.npz")
+    model = Model(exported / "model.onnx")
+    file = replace(skinfile.load(skinfile.shipped("cody")), layout=trial.layout)
+    lost = [Fault(bus=file.buses[0].device, channel=0, address=0x2C, during=(0.5, 1.0))]
+    for faults, flagged in (((), False), (lost, True)):
+        playback = Playback(trial)
+        with fake_skin(file, playback, faults=faults) as skin:
+            watcher = Watcher(model, skin.layout)
+            loop = Loop(skin, joints=playback, lasts_s=playback.ends)
+            events = [event for frame in loop.frames() for event in watcher.push(frame)]
+            changed = [status.state for status in skin.changes()]
+        decisions = [e for e in events if e["event"] == "decision"]
+        assert ["missing_taxels" in e["flags"] for e in decisions] == [flagged] * 2
+        assert decisions[0]["label"] == trial.labels["category"]
+        assert changed == []  # it came back before anyone asked
+
+
+def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
+    cody = skinfile.load(skinfile.shipped("cody"))
+    quiet = np.zeros((16, 24), dtype=np.uint16)
+    lost = Fault(bus=cody.buses[1].device, channel=1, address=0x2E, during=(0.1, 0.2))
+    heard = []
+    with fake_skin(cody, lambda t: quiet, faults=[lost]) as skin:
+        for frame in Loop(skin, lasts_s=0.5).frames():
+            heard += [chip_event(status, round(frame.t, 3)) for status in skin.changes()]
+    assert [(e["t"], e["state"], e["place"]) for e in heard] == [
+        (0.1, "down", "mux 0x70 channel 1 address 0x2e"),
+        (heard[1]["t"], "running", "mux 0x70 channel 1 address 0x2e"),
+    ]
+    assert heard[0]["error"].endswith(
+        "does not answer; check its power, wiring and address (EREMOTEIO)"
+    )
+    assert "error" not in heard[1]
+    assert 0.2 < heard[1]["t"] <= 0.3
 
 
 def test_a_chip_that_never_comes_back_stays_out_and_costs_nothing():

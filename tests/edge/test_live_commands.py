@@ -216,7 +216,8 @@ def test_run_takes_joints_from_stdin(exported, recordings):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--loop"], "--loop needs --fake"),
+        (["--loop"], "--loop and --real-time need --fake"),
+        (["--real-time", "--skin", "PAD"], "--loop and --real-time need --fake"),
         ([], "give --skin skin.toml, or --fake REC.npz for no hardware"),
         (["--fake", "no.npz"], "no.npz: no such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),

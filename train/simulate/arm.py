@@ -76,9 +76,7 @@ class Kinematics:
         return Pose(origin, rotation, axes, origins)
 
 
-def _fixed(
-    xyz: tuple[float, ...], rpy: tuple[float, ...]
-) -> tuple[Array | None, Array | None]:
+def _fixed(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[Array | None, Array | None]:
     shift = np.array(xyz) if any(xyz) else None
     if not any(rpy):
         return shift, None
@@ -152,7 +150,7 @@ def dot(a: Array, b: Array) -> Array:
     total = a[0] * b[0]
     for i in range(1, len(a)):
         total = total + a[i] * b[i]
-    return total
+    return np.asarray(total)
 
 
 def cross(a: Array, b: Array) -> Array:

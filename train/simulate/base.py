@@ -151,7 +151,7 @@ def covered(offset: Array, state: State) -> Array:
     """(L, n) which part of each row, `offset` metres from the face's middle, the face covers."""
     pitch = state["row_pitch"]
     half = 0.5 * np.maximum(state["values"]["width_m"], pitch)
-    return np.clip((half + 0.5 * pitch - np.abs(offset)) / pitch, 0.0, 1.0)
+    return np.asarray(np.clip((half + 0.5 * pitch - np.abs(offset)) / pitch, 0.0, 1.0))
 
 
 def curve_gap(offset: Array, state: State) -> Array:

@@ -70,7 +70,7 @@ def touching(gaps: Array, deepest: Array) -> slice:
 
     The others add exact zeros, so leaving them out changes no bit.
     """
-    touched = (gaps < deepest).any(axis=1).nonzero()[0]
+    touched = np.nonzero(np.any(gaps < deepest, axis=1))[0]
     return slice(int(touched[0]), int(touched[-1]) + 1) if touched.size else slice(0, 0)
 
 

@@ -12,7 +12,7 @@ from train.simulate import streams
 from train.simulate.arm import Array, Kinematics
 from train.simulate.calls import callers
 from train.simulate.contact import State
-from train.simulate.fields import OBJECT, SPREAD, STIFFNESSES
+from train.simulate.fields import SPREAD, STIFFNESSES
 from train.simulate.film import Film
 from train.simulate.plan import Plan, make_plan
 from train.simulate.scene import Scene, SceneObject
@@ -79,7 +79,10 @@ class Batch:
 
 
 def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
-    """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself."""
+    """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
+
+    Where an object has no such value (a fixed one its mass), it is NaN and nothing reads it.
+    """
     groups: dict[str, list[int]] = {}
     for i, trial in enumerate(trials):
         groups.setdefault(trial.key, []).append(i)
@@ -109,10 +112,10 @@ def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
                 drawn = drawn * np.exp(spread("mass"))
             elif name in ("taxel_n_m", "cover_n_m"):
                 drawn = drawn * np.exp(spread("cover"))
-            out.setdefault(name, np.empty(len(trials)))[where] = drawn
+            out.setdefault(name, np.full(len(trials), np.nan))[where] = drawn
         for name in SPREAD:
             if name in ("place_m", "yaw_deg", "roll_deg"):
-                out.setdefault(name, np.empty(len(trials)))[where] = spread(name)
+                out.setdefault(name, np.full(len(trials), np.nan))[where] = spread(name)
     return out
 
 

@@ -47,7 +47,7 @@ class Clock:
 def timed_plan(scene: Scene, effects: tuple[str, ...], clock: Clock) -> Plan:
     """A plan whose functions report their time under the effect that they belong to."""
     plan = make_plan(scene, effects, around=clock.around)
-    stages = {
+    stages: dict[str, Any] = {
         stage: tuple(clock.around(plan.owners[f], f) for f in getattr(plan, stage))
         for stage in STAGES
     }
@@ -89,9 +89,7 @@ def explain(scene: Scene) -> str:
             why = sorted({callers(scene, t.thing, t.condition)[effect] for t in first.values()})
             lines.append(f"  {effect:<16}{spent[effect]:>9.0f}  {', '.join(why)}")
         plan = make_plan(scene, kind.effects)
-        lines.append(
-            "  functions: " + ", ".join(f"{len(getattr(plan, s))} {s}" for s in STAGES)
-        )
+        lines.append("  functions: " + ", ".join(f"{len(getattr(plan, s))} {s}" for s in STAGES))
     left = [name for name in EFFECTS if name not in seen]
     lines += ["", "not called for, not loaded: " + (", ".join(left) or "none")]
     return "\n".join(lines)

@@ -113,9 +113,7 @@ middle of the ranges in the notes on physics, derived there)."""
 ELASTIC = (FOAM, PILLOW)
 EFFECTS: dict[str, EffectInfo] = {
     # In the order in which they take their place in the step and on the frames.
-    "foundation": EffectInfo(
-        "elastic foundation under each taxel", "contact", 1, families=ELASTIC
-    ),
+    "foundation": EffectInfo("elastic foundation under each taxel", "contact", 1, families=ELASTIC),
     "cover": EffectInfo(
         "a sleeve over the skin, in series and spreading the load",
         "contact",
@@ -134,9 +132,7 @@ EFFECTS: dict[str, EffectInfo] = {
         2,
         families=(RIGID, FOAM, PILLOW, BUBBLES),
     ),
-    "relaxation": EffectInfo(
-        "standard linear solid", "contact", 2, families=ELASTIC
-    ),
+    "relaxation": EffectInfo("standard linear solid", "contact", 2, families=ELASTIC),
     "impact": EffectInfo(
         "the arm's inertia when it meets the object, in closed form",
         "contact",

@@ -40,12 +40,12 @@ class Film:
             np.rint(counts, out=counts)
         np.minimum(counts, FULL, out=counts)
         last = first + counts.shape[1]
-        np.copyto(self.window[k, first:last, state["lines"]], counts.transpose(1, 0, 2), casting="unsafe")
+        np.copyto(
+            self.window[k, first:last, state["lines"]], counts.transpose(1, 0, 2), casting="unsafe"
+        )
         self.used = [min(self.used[0], first), max(self.used[1], last)]
 
-    def develop(
-        self, state: State, plan: Plan
-    ) -> tuple[NDArray[np.uint16], Any, Any, Any]:
+    def develop(self, state: State, plan: Plan) -> tuple[NDArray[np.uint16], Any, Any, Any]:
         """Whole frames (n, frames, rows, cols), as the sensor gives them; times, frames kept
         and valid taxels where an effect says something of them."""
         skin = state["scene"].skin

@@ -12,7 +12,6 @@ from importlib import import_module
 from typing import Any
 
 from train.simulate import base
-from train.simulate.contact import State
 from train.simulate.scene import Scene
 
 Function = Callable[[Any], None]
@@ -89,9 +88,7 @@ def make_plan(
         build.owner = name
         import_module(f"train.simulate.effects.{name}").add(build)
     stages = {
-        stage: tuple(
-            f for s, _, f in sorted(build.entries, key=lambda e: e[1]) if s == stage
-        )
+        stage: tuple(f for s, _, f in sorted(build.entries, key=lambda e: e[1]) if s == stage)
         for stage in STAGES
     }
     return Plan(effects=effects, solve=build.solve, owners=build.owners, **stages)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str,
                 "step_s": step_s,
                 "family": trial.thing.family,
                 "effects": list(kind_of(scene, trial.thing, trial.condition).effects),
-                "values": {key: float(value[i]) for key, value in values.items()},
+                "values": {k: float(v[i]) for k, v in values.items() if np.isfinite(v[i])},
             },
         }
         yield (
@@ -145,6 +146,7 @@ def write(
     except OSError as error:
         raise InputError(f"{target}: cannot be made: {error.strerror or error}") from None
     work = parts(scene, batch)
+    done: Iterable[list[Named]]
     if backend == "dask":
         done = _on_dask(scene, work, address)
     elif backend == "local":
@@ -179,11 +181,13 @@ def _on_dask(
     scene: Scene, work: list[tuple[tuple[Trial, ...], float]], address: str | None
 ) -> Iterator[list[Named]]:
     try:
-        from distributed import Client, as_completed
+        distributed: Any = import_module("distributed")
     except ImportError:
-        raise InputError("--backend dask needs Dask: pip install 'edge-classify[cluster]'") from None
+        raise InputError(
+            "--backend dask needs Dask: pip install 'edge-classify[cluster]'"
+        ) from None
     try:
-        client = Client(address, timeout="10s")
+        client = distributed.Client(address, timeout="10s")
     except (OSError, ValueError) as error:
         raise InputError(f"--address {address}: no Dask scheduler answers there: {error}") from None
     with closing(client):
@@ -192,7 +196,7 @@ def _on_dask(
             client.submit(simulate_part, spread, trials, step_s, None, pure=False)
             for trials, step_s in work
         ]
-        for future in as_completed(futures):
+        for future in distributed.as_completed(futures):
             yield future.result()
             future.release()
 

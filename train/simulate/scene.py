@@ -256,9 +256,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     return scene
 
 
-def _fields(
-    read: _Reader, value: object, key: str, known: dict[str, Field]
-) -> dict[str, float]:
+def _fields(read: _Reader, value: object, key: str, known: dict[str, Field]) -> dict[str, float]:
     table = read.table(value, key)
     read.known(table, key, tuple(known))
     return {

@@ -54,4 +54,4 @@ def noise(generator: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.
     than `standard_normal`, and finer than any taxel's reading."""
     count = int(np.prod(shape))
     words = np.frombuffer(generator.bytes(2 * count), dtype="<u2")
-    return _quantiles()[words].reshape(shape)
+    return np.asarray(_quantiles()[words].reshape(shape))

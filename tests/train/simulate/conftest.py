@@ -49,13 +49,14 @@ class Rig:
         given = [np.asarray(v, dtype=float) for v in values.values()]
         slopes, intercepts = np.asarray(slopes, float), np.asarray(intercepts, float)
         n = max([v.size for v in (*given, np.asarray(h), slopes[0])])
-        plan = Build(from_dict({"object": [{"name": "x", "family": "rigid", "conditions": ["fixed"]}]}), effects)
+        plan = Build(
+            from_dict({"object": [{"name": "x", "family": "rigid", "conditions": ["fixed"]}]}),
+            effects,
+        )
         base.add(plan)
         for effect in effects:
             {"sliding": sliding, "relaxation": relaxation}[effect].add(plan)
-        self.steps = [
-            f for s, _, f in sorted(plan.entries, key=lambda e: e[1]) if s == "step"
-        ]
+        self.steps = [f for s, _, f in sorted(plan.entries, key=lambda e: e[1]) if s == "step"]
         h = np.broadcast_to(np.asarray(h, float), (n,))
         k, d = np.full((1, 1), arm_k), np.full((1, 1), arm_d)
         self.state = {

@@ -95,7 +95,11 @@ def test_3_the_state_holds_the_called_effects_keys_alone():
         "tilt": {"guess", "settled", "lever"},
         "impact": {"touched", "impact_decay", "impact_omega", "impact_height", "impact_wave"},
         "relaxation": {
-            "relax_decay", "relax_rise", "relax_gain", "relax_load", "relax_lever",
+            "relax_decay",
+            "relax_rise",
+            "relax_gain",
+            "relax_load",
+            "relax_lever",
         },
         "dead_taxels": {"valid"},
         "jitter": {"times"},
@@ -107,7 +111,12 @@ def test_3_the_state_holds_the_called_effects_keys_alone():
     }
     assert not keys & set.union(*own.values())
     one = scene(
-        "tilt", "impact", "noise", "dead_taxels", "jitter", "dropped_frames",
+        "tilt",
+        "impact",
+        "noise",
+        "dead_taxels",
+        "jitter",
+        "dropped_frames",
         objects=[*everything()],
     )
     for i, kind in enumerate(kinds(one)):
@@ -156,10 +165,17 @@ def test_4_streams_go_by_name_not_by_place():
 def test_5_the_number_of_functions_is_exact():
     bare = make_plan(scene(), ())
     assert {s: len(getattr(bare, s)) for s in STAGES} == {
-        "setup": 5, "frame": 1, "step": 3, "sample": 2, "clock": 0, "sensor": 0,
+        "setup": 5,
+        "frame": 1,
+        "step": 3,
+        "sample": 2,
+        "clock": 0,
+        "sensor": 0,
     }
-    one = scene(*[n for n in EFFECTS if n not in ("foundation", "relaxation", "pop", "stems")],
-                objects=everything())
+    one = scene(
+        *[n for n in EFFECTS if n not in ("foundation", "relaxation", "pop", "stems")],
+        objects=everything(),
+    )
     seen = set()
     for kind in kinds(one):
         plan = make_plan(one, kind.effects)
@@ -212,7 +228,10 @@ def test_leaving_out_what_is_implied():
 def test_the_plan_is_flat():
     plan = make_plan(scene("tilt"), ("tilt", "sliding"))
     state = begin(
-        scene("tilt"), plan, t := tuple(list(kinds(scene("tilt")).values())[1]), 0.01,
+        scene("tilt"),
+        plan,
+        t := tuple(list(kinds(scene("tilt")).values())[1]),
+        0.01,
         values_of(scene("tilt"), t),
     )
     assert all(callable(f) for stage in STAGES for f in getattr(plan, stage))

@@ -56,8 +56,12 @@ class TestArm:
                 "joint": [
                     {"name": "a", "axis": [1, 2, 3], "origin_xyz": [0.1, 0.2, 0.3]},
                     {"name": "f", "type": "fixed", "axis": [1, 0, 0], "origin_rpy": [0.3, 0.2, 1]},
-                    {"name": "b", "axis": [0, -1, 0.5], "origin_rpy": [1, 0, 0.4],
-                     "translate": [0, 0, 0.2]},
+                    {
+                        "name": "b",
+                        "axis": [0, -1, 0.5],
+                        "origin_rpy": [1, 0, 0.4],
+                        "translate": [0, 0, 0.2],
+                    },
                 ]
             }
         )
@@ -117,8 +121,14 @@ class TestSliding:
 
     def rig(self, tools, h, speed=0.15, **other):
         return tools.Rig(
-            h=h, speed=speed, slopes=[[1e7]], effects=("sliding",), mass_kg=self.MASS,
-            friction_static=self.MU_S, friction_kinetic=self.MU_K, **other,
+            h=h,
+            speed=speed,
+            slopes=[[1e7]],
+            effects=("sliding",),
+            mass_kg=self.MASS,
+            friction_static=self.MU_S,
+            friction_kinetic=self.MU_K,
+            **other,
         )
 
     def test_it_sticks_for_mu_n_over_k_v(self, tools):
@@ -147,7 +157,10 @@ class TestSliding:
     @pytest.mark.parametrize(("mass", "seconds"), [(1.0, 0.2), (5.0, 1.0)])
     def test_the_time_floor_of_looking_movable(self, mass, seconds):
         thing = one_object(
-            conditions=["movable"], mass_kg=mass, friction_static=0.4, friction_kinetic=0.35,
+            conditions=["movable"],
+            mass_kg=mass,
+            friction_static=0.4,
+            friction_kinetic=0.35,
             width_m=0.05,
         )
         batch = run(make(thing))
@@ -165,8 +178,13 @@ class TestSliding:
         height = 0.4
         for mu, tips in ((0.30, False), (0.60, True)):
             thing = one_object(
-                conditions=["movable"], mass_kg=1.0, friction_static=mu, friction_kinetic=mu * 0.9,
-                base_m=0.36, height_m=height, width_m=0.05,
+                conditions=["movable"],
+                mass_kg=1.0,
+                friction_static=mu,
+                friction_kinetic=mu * 0.9,
+                base_m=0.36,
+                height_m=height,
+                width_m=0.05,
             )
             batch = run(make(thing))
             assert bool(batch.state["tips"][0]) is tips
@@ -181,8 +199,14 @@ class TestRelaxation:
     def test_ramp_and_hold_of_the_standard_linear_solid(self, tools, tau):
         k, ratio, rate, up = 500.0, 1.2, 0.02, 0.5
         rig = tools.Rig(
-            h=0.01, arm_k=1e12, speed=rate, travel_s=up, slopes=[[k]], effects=("relaxation",),
-            relax_ratio=ratio, relax_s=tau,
+            h=0.01,
+            arm_k=1e12,
+            speed=rate,
+            travel_s=up,
+            slopes=[[k]],
+            effects=("relaxation",),
+            relax_ratio=ratio,
+            relax_s=tau,
         )
         trace = rig.run(150)
         t = trace.t[:, 0]
@@ -196,8 +220,13 @@ class TestRelaxation:
         gaps[0] = 0.0
         slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
         rig = tools.Rig(
-            h=0.01, arm_k=1e12, speed=0.0, slopes=slopes, intercepts=intercepts,
-            effects=("relaxation",), relax_ratio=rng.uniform(0.2, 2.0, 40),
+            h=0.01,
+            arm_k=1e12,
+            speed=0.0,
+            slopes=slopes,
+            intercepts=intercepts,
+            effects=("relaxation",),
+            relax_ratio=rng.uniform(0.2, 2.0, 40),
             relax_s=rng.uniform(0.05, 2.0, 40),
         )
         # Presses and lets go at many speeds, always in small steps.
@@ -228,15 +257,15 @@ class TestBed:
         angles = (np.arange(columns) + 0.5)[:, None] * (2.0 * math.pi / columns)
         away = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
         state = {
-            "scene": SimpleNamespace(), "row_pitch": row_pitch, "weight": np.ones((rows, 1)),
+            "scene": SimpleNamespace(),
+            "row_pitch": row_pitch,
+            "weight": np.ones((rows, 1)),
             "values": {"radius_m": np.array([curve or 1e6])},
             "stiffness": np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0),
             "gaps": RADIUS * (1.0 - np.cos(away)),
         }
         depths = depth - base.curve_gap(z, state)
-        loads = contact.spring_loads(
-            depths, state["gaps"], state["stiffness"], state["weight"]
-        )
+        loads = contact.spring_loads(depths, state["gaps"], state["stiffness"], state["weight"])
         return loads.sum(), (loads > 0.0).sum() * pitch * row_pitch, rows * row_pitch
 
     @staticmethod
@@ -305,12 +334,14 @@ class TestImpact:
         omega = math.sqrt(k / mass)
         want = solve_ivp(
             lambda _, y: [y[1], -2 * zeta * omega * y[1] - omega**2 * y[0]],
-            (0.0, 0.3), [0.0, v], rtol=1e-10, atol=1e-13, dense_output=True,
+            (0.0, 0.3),
+            [0.0, v],
+            rtol=1e-10,
+            atol=1e-13,
+            dense_output=True,
         )
         held = (t > 0.0) & (batch.force[0] > 0.0) & (t < 0.29)
-        np.testing.assert_allclose(
-            pulse[held], k * want.sol(t[held])[0], atol=1e-6 * k * v / omega
-        )
+        np.testing.assert_allclose(pulse[held], k * want.sol(t[held])[0], atol=1e-6 * k * v / omega)
 
     def test_its_peak_does_not_depend_on_the_step(self):
         def peak(step_s):
@@ -380,7 +411,9 @@ class TestConvergence:
         for tolerance in (0.05, 0.004):
             scene.trials["tolerance"] = tolerance
             found = measure(scene, tuple(next(iter(kinds(scene).values()))))
-            within = [s for s, e in zip(found.steps_s, found.errors, strict=False) if e <= tolerance]
+            within = [
+                s for s, e in zip(found.steps_s, found.errors, strict=False) if e <= tolerance
+            ]
             assert found.step_s == within[0]
             chosen.append(found.step_s)
         assert chosen[0] > chosen[1]

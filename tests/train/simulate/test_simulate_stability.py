@@ -93,7 +93,11 @@ class TestGrid:
     def test_the_judge_rejects_a_finite_trace_that_reset_itself(self, tools):
         # A general engine's soft body went NaN, reset itself and ended finite with zero force.
         rig = tools.Rig(
-            h=0.01, slopes=[[1e3]], effects=("sliding",), mass_kg=5.0, friction_static=MU_S,
+            h=0.01,
+            slopes=[[1e3]],
+            effects=("sliding",),
+            mass_kg=5.0,
+            friction_static=MU_S,
             friction_kinetic=MU_K,
         )
         trace = rig.run(60)
@@ -112,8 +116,13 @@ class TestGrid:
         slopes, intercepts = contact.sort_bed(gaps, k)
         mass = 10.0 ** rng.uniform(-3, 1, n)
         rig = tools.Rig(
-            h=10.0 ** rng.uniform(-3, -1, n), slopes=slopes, intercepts=intercepts,
-            effects=("sliding",), mass_kg=mass, friction_static=MU_S, friction_kinetic=MU_K,
+            h=10.0 ** rng.uniform(-3, -1, n),
+            slopes=slopes,
+            intercepts=intercepts,
+            effects=("sliding",),
+            mass_kg=mass,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
         )
         trace = rig.run(100)
 
@@ -139,14 +148,23 @@ class TestTraps:
         assert usable <= 2
         k, m = (g.ravel() for g in np.meshgrid(springs, masses, indexing="ij"))
         rig = tools.Rig(
-            h=0.01, slopes=k[None], intercepts=np.zeros((1, 16)), effects=("sliding",),
-            mass_kg=m, friction_static=MU_S, friction_kinetic=MU_K,
+            h=0.01,
+            slopes=k[None],
+            intercepts=np.zeros((1, 16)),
+            effects=("sliding",),
+            mass_kg=m,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
         )
         trace = rig.run(120)
         ours = [
             not judge(
                 type(trace)(**{key: v[:, i : i + 1] for key, v in vars(trace).items()}),
-                k[i], m[i], 0.01, MU_S, MU_K,
+                k[i],
+                m[i],
+                0.01,
+                MU_S,
+                MU_K,
             )
             for i in range(16)
         ]
@@ -158,8 +176,13 @@ class TestTraps:
             creep = regularised_creep(load, MU_S * mass * GRAVITY, slip_speed, 1.2)
             assert 0.0005 < creep < 0.0125
         rig = tools.Rig(
-            h=0.01, speed=load * (1 / ARM_K + 1e-4) / 0.3, travel_s=0.3, effects=("sliding",),
-            mass_kg=mass, friction_static=MU_S, friction_kinetic=MU_K,
+            h=0.01,
+            speed=load * (1 / ARM_K + 1e-4) / 0.3,
+            travel_s=0.3,
+            effects=("sliding",),
+            mass_kg=mass,
+            friction_static=MU_S,
+            friction_kinetic=MU_K,
         )
         trace = rig.run(150)
         assert trace.force[-1, 0] == pytest.approx(load, rel=1e-9)
@@ -184,8 +207,13 @@ class TestTraps:
                 assert not abs(z) < 1e6 * exact
             # A pusher so stiff that it sets the depth: the force is then elastic + z, exactly.
             rig = tools.Rig(
-                h=h, arm_k=1e18, speed=1e-4 / h, slopes=[[k]], effects=("relaxation",),
-                relax_ratio=ratio, relax_s=tau,
+                h=h,
+                arm_k=1e18,
+                speed=1e-4 / h,
+                slopes=[[k]],
+                effects=("relaxation",),
+                relax_ratio=ratio,
+                relax_s=tau,
             )
             trace = rig.run(200)
             want = k * 1e-4 * 200 + exact
@@ -226,8 +254,13 @@ class TestTraps:
         first = {}
         for h in (0.01, 0.001):
             rig = tools.Rig(
-                h=h, speed=speed, slopes=[[1e7]], effects=("sliding",), mass_kg=mass,
-                friction_static=mu_s, friction_kinetic=mu_k,
+                h=h,
+                speed=speed,
+                slopes=[[1e7]],
+                effects=("sliding",),
+                mass_kg=mass,
+                friction_static=mu_s,
+                friction_kinetic=mu_k,
             )
             trace = rig.run(round(6.0 / h))
             moving = trace.speed[:, 0] > 0.0

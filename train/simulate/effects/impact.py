@@ -13,6 +13,7 @@ from train.simulate import base
 from train.simulate.contact import State
 from train.simulate.plan import Build
 
+
 def add(build: Build) -> None:
     """Time the touch, and add the rebound to what the skin bears."""
     settings = build.settings("impact")
@@ -35,6 +36,7 @@ def add(build: Build) -> None:
     build.put("step", base.SETTLE - 5, touch)
     build.put("sample", base.BEAR + 10, rebound)
 
+
 def rebound_stiffness(state: State, energy: np.ndarray) -> np.ndarray:
     """K (n,) of the linear spring that takes up `energy` (n,) at the depth at which the bed does.
 
@@ -54,6 +56,7 @@ def rebound_stiffness(state: State, energy: np.ndarray) -> np.ndarray:
         low = np.where(enough, low, middle)
     return np.asarray(2.0 * energy / (high * high))
 
+
 def touch(state: State) -> None:
     """The first touch's time: when the free arm met the first spring, within the step."""
     first = (state["loads"][0] > 0.0) & np.isinf(state["touched"])
@@ -61,6 +64,7 @@ def touch(state: State) -> None:
         depth = state["y"][0] - state["intercepts"][0] / state["slopes"][0]
         since = np.clip(depth / state["approach"], 0.0, state["h"])
         state["touched"] = np.where(first, state["t"] - since, state["touched"])
+
 
 def rebound(state: State) -> None:
     """Add the rebound; the skin can be pressed, never pulled."""

@@ -13,10 +13,10 @@ from train.simulate import base
 from train.simulate.contact import (
     Array,
     State,
-    total,
     share_out,
     sort_bed,
     spring_loads,
+    total,
     touching,
 )
 from train.simulate.plan import Build
@@ -68,9 +68,7 @@ def order(state: State) -> None:
     n = state["n"]
     stiffness = state["weight"][:, None] * (state["stiffness"][None] * state["alive"])
     gaps = state["line_gap"][:, None] + np.broadcast_to(state["gaps"], stiffness.shape)
-    state["slopes"], state["intercepts"] = sort_bed(
-        gaps.reshape(-1, n), stiffness.reshape(-1, n)
-    )
+    state["slopes"], state["intercepts"] = sort_bed(gaps.reshape(-1, n), stiffness.reshape(-1, n))
 
 
 def line_forces(state: State, depths: Array) -> tuple[Array, Array]:

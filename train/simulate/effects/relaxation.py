@@ -30,8 +30,7 @@ def add(build: Build) -> None:
         total = gain * loads[0] + before
         holds = (loads[0] > 0.0) & (total > 0.0)
         return tuple(
-            np.where(holds, gain * load + old, 0.0)
-            for load, old in zip(loads, there, strict=True)
+            np.where(holds, gain * load + old, 0.0) for load, old in zip(loads, there, strict=True)
         )
 
     build.wrap(relaxing)

@@ -54,9 +54,9 @@ def stand(state: State) -> None:
     values = state["values"]
     stiffness = state["weight"] * state["stiffness"]
     state["stem_order"] = np.argsort(state["line_gap"], axis=0, kind="stable")
-    state["damping"] = (
-        2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])
-    ) * (state["weight"] > 0.0)
+    state["damping"] = (2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])) * (
+        state["weight"] > 0.0
+    )
     law(state)
     state["slopes"], state["intercepts"] = state["stem_slopes"], state["stem_intercepts"]
 

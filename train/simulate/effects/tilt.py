@@ -35,7 +35,10 @@ def add(build: Build) -> None:
 
 def upright(state: State) -> None:
     """No load yet."""
-    state["loads"] = state["guess"] = state["settled"] = (np.zeros(state["n"]), np.zeros(state["n"]))
+    state["loads"] = state["guess"] = state["settled"] = (
+        np.zeros(state["n"]),
+        np.zeros(state["n"]),
+    )
 
 
 def pivot(state: State) -> None:
@@ -124,7 +127,7 @@ def residual(y: Coordinates, free: Coordinates, c: Coordinates, f: Coordinates) 
 def solve(state: State, free: Coordinates, c: Coordinates) -> Coordinates:
     """The loads (F, M) at which arm and bed agree."""
     force, moment = state["guess"]
-    y = (
+    y: Coordinates = (
         free[0] - (c[0] * force + c[1] * moment),
         free[1] - (c[1] * force + c[2] * moment),
     )
@@ -168,7 +171,7 @@ def guarded(
     turned uphill by more than half of what it began with is cut back along its secant.
     """
     where = np.flatnonzero(open_)
-    part = {
+    part: State = {
         key: state[key][..., where] if state[key].shape[-1] > 1 else state[key]
         for key in ("lever", "line_gap", "gaps", "stiffness", "weight", "alive")
         if key in state

@@ -1,0 +1,156 @@
+"""What software adds to the wire, bits against the least, and the period that the loop keeps.
+
+An unmodified smbus2 runs over the C stand-in for /dev/i2c-N of the tests, whose calls return at
+once: what is left is software. `python -m bench.bench_bus --seconds 600` measures the loop's
+period over a longer run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+LEAST_BITS = 8 * 20 + 32 * 255
+"""A selection for each of 8 mux channels, a pointer write and a read for each of 32 AD7147."""
+WIRE_S = (12 * 255 + 3 * 20) / 400_000
+"""The least time of a frame over three buses: 12 chips and 3 channels on the longest."""
+
+
+def _shim():
+    spec = importlib.util.spec_from_file_location("shim", ROOT / "tests/edge/shim/build.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def inside(*arguments: str) -> dict:
+    """What `measure` or `keep_period` gives, in a process of its own over the stand-in."""
+    shim = _shim()
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench.bench_bus", "--inside", *arguments],
+            env=shim.environment(shim.build(Path(folder))),
+            cwd=ROOT,
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+    return json.loads(done.stdout)
+
+
+def _least_us(action, rounds=60, calls=20) -> float:
+    """Processor time of all threads in the best round: other programs' share does not count."""
+    times = []
+    for _ in range(rounds):
+        began = time.process_time()
+        for _ in range(calls):
+            action()
+        times.append((time.process_time() - began) / calls)
+    return 1e6 * min(times)
+
+
+def _skin():
+    from edge import skinfile
+    from edge.fake.player import calibrated
+    from edge.skin import Skin
+
+    return Skin.open(calibrated(skinfile.load(skinfile.shipped("cody"))))
+
+
+def measure() -> dict:
+    """Microseconds of one full frame over three buses, by part."""
+    from smbus2 import SMBus, i2c_msg
+
+    with _skin() as skin:
+        skin.read()
+
+        def buses_in_turn():
+            for reader in skin.readers:
+                reader.read(reader.slots)
+
+        def put_together():
+            skin._assemble(skin.clock.now())
+
+        out = {
+            "buses": _least_us(buses_in_turn),
+            "frame": _least_us(put_together),
+            "threads": _least_us(skin.read),
+        }
+        buses = [SMBus(spec.device) for spec in skin.file.buses]
+
+        def plainly():
+            for bus, spec in zip(buses, skin.file.buses, strict=True):
+                channel = None
+                for chip in spec.chips:
+                    if chip.channel != channel:
+                        channel = chip.channel
+                        bus.i2c_rdwr(i2c_msg.write(0x70, [1 << channel]))
+                        bus.i2c_rdwr(i2c_msg.read(0x70, 1))
+                    message = i2c_msg.read(chip.address, 24)
+                    bus.i2c_rdwr(i2c_msg.write(chip.address, [0, 0x0B]), message)
+                    data = list(message)
+                    [data[i] << 8 | data[i + 1] for i in range(0, 24, 2)]
+
+        out["plainly"] = _least_us(plainly)
+    return out
+
+
+def keep_period(seconds: float) -> dict:
+    """Milliseconds of the loop's period at 100 Hz, by percentile."""
+    from edge.loop import Loop
+
+    with _skin() as skin:
+        loop = Loop(skin, lasts_s=seconds)
+        frames = sum(1 for _ in loop.frames())
+        periods, missed = loop.schedule.periods, loop.schedule.missed
+    out = {f"p{p:g}": 1e3 * periods.percentile(p) for p in (50, 99, 99.9)}
+    return {**out, "longest": 1e3 * periods.longest, "frames": frames, "missed": missed}
+
+
+def bench_overhead_of_software(note):
+    """The buses' work one after another is more than side by side: an upper bound."""
+    parts = inside()
+    ours = parts["buses"] + parts["frame"]
+    note(f"the wire's {WIRE_S * 1e6:.0f} us at 400 kHz", ours / WIRE_S * 1e-6, "at most 0.02")
+    note("reading with list(msg) and shifts", parts["buses"] / parts["plainly"], "-")
+    note("us: chips of three buses", parts["buses"], "-")
+    note("us: bytes to frame", parts["frame"], "-")
+    note("us: both, in threads that fight for one lock", parts["threads"], "-")
+
+
+def bench_bits_on_the_wire(note):
+    from edge import skinfile
+    from edge.fake.player import frame_bits
+
+    bits = sum(frame_bits(skinfile.load(skinfile.shipped("cody")), 400)) / 400
+    note(f"{LEAST_BITS}, the least", bits / LEAST_BITS, "at most 1.03")
+
+
+def bench_period(note):
+    found = inside("--seconds", "20")
+    for name in ("p50", "p99", "p99.9", "longest"):
+        note(f"ms, {name} of {found['frames']}", found[name], "10")
+    note("ticks left out", found["missed"], "0")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--seconds", type=float)
+    arguments = parser.parse_args()
+    if arguments.inside:
+        found = measure() if arguments.seconds is None else keep_period(arguments.seconds)
+        print(json.dumps(found))
+        return
+    print(json.dumps(inside("--seconds", str(arguments.seconds or 60.0)), indent=2))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""Trials a second of the simulator, beside MuJoCo on the same three scenes in the same run.
+
+`pytest bench/bench_simulate.py`. Each row is a run of several trials of 2 s with full frames of
+384 taxels at 100 Hz; `extra_info` holds trials a second, and the ratio to MuJoCo where it is
+installed. Writing and each effect's cost have rows of their own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from edge import recording
+from train.simulate.engine import Trial, run_batch
+from train.simulate.explain import costs
+from train.simulate.fields import EFFECTS
+from train.simulate.run import kinds, recordings
+from train.simulate.scene import COLUMN_ANGLES_DEG, from_dict
+
+BATCH = 256
+MOVES = {"mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35}
+SCENES = {
+    "fixed box": ("rigid", "fixed"),
+    "movable box": ("rigid", "movable"),
+    "soft block": ("foam", "fixed"),
+}
+RATE = {}
+"""{scene: trials a second of MuJoCo}, for the ratio."""
+
+
+def make(family, condition, *add, count=BATCH):
+    thing = {"name": "thing", "family": family, "conditions": [condition], "width_m": 0.1, **MOVES}
+    return from_dict(
+        {
+            "trials": {"count": count, "lead_s": 0.2, "after_s": 1.8},
+            "step_s": {"base": 0.01, "sliding": 0.005},
+            "spread": {"place_m": 0.01, "roll_deg": 4.0, "friction": 0.1},
+            "effects": {"add": list(add)},
+            "object": [thing],
+        }
+    )
+
+
+def step_of(condition):
+    return 0.005 if condition == "movable" else 0.01
+
+
+def peer_model(family, condition):
+    """A forearm of 384 touch geoms on a slide of the arm's stiffness, against a box."""
+    taxels, sensors = [], []
+    for row in range(16):
+        for column, degrees in enumerate(COLUMN_ANGLES_DEG):
+            angle = math.radians(degrees)
+            x, y = 0.043 * math.cos(angle), 0.043 * math.sin(angle)
+            z = (7.5 - row) * 0.0108
+            name = f"t{row}_{column}"
+            taxels.append(
+                f'<geom type="sphere" size="0.0045" pos="{x} {y} {z}" mass="0.004" '
+                f'contype="1" conaffinity="2"/>'
+                f'<site name="{name}" type="sphere" size="0.006" pos="{x} {y} {z}"/>'
+            )
+            sensors.append(f'<touch site="{name}"/>')
+    soft = 'solref="-3000 -50"' if family == "foam" else ""
+    free = '<joint type="slide" axis="1 0 0" frictionloss="3.4"/>' if condition == "movable" else ""
+    return f"""<mujoco><worldbody>
+      <body name="arm"><joint name="reach" type="slide" axis="1 0 0" damping="6"/>
+        {"".join(taxels)}</body>
+      <body pos="0.13 0 0">{free}<geom type="box" size="0.05 0.15 0.05" mass="1"
+        contype="2" conaffinity="1" {soft}/></body></worldbody>
+      <actuator><position joint="reach" kp="115"/></actuator>
+      <option timestep="0.01" integrator="implicitfast" gravity="0 0 0"/>
+      <sensor>{"".join(sensors)}</sensor></mujoco>"""
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_bench_mujoco(benchmark, name):
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(peer_model(*SCENES[name]))
+
+    def trial():
+        data = mujoco.MjData(model)
+        frames = []
+        for frame in range(200):
+            data.ctrl[0] = 0.15 * frame * 0.01
+            mujoco.mj_step(model, data)
+            frames.append(data.sensordata.copy())
+        assert max(f.max() for f in frames) > 0.1
+        return frames
+
+    benchmark.pedantic(trial, rounds=3, iterations=1)
+    RATE[name] = 1.0 / benchmark.stats.stats.min
+    benchmark.extra_info["trials_per_s"] = round(RATE[name], 1)
+
+
+@pytest.mark.parametrize("tilt", [(), ("tilt",)], ids=["plain", "tilt"])
+@pytest.mark.parametrize("name", SCENES)
+def test_bench_simulate(benchmark, name, tilt):
+    family, condition = SCENES[name]
+    scene = make(family, condition, *tilt)
+    trials = tuple(next(iter(kinds(scene).values())))
+    batch = benchmark.pedantic(
+        run_batch, (scene, trials, step_of(condition)), rounds=5, iterations=1, warmup_rounds=1
+    )
+    assert batch.counts.shape == (BATCH, 201, 16, 24)
+    rate = BATCH / benchmark.stats.stats.min
+    benchmark.extra_info["trials_per_s"] = round(rate)
+    if name in RATE:
+        benchmark.extra_info["times_mujoco"] = round(rate / RATE[name], 1)
+
+
+def test_bench_write(benchmark, tmp_path):
+    """Recordings of one batch to files; beside `test_bench_simulate[fixed box-plain]`."""
+    scene = make("rigid", "fixed")
+    trials = tuple(next(iter(kinds(scene).values())))
+    batch = run_batch(scene, trials, 0.01)
+    runs = iter(range(100))
+
+    def write():
+        folder = tmp_path / str(next(runs))
+        for name, trial in recordings(batch, scene, 0.01):
+            recording.save(folder / name, trial)
+
+    benchmark.pedantic(write, rounds=3, iterations=1)
+    benchmark.extra_info["us_a_trial"] = round(benchmark.stats.stats.min / BATCH * 1e6)
+
+
+FULL = {"cover_n_m": 2600.0, "stribeck_m_s": 0.05, "base_m": 0.1, "height_m": 0.3}
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_bench_effect(benchmark, effect):
+    """Microseconds a trial of each effect, in a movable trial of a family that supports it."""
+    info = EFFECTS[effect]
+    family = info.families[0] if info.families else "rigid"
+    keys = {k: FULL[k] for k in info.keys}
+    thing = {"name": "thing", "family": family, "conditions": ["movable"], **MOVES, **keys}
+    table = {
+        "trials": {"count": 1, "lead_s": 0.2, "after_s": 1.8},
+        "step_s": {"base": 0.01},
+        "effects": {"add": [effect]},
+        "object": [thing],
+    }
+    scene = from_dict(table)
+    trial = Trial(scene.objects[0], "movable", 0)
+    found = benchmark.pedantic(costs, (scene, (trial,), 0.01), rounds=1, iterations=1)
+    benchmark.extra_info["us_a_trial"] = round(found[effect], 1)

@@ -1,0 +1,8 @@
+"""All hard cases, in the order of the table."""
+
+from __future__ import annotations
+
+from tests.hard_cases import frames, neighbours, scaling
+from tests.hard_cases.cases import Case
+
+CASES: list[Case] = [*neighbours.CASES, *scaling.CASES, *frames.CASES]

@@ -1,0 +1,188 @@
+"""Scenes to files: the same bytes however they are run, and the command line."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.recording import load
+from train.__main__ import main
+from train.simulate import scene as scenes
+from train.simulate.run import simulate, total_trials, write
+from train.simulate.scene import from_dict
+
+DEMO = Path(__file__).parents[3] / "train" / "scenes" / "demo.toml"
+
+
+def digests(folder):
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def demo():
+    return scenes.load(DEMO, count=2)
+
+
+@pytest.fixture(scope="module")
+def written(demo, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo")
+    return folder, write(demo, folder)
+
+
+def test_a_recording_is_as_the_contract_says(demo, written):
+    folder, paths = written
+    assert len(paths) == total_trials(demo) == 16
+    trial = load(folder / "cardboard-box-movable-01.npz")
+    assert trial.labels == {
+        "category": "rigid-movable",
+        "mobility": "movable",
+        "object": "cardboard box",
+    }
+    assert trial.frames.shape[1:] == (16, 24)
+    assert trial.joints is not None
+    assert trial.joints.shape == (len(trial.t), 5)
+    assert trial.layout == demo.skin
+    assert trial.meta["arm"] == demo.arm.to_dict()
+    assert trial.meta["simulation"]["effects"] == ["sliding", "noise", "dead_band"]
+    np.testing.assert_allclose(np.diff(trial.t), 0.01)
+    touched = trial.t[np.argmax(trial.frames.max(axis=(1, 2)) > demo.skin.onset)]
+    assert touched > 0.1
+    assert trial.t[-1] >= touched + 2.0
+
+
+@pytest.mark.parametrize("how", [{"batch": 1}, {"batch": 3}, {"jobs": 2}])
+def test_the_same_bytes_whatever_the_batch_or_the_cores(demo, written, tmp_path, how):
+    seen = []
+    write(demo, tmp_path, progress=seen.append, **how)
+    assert digests(tmp_path) == digests(written[0])
+    assert sum(seen) == 16
+
+
+def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=False,
+        dashboard_address=None,
+        protocol="tcp",
+        host="127.0.0.1",
+    ) as cluster:
+        write(demo, tmp_path, backend="dask", address=cluster.scheduler_address)
+    assert digests(tmp_path) == digests(written[0])
+
+
+def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(written, tmp_path):
+    write(scenes.load(DEMO, seed=99, count=1), tmp_path / "seed")
+    write(scenes.load(DEMO, count=3), tmp_path / "more")
+    first, other, more = digests(written[0]), digests(tmp_path / "seed"), digests(tmp_path / "more")
+    assert all(first[name] != digest for name, digest in other.items())
+    assert all(more[name] == digest for name, digest in first.items())
+
+
+def test_the_sensors_effects_reach_the_recording():
+    table = {
+        "trials": {"count": 1, "after_s": 0.6},
+        "step_s": {"base": 0.01},
+        "object": [{"name": "bar", "family": "rigid", "conditions": ["fixed"], "width_m": 0.03}],
+    }
+
+    def one(**effects):
+        return next(simulate(from_dict({**table, "effects": effects})))[1]
+
+    plain = one()
+    peak = plain.frames.max()
+    assert one(saturation={"newton": 0.5}).frames.max() == 500
+    assert set(np.unique(one(quantisation={"counts": 64}).frames) % 64) == {0}
+    banded = one(dead_band={"counts": 300}).frames
+    assert banded[banded > 0].min() >= 300
+    dead = one(dead_taxels={"part": 0.3, "known": 1})
+    assert dead.valid is not None
+    assert 0.6 < dead.valid.mean() < 0.8
+    assert not dead.frames[:, ~dead.valid].any()
+    assert one(dead_taxels={"part": 0.3, "known": 0}).valid is None
+    late = one(jitter={"s": 0.002})
+    assert len(np.unique(np.diff(late.t).round(6))) > 10
+    assert (np.diff(late.t) > 0.0).all()
+    fewer = one(dropped_frames={"part": 0.4})
+    assert 0.45 < len(fewer.t) / len(plain.t) < 0.75
+    where = np.searchsorted(plain.t, fewer.t)
+    np.testing.assert_array_equal(fewer.frames, plain.frames[where])
+    leak = one(crosstalk={"part": 0.05})
+    assert (leak.frames > 0).sum() > (plain.frames > 0).sum()
+    lag = one(hysteresis={"counts": 100}).frames.astype(int)
+    assert lag.max() == pytest.approx(int(peak) - 100, abs=1)
+    noise = one(noise={"counts": 6})
+    rest = noise.frames[:10].astype(float)
+    assert 6 * 0.35 < rest.mean() < 6 * 0.45  # half of a normal law: 0.4 deviations
+    drift = one(drift={"counts_per_s": 50})
+    assert drift.frames[-1].mean() > drift.frames[5].mean() > 0.0
+
+
+class TestCommand:
+    def test_simulate_writes_with_a_progress_bar(self, tmp_path, capsys):
+        assert main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)]) == 0
+        err = capsys.readouterr().err
+        assert "8/8" in err
+        assert len(list(tmp_path.iterdir())) == 8
+
+    def test_explain_tells_what_runs_why_and_at_what_cost(self, tmp_path, capsys):
+        path = tmp_path / "one.toml"
+        path.write_text(
+            "[trials]\ncount = 1\nafter_s = 0.3\n[step_s]\nbase = 0.01\n"
+            '[[object]]\nname = "foam"\nfamily = "foam"\nconditions = ["fixed"]\n'
+        )
+        assert main(["simulate", str(path), "--explain"]) == 0
+        out = capsys.readouterr().out
+        line = next(x for x in out.splitlines() if "relaxation" in x)
+        assert "family foam" in line
+        assert float(line.split()[1]) > 0.0
+        assert "order" in out
+        assert "not called for, not loaded: cover, pop" in out
+
+    @pytest.mark.parametrize(
+        ("arguments", "says"),
+        [
+            (["nowhere.toml", "--out", "x"], "nowhere.toml: cannot be read"),
+            ([str(DEMO)], "give --out DIR, --explain or both"),
+            ([str(DEMO), "--out", "x", "--jobs", "0"], "--jobs must be"),
+            ([str(DEMO), "--out", "x", "--batch", "0"], "--batch must be at least 1"),
+            ([str(DEMO), "--out", "x", "--backend", "dask"], "needs --address"),
+            ([str(DEMO), "--out", "x", "--address", "tcp://h:1"], "needs --backend dask"),
+            ([str(DEMO), "--out", "x", "--trials", "0"], "trials.count must be at least 1"),
+        ],
+    )
+    def test_bad_usage_is_one_sentence(self, arguments, says, capsys, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        assert main(["simulate", *arguments]) == 2
+        err = capsys.readouterr().err
+        assert says in err
+        assert "Traceback" not in err
+
+    def test_a_folder_that_cannot_be_made(self, demo, tmp_path):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(InputError, match="cannot be made"):
+            write(demo, tmp_path / "file" / "folder")
+
+    def test_show_draws_a_picture(self, written, tmp_path, capsys):
+        out = tmp_path / "picture.png"
+        trial = written[0] / "foam-block-movable-00.npz"
+        assert main(["show", str(trial), "--scene", "--out", str(out)]) == 0
+        assert out.read_bytes().startswith(b"\x89PNG")
+        assert capsys.readouterr().out.strip() == str(out)
+
+    def test_show_without_an_arm(self, written, tmp_path, capsys):
+        from dataclasses import replace
+
+        from edge.recording import save
+
+        bare = replace(load(written[0] / "foam-block-movable-00.npz"), joints=None)
+        save(tmp_path / "bare.npz", bare)
+        assert main(["show", str(tmp_path / "bare.npz")]) == 0
+        assert (tmp_path / "bare.png").exists()
+        assert main(["show", str(tmp_path / "bare.npz"), "--scene"]) == 2
+        assert "no joint angles" in capsys.readouterr().err
