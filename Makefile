@@ -4,13 +4,14 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo demo-data golden wheel wheel-test board-test \
+.PHONY: help venv test lint types export demo demo-data study golden wheel wheel-test board-test \
   hard-cases bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
+	@echo "make study    every analysis of the paper, ours beside it: build/study/report.html; DATA= for yours"
 	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
 	@echo "make wheel-test   the wheel in an empty environment, away from here"
 	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
@@ -81,6 +82,14 @@ BENCHVENV := $(VENV)/.bench
 $(BENCHVENV): $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .[bench]
 	@touch $@
+
+ifndef DATA
+study: $(SIMULATED)/.made
+STUDIED := --scene $(SCENE)
+endif
+
+study: $(READY)
+	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
 
 bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
