@@ -5,7 +5,7 @@ OUT ?= build
 READY := $(VENV)/.ready
 
 .PHONY: help venv test lint types export demo demo-data study golden wheel wheel-test board-test \
-  hard-cases bench faults soak clean
+  hard-cases tradeoff bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
@@ -16,6 +16,9 @@ help:
 	@echo "make wheel-test   the wheel in an empty environment, away from here"
 	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
 	@echo "make demo-data    the model and touches that the wheel carries"
+	@echo "make tradeoff what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json for"
+	@echo "              a board's figures (edge-classify bench), else this machine's; DATA= for yours"
+	@echo "              then make export FRONT=fast|balanced|accurate|milliseconds|accuracy"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
@@ -53,8 +56,13 @@ RECORDINGS := $(SIMULATED)
 export: $(SIMULATED)/.made
 endif
 
+# FRONT=fast, balanced, accurate, milliseconds or an accuracy: a point of `make tradeoff`.
+ifdef FRONT
+FRONTED := --front $(FRONT) $(addprefix --fronts ,$(wildcard $(OUT)/tradeoff/front.json))
+endif
+
 export: $(READY)
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT) $(EXPORT)
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT) $(FRONTED) $(EXPORT)
 
 DEMO := $(OUT)/demo
 
@@ -84,12 +92,24 @@ $(BENCHVENV): $(READY)
 	@touch $@
 
 ifndef DATA
-study: $(SIMULATED)/.made
+study tradeoff: $(SIMULATED)/.made
 STUDIED := --scene $(SCENE)
 endif
 
 study: $(READY)
 	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
+
+# Without a BOARD, this machine's own figures: a model of these recordings, benched here.
+ifdef BOARD
+tradeoff: $(READY)
+else
+BOARD := $(OUT)/tradeoff/board.json
+tradeoff: $(READY)
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff
+	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
+endif
+	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
+	  --out $(OUT)/tradeoff $(TRADEOFF)
 
 bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \

@@ -23,7 +23,9 @@ from train.conformal import FEWEST, FOLDS, SequentialClassifier
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
 from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier, check_columns
+from train.tradeoff import pick
 
+FRONTS = Path("build/tradeoff/front.json")
 LOOKS = "0.2:1.2:0.1"
 MOST_TRIALS = 2000
 """Beyond them calibration takes minutes, and must be asked for."""
@@ -67,6 +69,19 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
     top.add_argument("--onset", type=int, help="counts above which a contact begins")
+    top.add_argument(
+        "--front",
+        metavar="WHAT",
+        help="window, features and scaling of a point of `make tradeoff`: fast, balanced, "
+        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
+    )
+    top.add_argument(
+        "--fronts",
+        type=Path,
+        metavar="front.json",
+        help="where the points are (build/tradeoff/front.json; where there is none, those of the "
+        "simulated set)",
+    )
     top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (all cores)")
     top.set_defaults(run=run)
     return top
@@ -74,6 +89,8 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
+    if arguments.front is not None:
+        _take_front(arguments)
     _check_fixed(arguments)
     dataset = load_trials(
         arguments.data,
@@ -114,6 +131,23 @@ def run(arguments: argparse.Namespace) -> int:
     print(report(dataset, classifier, chosen), file=sys.stderr)
     print(f"{path} ({len(data) / 1024:.0f} kB)\n{arguments.out / 'golden.npz'}")
     return 0
+
+
+def _take_front(arguments: argparse.Namespace) -> None:
+    """Set what a point of the front says, where the options do not."""
+    path = arguments.fronts or FRONTS
+    if arguments.fronts is None and not path.exists():
+        path = pick.SHIPPED
+    task, deals = pick.read(path)
+    deal = pick.pick(deals, arguments.front)
+    arguments.window, arguments.features = deal.window_s, list(deal.features)
+    print(
+        f"{path}: {arguments.front} is {deal.window_s:g} s of {' '.join(deal.features)}, scaling "
+        f"{deal.scaling}: {task} {deal.accuracy:.1%} in {deal.milliseconds:.0f} ms there",
+        file=sys.stderr,
+    )
+    if arguments.scaling is None:
+        arguments.scaling = deal.scaling
 
 
 def _check_fixed(arguments: argparse.Namespace) -> None:

@@ -15,18 +15,22 @@ from train.crossval import votes_right
 from train.pipeline import principal_axes, scale_of
 from train.study.score import Labels, Result, best_cell
 
-COMPONENTS = 20
-NEIGHBOURS = 8
+COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
+"""Numbers of components to choose from."""
+NEIGHBOURS = 6
+"""Most neighbours to choose from."""
 LEAVE_ONE_OUT_UP_TO = 200
 FOLDS = 10
 
 
 def nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order."""
-    kth = np.partition(squares, k - 1, axis=1)[:, k - 1 : k]
-    # What lies beyond the k-th goes last, whatever it is; a stable sort keeps the order.
-    among = np.where(squares <= kth, squares, np.inf)
-    return np.argsort(among, axis=1, kind="stable")[:, :k]
+    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order.
+
+    Which of several equal ones is the last of the k is left open.
+    """
+    among = np.sort(np.argpartition(squares, k - 1, axis=1)[:, :k], axis=1)
+    order = np.argsort(np.take_along_axis(squares, among, axis=1), axis=1, kind="stable")
+    return np.take_along_axis(among, order, axis=1)
 
 
 def nested(
@@ -63,7 +67,7 @@ def nested(
     found = {}
     for task in y:
         (c, j), _ = min(cells[task].items(), key=lambda item: (-item[1], item[0]))
-        found[task] = Result(right[task], n, c + 1, j + 1)
+        found[task] = Result(right[task], n, COMPONENTS[c], j + 1)
     return found
 
 
@@ -80,25 +84,26 @@ def _fold(
     columns = np.repeat(gain, X.shape[1] // len(features))
     scaled = (X[train] - mean) * columns
     _, axes, _ = principal_axes(scaled)
-    axes = axes[:COMPONENTS]
+    axes = axes[: COMPONENTS[-1]]
     own, new = scaled @ axes.T, ((X[test] - mean) * columns) @ axes.T
     inner, outer = np.zeros((len(train), len(train))), np.zeros((len(test), len(train)))
     np.fill_diagonal(inner, np.inf)
     k = min(NEIGHBOURS, len(train) - 1)
-    grids: dict[str, list[NDArray[np.float64]]] = {task: [] for task in classes}
-    told: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
+    among, seen = [], []
     for c in range(len(axes)):
         inner += (own[:, None, c] - own[:, c]) ** 2
         outer += (new[:, None, c] - own[:, c]) ** 2
-        among, seen = nearest(inner, k), nearest(outer, k)
-        for task, labels in classes.items():
-            here = labels[train]
-            grids[task].append(votes_right(among, here, here).mean(axis=0))
-            told[task].append(votes_right(seen, here, labels[test]))
+        if c + 1 not in COMPONENTS:
+            continue
+        among.append(nearest(inner, k))
+        seen.append(nearest(outer, k))
     answers = {}
-    for task, grid in grids.items():
-        c, j = best_cell(np.array(grid))
-        answers[task] = (c, j), int(told[task][c][:, j].sum())
+    for task, labels in classes.items():
+        here = labels[train]
+        grid = votes_right(np.array(among), here, here).mean(axis=1)
+        c, j = best_cell(grid)
+        told = votes_right(seen[c], here, labels[test])
+        answers[task] = (c, j), int(told[:, j].sum())
     return answers
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from edge.candidates import ALARMS, Candidates
-from train.conformal import SequentialClassifier
+from train.conformal import FEWEST, SequentialClassifier
+from train.conformal import FOLDS as CALIBRATION_FOLDS
 from train.pipeline import Choice
 from train.simulate.scene import Scene
 
@@ -105,6 +106,69 @@ def beside(
     return Beside(tuple(looks_s), 1.0 - right.mean(axis=1), early, n)
 
 
+@dataclass(frozen=True)
+class Strangers:
+    """Contacts with things that were trained, and with things that were not.
+
+    Attributes:
+        alarms: how often a trained thing may be called unknown for lying far from all.
+        known: trials of trained things, and how many of them were called unknown.
+        strange: the same of things left out whole.
+    """
+
+    alarms: float
+    known: tuple[int, int]
+    strange: tuple[int, int]
+
+
+def strangers(
+    X: NDArray[np.float64],
+    labels: NDArray[np.str_],
+    choice: Choice,
+    looks_s: Sequence[float],
+    features: Sequence[str],
+    error: float = 0.2,
+    rates: Sequence[float] = (ALARMS, 0.1, 0.2),
+) -> list[Strangers]:
+    """A third of the labels is left out whole, in turn; a fifth of the others' trials is held out.
+
+    Args:
+        X, labels, choice, looks_s, features: as for `beside`.
+        error: asked for.
+        rates: of false alarms asked for.
+
+    Returns:
+        An entry a rate; none where too few trials are left to calibrate with.
+    """
+    names = np.unique(labels)
+    held = np.random.default_rng(2).permutation(len(labels)) % FOLDS == 0
+    counts = {rate: np.zeros((2, 2), dtype=int) for rate in rates}
+    with threadpool_limits(1):
+        for third in range(3):
+            strange = np.isin(labels, names[third::3])
+            train = ~strange & ~held
+            if len(np.unique(labels[train])) < 2 or train.sum() < FEWEST * CALIBRATION_FOLDS:
+                continue
+            model = SequentialClassifier({"task": choice}, looks_s, features).fit(
+                X[:, train], {"task": labels[train]}
+            )
+            calibration = model.calibrations_["task"]
+            for row, trials in enumerate((~strange & held, strange)):
+                pvalues = [calibration.pvalues(i, x[trials]) for i, x in enumerate(X)]
+                for rate in rates:
+                    for place in range(int(trials.sum())):
+                        candidates = Candidates(calibration.classes, error, rate)
+                        for values in pvalues:
+                            if not candidates.settled:
+                                candidates.look(values[place])
+                        counts[rate][row] += (1, candidates.unknown)
+    return [
+        Strangers(rate, (int(k[0]), int(k[1])), (int(s[0]), int(s[1])))
+        for rate, (k, s) in counts.items()
+        if k[0] and s[0]
+    ]
+
+
 def _decide(
     pvalues: list[NDArray[np.float64]],
     error: float,
@@ -153,6 +217,9 @@ def saved(found: Beside, early: Early) -> float | None:
 def floors(scene: Scene) -> dict[str, float]:
     """{object: seconds} before which an object that can move does not: mu_s m g / (k v).
 
+    What is narrow and high tips before it slides: where its base over twice the contact's height
+    is less than mu_s, it takes mu_s's place.
+
     k is the arm's stiffness at the contact along its motion, v the speed of its equilibrium
     point there; the spring between them is all that pushes. What is soft besides only delays.
     """
@@ -173,10 +240,9 @@ def floors(scene: Scene) -> dict[str, float]:
     found = {}
     for thing in scene.objects:
         if "movable" in thing.conditions and "mass_kg" in thing.values:
-            mass, friction = (_middle(thing.values[k]) for k in ("mass_kg", "friction_static"))
-            found[thing.name] = friction * mass * G / (stiffness * speed)
+            values = {key: value.middle for key, value in thing.values.items()}
+            share = values["friction_static"]
+            if values.get("base_m", 0.0) > 0.0 and values.get("height_m", 0.0) > 0.0:
+                share = min(share, values["base_m"] / (2.0 * values["height_m"]))  # it tips
+            found[thing.name] = share * values["mass_kg"] * G / (stiffness * speed)
     return found
-
-
-def _middle(value: object) -> float:
-    return float(np.mean(np.asarray(value, dtype=np.float64)))
