@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo bench faults soak clean
+.PHONY: help venv test lint types export demo bench faults soak hard-cases hard-cases-versions mutants clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
@@ -12,6 +12,9 @@ help:
 	@echo "make demo     export, then replay: decisions on a small simulated set"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
+	@echo "make hard-cases   what each hard case costs us and the usual stack, as a table"
+	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
+	@echo "make mutants  each guard taken out in turn: does a test notice?"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
@@ -78,6 +81,32 @@ faults: $(READY)
 
 soak: $(READY)
 	$(BIN)/python -m bench.soak
+
+HARD := $(OUT)/hard-cases
+
+hard-cases: $(READY)
+	$(BIN)/python -m tests.hard_cases --out $(HARD)
+
+# Golden files of hard cases, then asked again with another ONNX Runtime.
+OTHER_RUNTIME ?= 1.22.1
+OTHER := $(HARD)/onnxruntime-$(OTHER_RUNTIME)
+
+$(OTHER)/.ready: constraints.txt
+	$(PYTHON) -m venv $(OTHER)
+	$(OTHER)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  $$(grep -E '^(numpy|smbus2)==' constraints.txt) onnxruntime==$(OTHER_RUNTIME)
+	@touch $@
+
+hard-cases-versions: $(READY) $(OTHER)/.ready
+	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
+	for golden in $(HARD)/golden/*; do \
+	  $(OTHER)/bin/python -m edge.cli verify --model $$golden/model.onnx \
+	    --golden $$golden/golden.npz > $$golden/checks.jsonl || exit 1; \
+	done
+	$(OTHER)/bin/python -c "import onnxruntime as r; print('the same from', r.__version__)"
+
+mutants: $(READY)
+	$(BIN)/python -m tests.hard_cases.mutants
 
 clean:
 	rm -rf build dist
