@@ -35,7 +35,7 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in found.touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in found.touches])
     places = np.array([touch.place for touch in found.touches])
-    figure, axes = plt.subplots(1, 2, figsize=(11, 5.2), layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
         for i, label in enumerate(sorted(set(labels))):
             those = np.array([seen == label for seen in labels])
@@ -55,7 +55,10 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(0.15)
         axis.grid(alpha=0.3)
-    axes[1].legend(title=chosen, loc="best")
+    handles, names = axes[0].get_legend_handles_labels()
+    legend = figure.legend(handles, names, title=chosen, loc="outside right upper")
+    for handle in legend.legend_handles:
+        handle.set_alpha(1.0)
     figure.suptitle(f"{len(found.touches)} contacts in the frame of {found.frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
