@@ -4,8 +4,8 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench faults \
-  soak clean
+.PHONY: help venv test lint types export demo demo-data golden wheel wheel-test board-test \
+  hard-cases bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
@@ -66,6 +66,15 @@ demo: $(READY)
 	$(BIN)/edge-classify verify --model $(DEMO)/model.onnx --golden $(DEMO)/golden.npz > /dev/null
 	$(BIN)/edge-classify replay --model $(DEMO)/model.onnx --summary $(DEMO)/unseen
 	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
+
+# The committed model and outputs that the tests hold the edge to.
+golden: $(READY)
+	$(BIN)/python -m tests.golden.make
+
+# The README's picture.
+docs/touch.png: $(READY)
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
+	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --scene --out $@
 
 BENCHVENV := $(VENV)/.bench
 

@@ -131,6 +131,9 @@ class Contact:
             t = self._t[-1]
             for series in (self._t, self._measured, self._motion, self._more, self._force_motion):
                 del series[-1:]
+            for which, motion in (("area", self._motion), ("force", self._force_motion)):
+                if not any(map(math.isfinite, motion)):
+                    self._starts.pop(which, None)
         self._t.append(t)
         if frame.valid is not None and not self.missing_taxels:
             missing = self.layout.alive & ~frame.valid
@@ -219,7 +222,10 @@ def _time(frame: Frame, region: Region | None) -> float:
     """When the region was read: the mean over its taxels, as a frame is a rolling shutter."""
     if region is None or frame.times is None:
         return frame.t
-    return float(frame.times[region.mask].mean())
+    t = float(frame.times[region.mask].mean())
+    if not math.isfinite(t):
+        raise InputError("the time of a taxel in contact is not finite")
+    return t
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
@@ -342,7 +348,8 @@ class Tracker:
             that ends it (its `ended` is then True); else None.
 
         Raises:
-            InputError: the frame's shape is not the skin's, or its time goes back.
+            InputError: the frame's shape is not the skin's, its time goes back, or a time or
+                joint angle is not finite.
         """
         self._take(frame)
         region = largest_region(
@@ -361,7 +368,9 @@ class Tracker:
             raise InputError(
                 f"a frame of {frame.counts.shape} taxels on a skin of {self.layout.shape}"
             )
-        if not frame.t >= self._t:
+        if not math.isfinite(frame.t):
+            raise InputError(f"the time of a frame is not finite: {frame.t}")
+        if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
 

@@ -56,9 +56,7 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
         axis.margins(0.15)
         axis.grid(alpha=0.3)
     handles, names = axes[0].get_legend_handles_labels()
-    legend = figure.legend(handles, names, title=chosen, loc="outside right upper")
-    for handle in legend.legend_handles:
-        handle.set_alpha(1.0)
+    figure.legend(handles, names, title=chosen, loc="outside right upper")
     figure.suptitle(f"{len(found.touches)} contacts in the frame of {found.frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)

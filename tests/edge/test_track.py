@@ -76,6 +76,16 @@ def test_of_two_readings_at_one_instant_the_later_counts():
     assert series.peak.tolist() == [30, 32, 33]
 
 
+def test_motion_counts_from_the_reading_that_counts():
+    """Where the first instant was read twice, the later reading is the onset's place."""
+    tracker = Tracker(FLAT, TrackSettings(debounce=1))
+    for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]:
+        counts = np.zeros(FLAT.shape, dtype=np.uint16)
+        counts[1, col] = 50
+        contact = tracker.push(Frame(t, counts))
+    assert contact.series().motion == pytest.approx([0.0, 0.01], abs=1e-16)
+
+
 def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
     tracker = Tracker(FLAT, TrackSettings(release=2))
     places = [(1, 1), (1, 2), (2, 4), None, None]
@@ -146,9 +156,17 @@ def test_frames_of_another_shape_and_time_that_goes_back_are_refused():
     with pytest.raises(InputError, match="on a skin of"):
         tracker.push(Frame(0.0, np.zeros((2, 2), dtype=np.uint16)))
     tracker.push(Frame(1.0, np.zeros(FLAT.shape, dtype=np.uint16)))
-    for t in (0.5, float("nan")):
-        with pytest.raises(InputError, match="time goes back"):
-            tracker.push(Frame(t, np.zeros(FLAT.shape, dtype=np.uint16)))
+    with pytest.raises(InputError, match="time goes back"):
+        tracker.push(Frame(0.5, np.zeros(FLAT.shape, dtype=np.uint16)))
+
+
+@pytest.mark.parametrize("t", [np.nan, np.inf, -np.inf])
+def test_times_that_are_not_finite_are_refused(t):
+    counts = np.full(FLAT.shape, 50, dtype=np.uint16)
+    with pytest.raises(InputError, match="time of a frame is not finite"):
+        Tracker(FLAT).push(Frame(t, counts))
+    with pytest.raises(InputError, match="time of a taxel in contact is not finite"):
+        Tracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
 
 
 @pytest.mark.parametrize("settings", [{"debounce": 0}, {"release": 1.5}, {"connectivity": 5}])

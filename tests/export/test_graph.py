@@ -183,6 +183,23 @@ def test_a_shortlist_beside_the_direct_search(export, monkeypatch):
         assert (answers[f"t_{part}"] == expected[f"t_{part}"]).all()
 
 
+@pytest.mark.parametrize("scale", [1e-30, 1e-24, 1e18, 1e20, 1e60])
+def test_a_shortlist_holds_at_sizes_whose_squares_float32_cannot_hold(export, scale):
+    X = features(1400) * scale
+    fitted, model = export(X, {"t": Choice("none", 5, 6)})
+    queries = features(100, seed=1) * scale
+    _, rows = fitted.neighbours("t", queries)
+    alone = [model.run(queries[i : i + 1])["t_neighbours"][0] for i in range(100)]
+    assert (np.array(alone) == rows).all()
+    assert not model.run(X[:1])["t_distances"][:, 0].any()
+
+
+def test_nearly_as_many_voters_as_rows_need_no_shortlist(export):
+    X = features(1400)
+    fitted, model = export(X, {"t": Choice("none", 5, 1400)})
+    agree(fitted, model, X[:2])
+
+
 @pytest.mark.parametrize("n", [60, 1400])
 @pytest.mark.parametrize("k", [1, 2, 3])
 def test_what_is_not_finite_is_never_classified_and_spoils_no_other_row(export, n, k):

@@ -80,6 +80,17 @@ def test_components_match_long_double_and_have_a_fixed_sign():
     assert principal_axes(X[::-1])[1][:5] == pytest.approx(axes[:5], abs=1e-12)
 
 
+def test_the_sign_does_not_hang_on_rounding():
+    """Two features against each other: their entries are equal but for rounding."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        a, b = rng.normal(size=(2, 30))
+        X = 5.0 + np.repeat(np.column_stack([a, -a, 0.01 * b]), 40, axis=1)
+        weights = Projection(X, "none", 2).weights
+        assert (weights[:40, 0] > 0.7 / 40**0.5).all()
+        assert (Projection(X[rng.permutation(30)], "none", 2).weights == weights).all()
+
+
 def test_components_stop_at_the_rank():
     X = data(n=12)
     pca = PrincipalComponents(20).fit(X)
@@ -161,7 +172,7 @@ def test_what_a_projection_cuts_off_is_below_float64_of_its_range():
 
 
 def test_features_whose_squares_vanish_or_overflow_are_refused():
-    for scale in (1e-110, 1e110):
+    for scale in (1e-110, 1e-33, 1e110):
         with pytest.raises(InputError, match="other units"):
             Projection(data() * scale, "none", 2)
 

@@ -1,0 +1,77 @@
+"""What a hard case is, and the search for the worst of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, given, settings, target
+from threadpoolctl import threadpool_limits
+
+EXAMPLES = 12
+"""Examples that a search tries around a case; the same ones in every run."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hazard with an oracle.
+
+    Attributes:
+        group: the kind of hazard.
+        name: the hazard.
+        oracle: what the answer is judged by.
+        unit: what `error` measures.
+        bound: the most that it may be.
+        error: the error at given parameters.
+        hazard: the parameters that the case is known by.
+        around: strategies of parameters near them, which the search draws from.
+        usual: what the usual stack gives on the same hazard.
+        examples: how many the search draws.
+    """
+
+    group: str
+    name: str
+    oracle: str
+    unit: str
+    bound: float
+    error: Callable[..., float]
+    hazard: Sequence[Mapping[str, Any]] = ({},)
+    around: Mapping[str, Any] = field(default_factory=dict)
+    usual: Callable[[], str] | None = None
+    examples: int = EXAMPLES
+
+    @property
+    def key(self) -> str:
+        """Group and name, for people."""
+        return f"{self.group}: {self.name}"
+
+    def worst(self) -> tuple[float, Mapping[str, Any]]:
+        """The largest error at the hazard and in the search around it, and where it was."""
+        # Decompositions of this size only lose by a second thread, most of all beside others.
+        with threadpool_limits(1):
+            return self._worst()
+
+    def _worst(self) -> tuple[float, Mapping[str, Any]]:
+        seen: list[tuple[float, Mapping[str, Any]]] = [
+            (float(self.error(**at)), dict(at)) for at in self.hazard
+        ]
+        if self.around:
+
+            @settings(
+                max_examples=self.examples,
+                derandomize=True,
+                database=None,
+                deadline=None,
+                phases=[Phase.generate, Phase.target],
+                suppress_health_check=list(HealthCheck),
+            )
+            @given(**self.around)
+            def search(**at: Any) -> None:
+                error = float(self.error(**at))
+                seen.append((error, at))
+                if error < float("inf"):
+                    target(error)
+
+            search()
+        return max(seen, key=lambda pair: pair[0])

@@ -1,0 +1,441 @@
+"""Features of hard frames and times, and the arm's kinematics."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import scipy.ndimage
+from hypothesis import strategies as st
+
+from edge.arm import Chain, Joint
+from edge.features import feature_vector
+from edge.frame import Frame
+from edge.joints import Joints
+from edge.layout import SkinLayout
+from edge.region import largest_region
+from edge.track import FeatureSeries, Tracker, TrackSettings
+from tests.edge.test_region import SHAPES, check_against_reference
+from tests.hard_cases.cases import Case
+
+SEEDS = st.integers(0, 10**6)
+FOREARM = SkinLayout(16, 24, True, (0.0108, 0.01205), 0.046, threshold_counts=50, onset_counts=50)
+
+
+def region_error(name: str, wraps: bool, connectivity: int) -> float:
+    """1 where a region, its area, peak or sums differ from the reference."""
+    try:
+        check_against_reference(SHAPES[name], 50, None, wraps, connectivity)
+    except AssertionError:
+        return 1.0
+    return 0.0
+
+
+def random_region_error(density: float, peak: int, seed: int) -> float:
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(51, peak + 1, (16, 24)) * (rng.random((16, 24)) < density)
+    valid = rng.random((16, 24)) < 0.95
+    try:
+        check_against_reference(counts.astype(np.uint16), 50, valid, bool(seed % 2), 4)
+    except AssertionError:
+        return 1.0
+    return 0.0
+
+
+def seam_usual() -> str:
+    counts = SHAPES["seam"]
+    labels, n = scipy.ndimage.label(counts > 50)
+    largest = 1 + int(np.argmax([(labels == i + 1).sum() for i in range(n)]))
+    ours = largest_region(counts, 50)
+    assert ours is not None
+    col = np.nonzero(labels == largest)[1].mean()
+    return f"scipy.ndimage.label: {n} regions, column {col:.2f}; ours column {ours.centroid[1]:.2f}"
+
+
+def series_of(frames: list[np.ndarray], layout: SkinLayout = FOREARM) -> FeatureSeries:
+    tracker = Tracker(layout, TrackSettings(debounce=1))
+    found = None
+    for i, counts in enumerate(frames):
+        contact = tracker.push(Frame(0.01 * i, counts))
+        found = found or contact
+    assert found is not None
+    return found.series()
+
+
+def taxels(*places: tuple[int, int], value: int = 100) -> np.ndarray:
+    counts = np.zeros((16, 24), dtype=np.uint16)
+    for row, col in places:
+        counts[row, col % 24] = value
+    return counts
+
+
+def flicker_frames(seed: int) -> list[np.ndarray]:
+    """Two pairs of taxels whose peaks take turns at being the higher one."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for i in range(40):
+        first, second = (101, 100) if i == 0 or rng.random() < 0.5 else (100, 101)
+        out.append(taxels((3, 5), (3, 6), value=first) + taxels((12, 17), (12, 18), value=second))
+    return out
+
+
+def flicker_error(seed: int) -> float:
+    """Metres that the followed centroid moves though nothing does."""
+    return float(np.abs(series_of(flicker_frames(seed)).motion).max())
+
+
+def flicker_usual() -> str:
+    places = []
+    for counts in flicker_frames(0):
+        labels, n = scipy.ndimage.label(counts > 50)
+        peaks = scipy.ndimage.maximum(counts, labels, range(1, n + 1))
+        mask = labels == 1 + int(np.argmax(peaks))
+        places.append(FOREARM.position(*(float(v.mean()) for v in np.nonzero(mask))))
+    jump = max(math.dist(place, places[0]) for place in places)
+    return f"each frame's highest region: jumps of {jump:.3f} m"
+
+
+def full_error(value: int) -> float:
+    """Sums over a frame that is full, against plain integers."""
+    counts = np.full((16, 24), value, dtype=np.uint16)
+    region = largest_region(counts, 50, wraps=False)
+    assert region is not None
+    truth = (sum(r * 24 for r in range(16)), sum(c * 16 for c in range(24)))
+    return float(
+        abs(region.sums[0] - truth[0])
+        + abs(region.sums[1] - truth[1])
+        + abs(region.area - 384)
+        + abs(region.peak - value)
+    )
+
+
+def full_usual() -> str:
+    counts = np.full((16, 24), 65535, dtype=np.uint16)
+    with np.errstate(over="ignore"):
+        wrong = int((counts * np.arange(24, dtype=np.uint16)).sum(dtype=np.uint32))
+    right = sum(65535 * c * 16 for c in range(24))
+    return f"numpy in the frame's own uint16: moment {wrong} instead of {right}"
+
+
+def split_error(dead: int, length: int) -> float:
+    """A line of taxels that a dead one cuts: the longer part's area and column."""
+    counts = taxels(*((8, c) for c in range(length)))
+    valid = np.ones((16, 24), dtype=bool)
+    valid[8, dead] = False
+    region = largest_region(counts, 50, valid=valid, wraps=False)
+    parts = [range(dead), range(dead + 1, length)]
+    longest = max(parts, key=lambda p: (len(p), -p.start))
+    if not len(longest):
+        return float(region is not None)
+    assert region is not None
+    return float(region.area != len(longest) or region.sums != (8 * len(longest), sum(longest)))
+
+
+def contact_error(lead: int, length: int, settings: int) -> float:
+    """Onset, end and length of a contact against what the frames say."""
+    peaks = [0] * lead + [100] * length + [0] * 8
+    tracker = Tracker(FOREARM, TrackSettings(debounce=settings))
+    found = []
+    for i, peak in enumerate(peaks):
+        contact = tracker.push(Frame(0.01 * i, taxels((3, 3), value=peak)))
+        if contact is not None and contact not in found:
+            found.append(contact)
+    if length < settings:
+        return float(len(found))
+    (contact,) = found
+    series = contact.series()
+    area = [1] * length + [0] * 5
+    return float(
+        contact.onset_s != 0.01 * lead
+        or not contact.ended
+        or series.area.tolist() != area
+        or feature_vector(series, 1.2)[-41] != 0.0
+    )
+
+
+def times_error(seed: int, shortest: float) -> float:
+    """Samples of a series with jitter, duplicates and gaps against exact interpolation,
+    over the range of the counts and what the times themselves resolve."""
+    rng = np.random.default_rng(seed)
+    steps = 10.0 ** rng.uniform(math.log10(shortest), -0.5, 40)
+    readings = np.cumsum(np.concatenate([[0.0], np.repeat(steps, rng.integers(1, 3, 40))]))
+    readings = np.sort(np.concatenate([readings, readings[::5]]))  # some instants twice
+    tracker = Tracker(FOREARM, TrackSettings(debounce=1))
+    latest: dict[float, int] = {}
+    contact = None
+    for t in readings.tolist():
+        peak = int(rng.integers(51, 65536))
+        latest[t] = peak
+        contact = tracker.push(Frame(t, taxels((3, 3), value=peak))) or contact
+    assert contact is not None
+    vector = feature_vector(contact.series(), 1.2)[:40]
+    t, peaks = list(latest), list(latest.values())
+    worst = 0.0
+    for sample, time in zip(vector.tolist(), (np.arange(40) * (1.2 / 39)).tolist(), strict=True):
+        if time >= t[-1]:
+            worst = max(worst, abs(sample - peaks[-1]) / 65536)
+            continue
+        i = int(np.searchsorted(t, time, side="right")) - 1
+        step = Fraction(t[i + 1]) - Fraction(t[i])
+        truth = peaks[i] + (Fraction(time) - Fraction(t[i])) / step * (peaks[i + 1] - peaks[i])
+        resolved = 1.0 + t[i + 1] / float(step)
+        worst = max(worst, abs(float(Fraction(sample) - truth)) / 65536 / resolved)
+    return worst
+
+
+def times_usual() -> str:
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0.0, 1.2, 70))
+    t[0] = 0.0
+    force = 1000.0 * t
+    times = np.arange(40) * (1.2 / 39)
+    by_index = force[np.linspace(0, 69, 40).round().astype(int)]
+    true = np.interp(times, t, force)
+    return f"resampled by frame number: off by {np.abs(by_index - true).max() / 1200:.1%} of range"
+
+
+def orthonormal_error(steps: int, reach: float) -> float:
+    """Largest |R R^T - 1| along a path of `steps` poses."""
+    chain, worst = Chain.cody(), 0.0
+    rate = np.array([0.7, -1.1, 0.3, 1.7, -0.9])
+    for start in range(0, steps, 20000):
+        i = np.arange(start, min(start + 20000, steps))[:, None]
+        turn = chain.pose(reach * np.sin(1e-3 * i * rate) + 1e-4 * i)[:, :3, :3]
+        gap = turn @ turn.transpose(0, 2, 1) - np.eye(3)
+        worst = max(worst, float(np.abs(gap).max()))
+    return worst
+
+
+def orthonormal_usual() -> str:
+    step = Chain([Joint("j", (1.0, 2.0, -2.0))]).pose([1e-3])[:3, :3]
+    turn = np.eye(3)
+    for _ in range(100_000):
+        turn = turn @ step
+    return f"100 000 small rotations multiplied: {np.abs(turn @ turn.T - np.eye(3)).max():.1e}"
+
+
+def exact_turn(axis: tuple[float, float, float], angle: float) -> list[list[mpmath.mpf]]:
+    """Rodrigues' formula in 60 digits (400 for the reduction of large angles)."""
+    with mpmath.workdps(400):
+        a = mpmath.mpf(angle)
+        s, c = mpmath.sin(a), 1 - mpmath.cos(a)
+        size = mpmath.sqrt(sum(mpmath.mpf(v) ** 2 for v in axis))
+        x, y, z = (mpmath.mpf(v) / size for v in axis)
+        k = mpmath.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        out = mpmath.eye(3) + s * k + c * (k * k)
+        return [[out[i, j] for j in range(3)] for i in range(3)]
+
+
+def turn_error(angle: float, seed: int) -> float:
+    """Largest error of a rotation; off the diagonal relative to the angle where it is tiny."""
+    x, y, z = np.random.default_rng(seed).normal(size=3).tolist()
+    seen = Chain([Joint("j", (x, y, z))]).pose([angle])[:3, :3]
+    truth = exact_turn((x, y, z), angle)
+    scale = min(1.0, abs(angle)) or 1.0
+    worst = 0.0
+    for i in range(3):
+        for j in range(3):
+            gap = abs(float(mpmath.mpf(float(seen[i, j])) - truth[i][j]))
+            worst = max(worst, gap if i == j else gap / scale)
+    return worst
+
+
+def turn_usual() -> str:
+    angle = 1e-8
+    wrong = 1.0 - math.cos(angle)
+    return f"1 - cos(1e-8) as written: {wrong:.1e} instead of 5.0e-17"
+
+
+def wrapped_error(turns: int, seed: int) -> float:
+    """Metres between a pose and the same with one angle some turns further."""
+    chain = Chain.cody()
+    low, high = np.array([p or (-3.0, 3.0) for p in chain.limits]).T
+    rng = np.random.default_rng(seed)
+    q = np.where(rng.random(5) < 0.5, low, high)  # every joint at a limit
+    moved = q.copy()
+    moved[seed % 5] += turns * 2.0 * math.pi
+    return float(np.abs(chain.pose(q) - chain.pose(moved)).max()) / max(1, abs(turns))
+
+
+def wrapped_usual() -> str:
+    q = np.array([3.1, -3.1])
+    return f"joint angles interpolated as numbers: the mean of 3.1 and -3.1 is {q.mean():g}, not pi"
+
+
+def line_error(angle: float, step: float) -> float:
+    """Error of the pose midway between two lines of a sender that wraps its angles."""
+
+    def wrap(q: float) -> float:
+        return math.remainder(q, 2.0 * math.pi)
+
+    text = "".join(
+        json.dumps({"t": t, "q": [wrap(q)]}) + "\n" for t, q in ((5.0, angle), (5.01, angle + step))
+    )
+    lines = iter([text.encode(), None])
+    joints = Joints(lambda: next(lines), dof=1, now=lambda: 0.0)
+    seen = joints.at(-0.005)
+    if seen is None:
+        return math.inf
+    turn = Chain([Joint("j", (0.0, 0.0, 1.0))])
+    return float(np.abs(turn.pose(seen) - turn.pose([angle + 0.5 * step])).max())
+
+
+def moved_error(seed: int) -> float:
+    """Motion of a region that stays in the world while the link turns under it by 2 pi."""
+    layout = replace(FOREARM, radius_m=None, pitch_m=0.01)
+    tracker = Tracker(layout, TrackSettings(debounce=1), chain=Chain([Joint("j", (0.0, 0.0, 1.0))]))
+    angle = float(np.random.default_rng(seed).uniform(-3, 3))
+    contact = None
+    for i in range(3):
+        joints = np.array([angle + 2.0 * math.pi * i])
+        contact = tracker.push(Frame(0.01 * i, taxels((3, 7)), joints=joints)) or contact
+    assert contact is not None
+    return float(np.abs(contact.series().motion).max())
+
+
+CASES = [
+    Case(
+        "features",
+        "empty, full, checkerboard, spiral, serpentine, ring and seam frames",
+        "scipy.ndimage.label with the seam joined; plain integers",
+        "frames that differ",
+        0,
+        region_error,
+        [
+            {"name": n, "wraps": w, "connectivity": c}
+            for n in SHAPES
+            for w in (False, True)
+            for c in (4, 8)
+        ],
+        usual=seam_usual,
+    ),
+    Case(
+        "features",
+        "random frames with dead taxels, to full scale",
+        "scipy.ndimage.label with the seam joined; plain integers",
+        "frames that differ",
+        0,
+        random_region_error,
+        [{"density": 0.6, "peak": 65535, "seed": 0}],
+        {"density": st.floats(0.003, 1.0), "peak": st.integers(51, 65535), "seed": SEEDS},
+        examples=60,
+    ),
+    Case(
+        "features",
+        "two regions of equal area that flicker",
+        "nothing moves",
+        "metres of motion",
+        0,
+        flicker_error,
+        [{"seed": 0}],
+        {"seed": SEEDS},
+        flicker_usual,
+    ),
+    Case(
+        "features",
+        "saturation: full scale in every taxel",
+        "plain integers",
+        "error of area, peak and sums",
+        0,
+        full_error,
+        [{"value": 65535}],
+        {"value": st.integers(51, 65535)},
+        full_usual,
+    ),
+    Case(
+        "features",
+        "a dead taxel that splits a region",
+        "plain integers",
+        "frames that differ",
+        0,
+        split_error,
+        [{"dead": 5, "length": 12}],
+        {"dead": st.integers(0, 11), "length": st.just(12)},
+        lambda: "a dead taxel that reads full scale joins the parts and is the peak",
+    ),
+    Case(
+        "features",
+        "onset on the first frame, a contact that ends early, or never comes",
+        "the frames as written down",
+        "contacts that differ",
+        0,
+        contact_error,
+        [
+            {"lead": 0, "length": 20, "settings": 1},
+            {"lead": 0, "length": 3, "settings": 2},
+            {"lead": 3, "length": 0, "settings": 1},
+            {"lead": 3, "length": 1, "settings": 2},
+        ],
+        {"lead": st.integers(0, 9), "length": st.integers(0, 30), "settings": st.integers(1, 3)},
+    ),
+    Case(
+        "features",
+        "jitter, duplicates and gaps in time",
+        "interpolation in fractions; of one instant the last reading",
+        "error over full scale and what the times resolve",
+        1e-15,
+        times_error,
+        [{"seed": 0, "shortest": 1e-12}],
+        {"seed": SEEDS, "shortest": st.floats(-12, -2).map(lambda e: 10.0**e)},
+        times_usual,
+    ),
+    Case(
+        "kinematics",
+        "orthonormal over a million steps",
+        "R R^T = 1",
+        "largest entry of R R^T - 1",
+        5e-15,
+        orthonormal_error,
+        [{"steps": 1_000_000, "reach": 2.0}],
+        {"steps": st.just(2000), "reach": st.floats(0, 1e6)},
+        orthonormal_usual,
+        examples=8,
+    ),
+    Case(
+        "kinematics",
+        "large and tiny angles",
+        "Rodrigues' formula in 400 digits",
+        "error of an entry, off the diagonal over a tiny angle",
+        1e-15,
+        turn_error,
+        [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)],
+        {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
+        turn_usual,
+        examples=25,
+    ),
+    Case(
+        "kinematics",
+        "joint angles at their limits, wrapped by 2 pi",
+        "the same pose",
+        "metres and entries a turn",
+        5e-15,
+        wrapped_error,
+        [{"turns": 1, "seed": s} for s in range(5)],
+        {"turns": st.integers(-1000, 1000), "seed": SEEDS},
+    ),
+    Case(
+        "kinematics",
+        "a sender that wraps its angles between two lines",
+        "the pose midway on the shorter way",
+        "error of an entry",
+        2e-12,
+        line_error,
+        [{"angle": math.pi - 0.001, "step": 0.002}],
+        {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
+        wrapped_usual,
+    ),
+    Case(
+        "kinematics",
+        "a link that turns by 2 pi between frames",
+        "nothing moves",
+        "metres of motion",
+        1e-15,
+        moved_error,
+        [{"seed": 0}],
+        {"seed": SEEDS},
+    ),
+]

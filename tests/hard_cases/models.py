@@ -1,0 +1,223 @@
+"""Models of the project and of the usual stack on the same training vectors."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+from skl2onnx import to_onnx as convert
+from sklearn.decomposition import PCA
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+
+from edge.features import FEATURES
+from edge.layout import SkinLayout
+from edge.model import Model, ModelInfo, Task
+from edge.track import TrackSettings
+from export.graph import to_onnx
+from tests.hard_cases import exact
+from train.pipeline import Choice, ContactClassifier
+
+Array = NDArray[np.float64]
+
+
+def features(n: int, seed: int = 0) -> Array:
+    """(n, 120) vectors with the scales of force, area and motion."""
+    rng = np.random.default_rng(seed)
+    X = rng.gamma(2.0, size=(n, 120))
+    X[:, 40:80] *= 30.0
+    X[:, 80:] *= 0.02
+    return X
+
+
+def describe(fitted: ContactClassifier) -> ModelInfo:
+    """Metadata for a model that was fitted on vectors alone."""
+    return ModelInfo(
+        tasks={
+            task: Task(
+                tuple(map(str, fitted.classes_[task])),
+                choice.k,
+                fitted.components_[task],
+                choice.scaling,
+                0.0,
+            )
+            for task, choice in fitted.choices.items()
+        },
+        layout=SkinLayout(16, 24, True),
+        tracking=TrackSettings(),
+        window_s=1.2,
+        samples=40,
+        features=FEATURES,
+        units=dict.fromkeys(FEATURES, ""),
+        motion_frame="skin",
+        chain=None,
+        rows=len(next(iter(fitted.labels_.values()))),
+        data_digest="",
+    )
+
+
+def labels_for(X: Array, classes: int = 5, seed: int = 0) -> NDArray[np.str_]:
+    """Labels that have nothing to do with the vectors: classes overlap, votes tie."""
+    rng = np.random.default_rng([seed, 77])
+    return np.array([f"c{i:04d}" for i in rng.integers(0, classes, len(X))])
+
+
+class Ours:
+    """A fitted classifier, its exported graph, and the oracle of both."""
+
+    def __init__(
+        self,
+        X: Array,
+        *,
+        k: int = 5,
+        components: int = 6,
+        scaling: str = "none",
+        y: NDArray[np.str_] | None = None,
+    ) -> None:
+        y = labels_for(X) if y is None else y
+        self.fitted = ContactClassifier({"t": Choice(scaling, components, k)}).fit(X, {"t": y})
+        self.k = k
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "model.onnx"
+            self.data = to_onnx(self.fitted, describe(self.fitted))
+            path.write_bytes(self.data)
+            self.model = Model(path)
+        self.projection = self.fitted.projections_[scaling]
+        p, c = self.projection, self.fitted.components_["t"]
+        self._parameters = (p.mean, p.gain, p.weights[:, :c])
+        self.rows, self.exponent = exact.coordinates(X, *self._parameters)
+        self.X, self.y = X, self.fitted.labels_["t"].tolist()
+
+    def alone(self, queries: Array) -> Mapping[str, NDArray[Any]]:
+        """The graph's answers to queries one by one, as the board asks."""
+        parts = [self.model.run(queries[i : i + 1]) for i in range(len(queries))]
+        return {
+            name.removeprefix("t_"): np.concatenate([p[name] for p in parts])
+            for p in parts[:1]
+            for name in p
+        }
+
+    def judged(self, queries: Array) -> tuple[int, float]:
+        """Queries whose neighbours, in order, or label are not the oracle's, and the largest
+        relative error of a distance among the others."""
+        # The exponent of the whole numbers must be the same for rows and queries.
+        both, exponent = exact.coordinates(np.concatenate([self.X, queries]), *self._parameters)
+        rows, points = both[: len(self.X)], both[len(self.X) :]
+        seen = self.alone(queries)
+        wrong, worst = 0, 0.0
+        for i, point in enumerate(points):
+            found, squares = exact.nearest(rows, point, self.k)
+            label = exact.winner([self.y[j] for j in found])
+            if seen["neighbours"][i].tolist() != found or seen["label"][i] != label:
+                wrong += 1
+                continue
+            for distance, j in zip(seen["distances"][i].tolist(), found, strict=True):
+                worst = max(worst, exact.root_error(distance, squares[j], 2 * exponent))
+        return wrong, worst
+
+    def oracle_nearest(self, queries: Array) -> NDArray[np.int64]:
+        """(m,) the nearest row of each query, exactly."""
+        both, _ = exact.coordinates(np.concatenate([self.X, queries]), *self._parameters)
+        rows, points = both[: len(self.X)], both[len(self.X) :]
+        return np.array([exact.nearest(rows, point, 1)[0][0] for point in points])
+
+
+def usual_pipeline(X: Array, components: int, k: int, y: Any) -> Any:
+    """PCA and k-NN as scikit-learn fits them by default, brute force."""
+    c = min(components, *X.shape)
+    return make_pipeline(PCA(c, random_state=0), KNeighborsClassifier(k, algorithm="brute")).fit(
+        X, y
+    )
+
+
+def session(data: bytes, level: Any = None, threads: int = 1) -> Any:
+    """A session of ONNX Runtime."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.log_severity_level = 4
+    if level is not None:
+        options.graph_optimization_level = level
+    return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+
+
+def converted(pipe: Any, X: Array) -> Any:
+    """The default skl2onnx conversion: float32 in, its own k-NN."""
+    proto = convert(pipe, X[:1].astype(np.float32), options={"zipmap": False})
+    return session(proto.SerializeToString())
+
+
+def single_graph(ours: Ours) -> bytes:
+    """Our graph's operations with every number in float32, without the guards: the price's
+    other side."""
+    p, c = ours.projection, ours.fitted.components_["t"]
+    rows = ours.fitted.rows_[next(iter(ours.fitted.rows_))][:, :c]
+    constants = {
+        "mean": p.mean,
+        "gain": p.gain,
+        "weights": p.weights[:, :c],
+        "columns": rows.T,
+    }
+    with np.errstate(over="ignore", under="ignore"):
+        initial = [numpy_helper.from_array(v.astype(np.float32), n) for n, v in constants.items()]
+    initial += [
+        numpy_helper.from_array(np.array([n], np.int64), name)
+        for name, n in (("one", 1), ("two", 2), ("k", ours.k))
+    ]
+    nodes = [
+        helper.make_node("Sub", ["x", "mean"], ["d"]),
+        helper.make_node("Mul", ["d", "gain"], ["s"]),
+        helper.make_node("MatMul", ["s", "weights"], ["z"]),
+        helper.make_node("Unsqueeze", ["z", "two"], ["q"]),
+        helper.make_node("Sub", ["columns", "q"], ["gaps"]),
+        helper.make_node("ReduceSumSquare", ["gaps", "one"], ["squares"], keepdims=0),
+        helper.make_node("TopK", ["squares", "k"], ["near", "rows"], largest=0, sorted=1),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "single",
+        [helper.make_tensor_value_info("x", TensorProto.FLOAT, [None, p.mean.size])],
+        [helper.make_tensor_value_info("rows", TensorProto.INT64, [None, ours.k])],
+        initial,
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=8)
+    return bytes(model.SerializeToString())
+
+
+def microseconds(call: Any, rounds: int = 40) -> float:
+    """Median time of a call."""
+    call()
+    times = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return float(np.median(times)) * 1e6
+
+
+def usual_neighbours(X: Array, queries: Array, *, components: int = 6) -> str:
+    """Shares of wrong nearest rows against the oracle, and what a decision costs."""
+    ours = Ours(X, k=1, components=components, y=np.array([f"{i:05d}" for i in range(len(X))]))
+    truth = ours.oracle_nearest(queries)
+    pipe = usual_pipeline(X, components, 1, np.arange(len(X)))
+    single = session(single_graph(ours))
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        narrow = queries.astype(np.float32)
+        said = {
+            "scikit-learn": pipe.predict(queries),
+            "skl2onnx": np.ravel(converted(pipe, X).run(None, {"X": narrow})[0]),
+            "float32 graph": single.run(["rows"], {"x": narrow})[0][:, 0],
+        }
+    shares = ", ".join(f"{name} {np.mean(v != truth):.0%}" for name, v in said.items())
+    vector, one = queries[0], narrow[:1]
+    cost = microseconds(lambda: ours.model.decide(vector))
+    cheap = microseconds(lambda: single.run(["rows"], {"x": one}))
+    return f"wrong nearest: {shares}; {cost:.0f} us float64 with guards, {cheap:.0f} us float32"

@@ -1,0 +1,15 @@
+"""All hard cases, in the order of the table."""
+
+from __future__ import annotations
+
+from tests.hard_cases import everywhere, frames, neighbours, refusals, scaling, simulator
+from tests.hard_cases.cases import Case
+
+CASES: list[Case] = [
+    *neighbours.CASES,
+    *scaling.CASES,
+    *frames.CASES,
+    *refusals.CASES,
+    *everywhere.CASES,
+    *simulator.CASES,
+]

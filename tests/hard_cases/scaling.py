@@ -1,0 +1,331 @@
+"""Scaling and principal components where the data gives them nothing to hold on to."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from hypothesis import strategies as st
+from scipy.linalg import hadamard
+from sklearn.decomposition import PCA
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MaxAbsScaler, StandardScaler
+
+from tests.hard_cases import exact
+from tests.hard_cases.cases import Case
+from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
+from train.pipeline import (
+    CLOSE_EIGENVALUES,
+    SCALINGS,
+    PrincipalComponents,
+    Projection,
+    principal_axes,
+)
+
+SEEDS = st.integers(0, 10**6)
+METHODS = st.sampled_from(SCALINGS)
+
+
+def constant_error(scaling: str, value: float, seed: int) -> float:
+    """What a constant column weighs, and how far its move shifts a projection."""
+    X = features(60, seed)
+    X[:, [7, 95]] = value
+    moved = X.copy()
+    moved[:, [7, 95]] += 1e3
+    p = Projection(X, scaling, 20)
+    return max(float(np.abs(p.weights[[7, 95]]).max()), float(np.abs(p(moved) - p(X)).max()))
+
+
+def constant_usual() -> str:
+    X = features(60)
+    X[:, [7, 95]] = 0.1
+    moved = X.copy()
+    moved[:, [7, 95]] += 1e3
+    pipe = make_pipeline(StandardScaler(), PCA(20, random_state=0)).fit(X)
+    shift = np.abs(pipe.transform(moved) - pipe.transform(X)).max()
+    size = np.abs(pipe.transform(X)).max()
+    return f"StandardScaler and PCA: the projection moves by {shift:.1e}, its range is {size:.1e}"
+
+
+def nearly_constant_error(scaling: str, seed: int) -> float:
+    """A feature type whose spread is the rounding of its value gets a gain."""
+    X = features(40, seed)
+    X[:, 80:] = np.nextafter(
+        0.1, np.where(np.random.default_rng(seed).random((40, 40)) < 0.5, 0.0, 1.0)
+    )
+    return abs(float(Projection(X, scaling, 20).gain[80:].max())) if scaling == "IV" else 0.0
+
+
+def nearly_constant_usual() -> str:
+    X = features(40)
+    X[:, 80:] = np.nextafter(
+        0.1, np.where(np.random.default_rng(0).random((40, 40)) < 0.5, 0.0, 1.0)
+    )
+    gain = 1.0 / X[:, 80:].reshape(-1).std()
+    return f"Eq. 4 without a floor: gain {gain:.1e} on rounding"
+
+
+def dead_error(scaling: str, value: float, seed: int) -> float:
+    """Queries whose neighbours change when a feature type that was 0 in training moves."""
+    X, queries = features(60, seed), features(12, seed + 1)
+    X[:, 80:] = queries[:, 80:] = 0.0
+    ours = Ours(X, scaling=scaling, components=20)
+    before = ours.alone(queries)
+    queries[:, 80:] = value
+    after = ours.alone(queries)
+    differs = (before["neighbours"] != after["neighbours"]).any(axis=1)
+    return float((differs | (before["distances"] != after["distances"]).any(axis=1)).sum())
+
+
+def dead_usual() -> str:
+    X = features(60)
+    X[:, 80:] = 0.0
+    y = np.arange(60)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        blocks = X.reshape(60, 3, 40)
+        divided = (blocks / blocks.max(axis=(0, 2))[:, None]).reshape(60, 120)
+        said = converted(usual_pipeline(X, 5, 1, y), X).run(
+            None, {"X": divided[:5].astype(np.float32)}
+        )[0]
+    scaler = MaxAbsScaler().fit(X)
+    moved = X[:1].copy()
+    moved[:, 80:] = 1e3
+    size = scaler.transform(moved)
+    rows = sorted(set(np.ravel(said).tolist()))
+    return (
+        f"x / max is NaN, and skl2onnx answers NaN with row {rows}; "
+        f"MaxAbsScaler lets it through at {size[0, 80:].max():g} where all else is below "
+        f"{size[0, :80].max():.1f}"
+    )
+
+
+def rank_error(rows: int, rank: int, seed: int) -> float:
+    """Components kept beyond or short of the exact rank of centred whole numbers."""
+    rng = np.random.default_rng(seed)
+    left = rng.integers(-9, 10, (rows, rank))
+    right = rng.integers(-9, 10, (rank, 120))
+    X = (left @ right).astype(np.float64)
+    wide = (rows * X - X.sum(axis=0)).astype(np.int64)  # rows times the centred rows
+    kept = PrincipalComponents(200).fit(X)
+    truth = exact.rank(wide)
+    reported = kept.dropped_ == 200 - len(kept.components_)
+    return abs(len(kept.components_) - truth) + float(not reported)
+
+
+def rank_usual() -> str:
+    rng = np.random.default_rng(0)
+    X = (rng.integers(-9, 10, (30, 3)) @ rng.integers(-9, 10, (3, 120))).astype(np.float64)
+    pca = PCA(20, random_state=0, whiten=True).fit(X)
+    away = np.abs(pca.transform(X + rng.normal(size=X.shape))).max()
+    with np.errstate(all="ignore"):
+        return f"PCA(20) keeps 20 of rank 3; whitened, unit noise moves a coordinate to {away:.1e}"
+
+
+def cut_error(gap: float, seed: int) -> float:
+    """How far the reported gap at the cut is from the one that the data was made with; wrong
+    where it is not under the warning's limit although the true one is."""
+    h = hadamard(32).astype(np.float64)
+    rng = np.random.default_rng(seed)
+    columns = rng.permutation(np.arange(1, 32))[:4]
+    values = np.array([4.0, 2.0, 2.0 * np.sqrt(1.0 - gap), 1.0])
+    X = np.zeros((32, 120))
+    X[:, :32] = h[:, columns] * values @ h[:4]
+    p = Projection(X, "none", 2)
+    true = 1.0 - (values[2] / values[1]) ** 2
+    warned = (p.gap < CLOSE_EIGENVALUES) == (true < CLOSE_EIGENVALUES)
+    return abs(p.gap - true) if warned else 1.0
+
+
+def cut_usual() -> str:
+    h = hadamard(32).astype(np.float64)
+    X = h[:, [3, 7, 11, 13]] * np.array([4.0, 2.0, 2.0, 1.0]) @ h[:4]
+    noise = 1e-13 * np.random.default_rng(0).normal(size=(10, *X.shape))
+    first, *others = (PCA(2, random_state=0).fit(X + e).components_[1] for e in noise)
+    angle = max(np.degrees(np.arccos(min(1.0, abs(float(first @ b))))) for b in others)
+    return f"PCA: noise of 1e-13 turns the second component by {angle:.0f} degrees, no warning"
+
+
+def flat(seed: int) -> Array:
+    """Features that are constant in time: a component's entries are equal but for rounding."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(2, 30))
+    return 5.0 + np.repeat(np.column_stack([a, -a, 0.01 * b]), 40, axis=1)
+
+
+def sign_error(seed: int) -> float:
+    """Components that differ when the same trials come in another order."""
+    X = flat(seed)
+    order = np.random.default_rng(seed).permutation(len(X))
+    weights = Projection(X, "none", 2).weights
+    return float((Projection(X[order], "none", 2).weights != weights).any(axis=0).sum())
+
+
+def sign_usual() -> str:
+    turned = 0
+    for seed in range(50):
+        X = flat(seed)
+        order = np.random.default_rng(seed).permutation(len(X))
+        a, b = (PCA(2, random_state=0).fit(v).components_ for v in (X, X[order]))
+        turned += int(((a * b).sum(axis=1) < 0.0).any())
+    return f"PCA: a component turns round in {turned} of 50 data sets"
+
+
+def decades(top: int, count: int, seed: int) -> tuple[Array, Array]:
+    """(n, 32) data with exact singular values over `top` binary orders: Hadamard rows and
+    columns are orthogonal and their sums are exact."""
+    h = hadamard(512).astype(np.float64)
+    g = hadamard(32).astype(np.float64)
+    rng = np.random.default_rng(seed)
+    columns = rng.permutation(np.arange(1, 512))[:count]
+    steps = np.round(np.linspace(0, top, count))
+    values = 2.0**-steps
+    X = (h[:, columns] * values) @ g[1 : count + 1]
+    return X, values * np.sqrt(512.0 * 32.0)
+
+
+def decades_error(top: int, count: int, seed: int) -> float:
+    """Largest error of a singular value over the largest one; a rank that is off counts 1."""
+    X, truth = decades(top, count, seed)
+    _, axes, values = principal_axes(X)
+    limit = truth[0] * max(X.shape) * np.finfo(float).eps
+    sure = int((truth > 2.0 * limit).sum())
+    most = int((truth > 0.5 * limit).sum())
+    if not sure <= len(axes) <= most:
+        return 1.0
+    return float(np.abs(values - truth[: len(values)]).max() / truth[0])
+
+
+def decades_usual() -> str:
+    X, truth = decades(48, 12, 0)
+    auto = PCA(12, random_state=0).fit(X).singular_values_
+    _, _, values = principal_axes(X)
+
+    def held(seen: Array) -> float:
+        good = np.abs(seen / truth[: len(seen)] - 1.0) < 0.1
+        return float(truth[: len(seen)][good].min() / truth[0])
+
+    return (
+        f"PCA(auto) holds singular values down to {held(auto):.0e} of the first, "
+        f"ours to {held(values):.0e} and drops the rest"
+    )
+
+
+def grid_error(seed: int) -> float:
+    """A distance on the components' grid against the same with components as fitted."""
+    X, queries = features(60, seed), features(20, seed + 1)
+    p = Projection(X, "none", 20)
+    _, axes, _ = principal_axes((X - p.mean) * p.gain)
+    fine = axes[:20].T
+    gaps = queries[:, None] - X
+    ours = np.sqrt(((gaps @ p.weights) ** 2).sum(axis=2))
+    free = np.sqrt(((gaps @ fine) ** 2).sum(axis=2))
+    return float((np.abs(ours - free) / np.sqrt((gaps**2).sum(axis=2))).max())
+
+
+def usual_labels_note() -> str:
+    """k-NN on null directions: what components beyond the rank cost."""
+    X = features(12)
+    y = labels_for(X)
+    kept = usual_pipeline(X, 12, 1, y)[0].components_
+    queries = features(200, 1) - X.mean(axis=0)
+    null = kept[-1:]
+    share = ((queries @ null.T) ** 2).sum() / ((queries @ kept.T) ** 2).sum()
+    return f"PCA(12) of 12 rows: the 12th component is rounding and takes {share:.0%} of a query"
+
+
+CASES = [
+    Case(
+        "scaling",
+        "a constant column, then alive",
+        "weight and movement exactly 0",
+        "weight or movement",
+        0,
+        constant_error,
+        [{"scaling": s, "value": 0.1, "seed": 0} for s in SCALINGS],
+        {"scaling": METHODS, "value": st.floats(-1e3, 1e3), "seed": SEEDS},
+        constant_usual,
+    ),
+    Case(
+        "scaling",
+        "a feature type whose spread is rounding",
+        "gain exactly 0",
+        "gain",
+        0,
+        nearly_constant_error,
+        [{"scaling": "IV", "seed": 0}],
+        {"scaling": st.just("IV"), "seed": SEEDS},
+        nearly_constant_usual,
+    ),
+    Case(
+        "scaling",
+        "maximum 0: a type dead in training that comes alive",
+        "same neighbours and distances, bit for bit",
+        "queries that change",
+        0,
+        dead_error,
+        [{"scaling": s, "value": 1e3, "seed": 0} for s in SCALINGS],
+        {"scaling": METHODS, "value": st.floats(1e-3, 1e6), "seed": SEEDS},
+        dead_usual,
+        examples=6,
+    ),
+    Case(
+        "PCA",
+        "fewer rows than components, rank deficiency",
+        "rank by elimination in fractions",
+        "components too many or too few",
+        0,
+        rank_error,
+        [{"rows": 12, "rank": 20, "seed": 0}, {"rows": 30, "rank": 3, "seed": 0}],
+        {"rows": st.integers(2, 30), "rank": st.integers(1, 20), "seed": SEEDS},
+        lambda: f"{rank_usual()}; {usual_labels_note()}",
+    ),
+    Case(
+        "PCA",
+        "nearly equal eigenvalues at the cut",
+        "the gap that the data was made with",
+        "error of the gap; 1 without its warning",
+        1e-13,
+        cut_error,
+        [{"gap": 0.0, "seed": 0}, {"gap": 1e-9, "seed": 0}],
+        {
+            "gap": st.one_of(st.floats(-14, -6.1), st.floats(-5.9, -1)).map(lambda e: 10.0**e),
+            "seed": SEEDS,
+        },
+        cut_usual,
+    ),
+    Case(
+        "PCA",
+        "sign ambiguity",
+        "bit for bit the same components from trials in another order",
+        "components that differ",
+        0,
+        sign_error,
+        [{"seed": s} for s in range(8)],
+        {"seed": SEEDS},
+        sign_usual,
+    ),
+    Case(
+        "PCA",
+        "singular values over 15 decades",
+        "Hadamard data: singular values known exactly",
+        "error over the largest singular value",
+        4e-15,
+        decades_error,
+        [{"top": 48, "count": 12, "seed": 0}],
+        {"top": st.integers(1, 48), "count": st.integers(2, 16), "seed": SEEDS},
+        decades_usual,
+        examples=6,
+    ),
+    Case(
+        "PCA",
+        "components rounded to their grid",
+        "the same distance with components as fitted",
+        "change over the distance in feature space",
+        2.0**-21 * (120 * 20) ** 0.5,
+        grid_error,
+        [{"seed": 0}],
+        {"seed": SEEDS},
+        examples=4,
+    ),
+]
