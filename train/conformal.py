@@ -37,6 +37,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
+from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
 from edge.features import FEATURES
@@ -251,12 +252,20 @@ class SequentialClassifier(BaseEstimator):
         Raises:
             InputError: there are too few trials for the folds, or X is not finite.
         """
-        looks, n = X.shape[:2]
+        n = X.shape[1]
         if n < FEWEST * self.folds:
             raise InputError(
                 f"calibration in {self.folds} folds needs at least {FEWEST * self.folds} trials, "
                 f"not {n}; record more, or export without looks"
             )
+        # Decompositions this small are slower on several threads, and far slower where those wait.
+        with threadpool_limits(1):
+            return self._fit(X, y)
+
+    def _fit(
+        self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
+    ) -> SequentialClassifier:
+        looks, n = X.shape[:2]
         self.looks_ = [ContactClassifier(self.choices, self.features).fit(x, y) for x in X]
         self.n_features_in_ = X.shape[2]
         last = self.looks_[-1]
