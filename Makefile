@@ -11,6 +11,7 @@ help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
+	@echo "make study    every analysis of the paper, ours beside it: build/study/report.html; DATA= for yours"
 	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
 	@echo "make wheel-test   the wheel in an empty environment, away from here"
 	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
@@ -89,6 +90,14 @@ bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
+
+ifndef DATA
+study: $(SIMULATED)/.made
+STUDIED := --scene $(SCENE)
+endif
+
+study: $(READY)
+	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
 
 faults: $(READY)
 	$(BIN)/python -m bench.faults
