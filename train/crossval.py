@@ -31,8 +31,21 @@ def fold_neighbours(
     max_components: int,
     max_k: int,
     features: Sequence[str] = FEATURES,
+    first: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Neighbours of one left-out trial for each number of components.
+
+    A product's rounding hangs on a row's place in the matrix, so equal trials are given the
+    coordinates of the first of them: they are then equally far, and at 0 from each other.
+
+    Args:
+        X: (n, features * samples).
+        test: the trial left out.
+        scaling: one of `SCALINGS`.
+        max_components: how many are tried, from 1.
+        max_k: neighbours given.
+        features: names of the feature types, in the order of X.
+        first: (n,) `first_equal(X)`, where it is at hand.
 
     Returns:
         (max_components, max_k) rows of X, nearest first, equal distances in the order of the
@@ -43,10 +56,10 @@ def fold_neighbours(
     _, gain = scale_of(train, scaling, features)
     columns = np.repeat(gain, X.shape[1] // len(features))
     mean = train.mean(axis=0)
-    scaled = (train - mean) * columns
-    _, axes, _ = principal_axes(scaled)
-    axes = axes[:max_components]
-    gaps = ((X[test] - mean) * columns) @ axes.T - scaled @ axes.T
+    scaled = (X - mean) * columns
+    _, axes, _ = principal_axes(scaled[keep])
+    z = (scaled @ axes[:max_components].T)[first_equal(X) if first is None else first]
+    gaps = z[test] - z[keep]
     squares = np.cumsum(gaps * gaps, axis=1)
     rows = np.empty((max_components, max_k), dtype=np.int64)
     where = np.flatnonzero(keep)
@@ -55,6 +68,12 @@ def fold_neighbours(
             order = _nearest(squares[:, c], max_k)
         rows[c] = where[order]
     return rows
+
+
+def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) for each row of X the first row that is equal to it."""
+    _, first, group = np.unique(X, axis=0, return_index=True, return_inverse=True)
+    return np.asarray(first[group.reshape(-1)])
 
 
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
@@ -132,7 +151,10 @@ def _chunk(
     k: int,
     features: Sequence[str],
 ) -> NDArray[np.int64]:
-    return np.stack([fold_neighbours(X, int(i), scaling, components, k, features) for i in tests])
+    first = first_equal(X)
+    return np.stack(
+        [fold_neighbours(X, int(i), scaling, components, k, features, first) for i in tests]
+    )
 
 
 def accuracies(rows: NDArray[np.int64], y: NDArray[np.str_]) -> NDArray[np.float64]:
