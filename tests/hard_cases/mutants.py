@@ -71,8 +71,8 @@ MUTANTS = (
     Mutant(
         "a column that is constant but for rounding weighs nothing",
         PIPELINE,
-        "    centred[:, still] = 0.0\n",
-        "",
+        "still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)",
+        "still = np.zeros(X.shape[1], dtype=bool)",
         (OF_PIPELINE, "without_variance or told_nothing"),
     ),
     Mutant(
@@ -168,7 +168,7 @@ MUTANTS = (
         GRAPH,
         "slack = 2.0 * u * float(lengths.max())",
         "slack = u = 0.0",
-        (OF_GRAPH, "too_narrow or near_duplicates"),
+        (OF_GRAPH, "clusters"),
     ),
     Mutant(
         "the shortlist is measured in the order of the rows",
@@ -217,7 +217,7 @@ MUTANTS = (
         CROSSVAL,
         "among = np.flatnonzero(squares <= limit)",
         "among = np.argpartition(squares, k - 1)[:k]",
-        (OF_CROSSVAL, "earlier_row or duplicates"),
+        (OF_CROSSVAL, "limit"),
     ),
     Mutant(
         "leave-one-out refuses what is not finite",
