@@ -35,12 +35,17 @@ PARTS = (0.05, 0.1, 0.2)
 
 
 def nested(
-    context: Context, X: NDArray[np.float64], scaling: str, features: Sequence[str], what: str
+    context: Context,
+    X: NDArray[np.float64],
+    scaling: str,
+    features: Sequence[str],
+    what: str,
+    exact_up_to: int = EXACT_UP_TO,
 ) -> dict[str, Result]:
     """Nested cross-validation: leave-one-out inside, leave-one-out or ten folds outside."""
     y = context.labels
     n = len(X)
-    if n <= EXACT_UP_TO:
+    if n <= exact_up_to:
         first, second = np.triu_indices(n, 1)
         pairs = list(zip(first.tolist(), second.tolist(), strict=True))
         size = max(1, len(pairs) // (8 * context.jobs))
