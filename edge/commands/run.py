@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
+from edge.commands.sure import add_error, check_error
 from edge.lines import Lines
 from edge.live import Event, Watcher
 from edge.loop import Loop, Schedule, stop_on
@@ -29,6 +30,7 @@ def add_parser(commands: Any) -> None:
         "Under systemd it says when it is ready and that it is alive.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
+    add_error(parser)
     add_skin(parser, joint_options=True)
     parser.add_argument(
         "--without-joints",
@@ -75,6 +77,7 @@ def end_event(schedule: Schedule, frames: int) -> Event:
 def run(arguments: argparse.Namespace) -> int:
     """Read, watch, print, until the recording, the user or the service manager ends it."""
     model = Model(arguments.model)
+    check_error(model, arguments.error)
     chain = model.info.chain
     with ExitStack() as stack:
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
@@ -87,7 +90,9 @@ def run(arguments: argparse.Namespace) -> int:
         skin = opened.skin
         dof = None if chain is None else chain.dof
         joints = stack.enter_context(open_joints(arguments, opened, dof))
-        watcher = Watcher(model, skin.layout, several=arguments.map is not None)
+        watcher = Watcher(
+            model, skin.layout, error=arguments.error, several=arguments.map is not None
+        )
         touch_map = None
         if arguments.map is not None:
             touch_map = stack.enter_context(MapFile(arguments.map, model.info))

@@ -177,18 +177,21 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
         "confidence": 0.5,
         "flags": ["tie"],
     }
+    others = [{**event, "task": t, "label": t, "flags": ["short"]} for t in ("category", "object")]
     with touchmap.MapFile(path, info) as file:
         file.write([{"event": "onset", "contact": 1, "onset_s": 0.5}, event])
+        assert not touchmap.load(path).touches  # two tasks are still open
+        file.write(others)
         file.write([{**event, "contact": 2, "place": None}])
     with path.open("a") as damaged:
         damaged.write('{"event": "touch", "pla')
     with touchmap.MapFile(path, info) as file:
-        file.write([event])
+        file.write([event, *others])
     first, second = touchmap.load(path).touches
     assert first == second
     assert first.place == (0.1, 0.2, 0.3)
-    assert first.labels == {"mobility": "fixed"}
-    assert first.flags == ("tie",)
+    assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
+    assert first.flags == ("tie", "short")
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -14,17 +15,15 @@ from hypothesis import strategies as st
 from edge.arm import Chain, Joint
 from edge.features import feature_vector
 from edge.frame import Frame
+from edge.joints import Joints
 from edge.layout import SkinLayout
 from edge.region import largest_region
 from edge.track import FeatureSeries, Tracker, TrackSettings
 from tests.edge.test_region import SHAPES, check_against_reference
 from tests.hard_cases.cases import Case
-from tests.hard_cases.models import Array
 
 SEEDS = st.integers(0, 10**6)
-FOREARM = SkinLayout(
-    16, 24, True, (0.0108, 0.01205), 0.046, threshold_counts=50, onset_counts=50
-)
+FOREARM = SkinLayout(16, 24, True, (0.0108, 0.01205), 0.046, threshold_counts=50, onset_counts=50)
 
 
 def region_error(name: str, wraps: bool, connectivity: int) -> float:
@@ -96,7 +95,8 @@ def flicker_usual() -> str:
         peaks = scipy.ndimage.maximum(counts, labels, range(1, n + 1))
         mask = labels == 1 + int(np.argmax(peaks))
         places.append(FOREARM.position(*(float(v.mean()) for v in np.nonzero(mask))))
-    return f"each frame's highest region: jumps of {max(math.dist(p, places[0]) for p in places):.3f} m"
+    jump = max(math.dist(place, places[0]) for place in places)
+    return f"each frame's highest region: jumps of {jump:.3f} m"
 
 
 def full_error(value: int) -> float:
@@ -266,6 +266,24 @@ def wrapped_usual() -> str:
     return f"joint angles interpolated as numbers: the mean of 3.1 and -3.1 is {q.mean():g}, not pi"
 
 
+def line_error(angle: float, step: float) -> float:
+    """Error of the pose midway between two lines of a sender that wraps its angles."""
+
+    def wrap(q: float) -> float:
+        return math.remainder(q, 2.0 * math.pi)
+
+    text = "".join(
+        json.dumps({"t": t, "q": [wrap(q)]}) + "\n" for t, q in ((5.0, angle), (5.01, angle + step))
+    )
+    lines = iter([text.encode(), None])
+    joints = Joints(lambda: next(lines), dof=1, now=lambda: 0.0)
+    seen = joints.at(-0.005)
+    if seen is None:
+        return math.inf
+    turn = Chain([Joint("j", (0.0, 0.0, 1.0))])
+    return float(np.abs(turn.pose(seen) - turn.pose([angle + 0.5 * step])).max())
+
+
 def moved_error(seed: int) -> float:
     """Motion of a region that stays in the world while the link turns under it by 2 pi."""
     layout = replace(FOREARM, radius_m=None, pitch_m=0.01)
@@ -277,7 +295,6 @@ def moved_error(seed: int) -> float:
         contact = tracker.push(Frame(0.01 * i, taxels((3, 7)), joints=joints)) or contact
     assert contact is not None
     return float(np.abs(contact.series().motion).max())
-
 
 
 CASES = [
@@ -373,7 +390,7 @@ CASES = [
         "largest entry of R R^T - 1",
         5e-15,
         orthonormal_error,
-        [{"steps": 20_000, "reach": 2.0}],
+        [{"steps": 1_000_000, "reach": 2.0}],
         {"steps": st.just(2000), "reach": st.floats(0, 1e6)},
         orthonormal_usual,
         examples=8,
@@ -399,6 +416,16 @@ CASES = [
         wrapped_error,
         [{"turns": 1, "seed": s} for s in range(5)],
         {"turns": st.integers(-1000, 1000), "seed": SEEDS},
+    ),
+    Case(
+        "kinematics",
+        "a sender that wraps its angles between two lines",
+        "the pose midway on the shorter way",
+        "error of an entry",
+        2e-12,
+        line_error,
+        [{"angle": math.pi - 0.001, "step": 0.002}],
+        {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
         wrapped_usual,
     ),
     Case(

@@ -56,7 +56,7 @@ def describe(fitted: ContactClassifier) -> ModelInfo:
         window_s=1.2,
         samples=40,
         features=FEATURES,
-        units={name: "" for name in FEATURES},
+        units=dict.fromkeys(FEATURES, ""),
         motion_frame="skin",
         chain=None,
         rows=len(next(iter(fitted.labels_.values()))),
@@ -99,7 +99,10 @@ class Ours:
     def alone(self, queries: Array) -> Mapping[str, NDArray[Any]]:
         """The graph's answers to queries one by one, as the board asks."""
         parts = [self.model.run(queries[i : i + 1]) for i in range(len(queries))]
-        return {name.removeprefix("t_"): np.concatenate([p[name] for p in parts]) for p in parts[:1] for name in p}
+        return {
+            name.removeprefix("t_"): np.concatenate([part[name] for part in parts])
+            for name in parts[0]
+        }
 
     def judged(self, queries: Array) -> tuple[int, float]:
         """Queries whose neighbours, in order, or label are not the oracle's, and the largest
@@ -129,9 +132,9 @@ class Ours:
 def usual_pipeline(X: Array, components: int, k: int, y: Any) -> Any:
     """PCA and k-NN as scikit-learn fits them by default, brute force."""
     c = min(components, *X.shape)
-    return make_pipeline(
-        PCA(c, random_state=0), KNeighborsClassifier(k, algorithm="brute")
-    ).fit(X, y)
+    return make_pipeline(PCA(c, random_state=0), KNeighborsClassifier(k, algorithm="brute")).fit(
+        X, y
+    )
 
 
 def session(data: bytes, level: Any = None, threads: int = 1) -> Any:

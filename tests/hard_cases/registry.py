@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from tests.hard_cases import frames, neighbours, scaling
+from tests.hard_cases import everywhere, frames, neighbours, refusals, scaling, simulator
 from tests.hard_cases.cases import Case
 
-CASES: list[Case] = [*neighbours.CASES, *scaling.CASES, *frames.CASES]
+CASES: list[Case] = [
+    *neighbours.CASES,
+    *scaling.CASES,
+    *frames.CASES,
+    *refusals.CASES,
+    *everywhere.CASES,
+    *simulator.CASES,
+]

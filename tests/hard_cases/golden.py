@@ -1,0 +1,120 @@
+"""`python -m tests.hard_cases.golden`: a model and a golden file of each hard set of vectors.
+
+`edge-classify verify` on another machine, or with another ONNX Runtime, then says whether its
+answers are the same. Every golden file holds the same hard frames beside its vectors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from edge.files import write_whole
+from edge.model import Model
+from edge.recording import Recording, save
+from export import golden
+from export.__main__ import describe
+from export.graph import to_onnx
+from tests.conftest import FOREARM, touch
+from tests.hard_cases.models import Array, features, labels_for
+from tests.hard_cases.neighbours import SHORT, lattice, near_duplicates, offset_data
+from train.crossval import Chosen
+from train.dataset import DataSet, load_trials
+from train.pipeline import Choice, ContactClassifier
+
+
+def seam(recording: Recording) -> Recording:
+    """The contact turned so that it lies across the seam."""
+    column = int(recording.frames[-1].sum(axis=0).argmax())
+    return replace(recording, frames=np.roll(recording.frames, -column, axis=2))
+
+
+def saturated(recording: Recording) -> Recording:
+    full = np.where(recording.frames > 0, 65535, 0).astype(np.uint16)
+    return replace(recording, frames=full)
+
+
+def jittered(recording: Recording) -> Recording:
+    """Uneven times, one instant twice, a gap."""
+    rng = np.random.default_rng(1)
+    t = np.cumsum(rng.uniform(0.002, 0.018, len(recording.t)))
+    t[60] = t[59]
+    t[80:] += 0.15
+    return replace(recording, t=t)
+
+
+def split(recording: Recording) -> Recording:
+    """The taxel with the most force cannot be read."""
+    valid = np.ones(FOREARM.shape, dtype=bool)
+    valid[np.unravel_index(recording.frames[-1].argmax(), FOREARM.shape)] = False
+    return replace(recording, valid=valid)
+
+
+def wrapped(recording: Recording) -> Recording:
+    assert recording.joints is not None
+    joints = recording.joints.copy()
+    joints[::2, 0] += 2.0 * math.pi
+    return replace(recording, joints=joints)
+
+
+def short(recording: Recording) -> Recording:
+    """Let go after half the window, and touched from the first frame on."""
+    frames = recording.frames[20:].copy()
+    frames[60:] = 0
+    assert recording.joints is not None
+    return replace(recording, frames=frames, t=recording.t[20:], joints=recording.joints[20:])
+
+
+def hard_trials(folder: Path) -> DataSet:
+    """Contacts with everything that frames and times can do to them, stored in a folder."""
+    changes = (seam, saturated, jittered, split, wrapped, short)
+    for seed, change in enumerate(changes):
+        for kind in ("hard", "soft"):
+            trial = change(touch(kind=kind, seed=seed))
+            save(folder / f"{change.__name__}-{kind}.npz", trial)
+    return load_trials([folder])
+
+
+def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
+    """Training vectors of each hard case, and what is fitted on them."""
+    own = dataset.features()
+    return {
+        "frames": (own, Choice("IV", 5, 2)),
+        "near-duplicates": (near_duplicates(160, 1e-7, 0)[0], Choice("none", 6, 5)),
+        "near-duplicates-shortlist": (near_duplicates(SHORT, 1e-7, 0)[0], Choice("none", 6, 5)),
+        "shortlist": (features(SHORT), Choice("IV", 20, 4)),
+        "offset": (offset_data(1e6, 0.01, 0)[0], Choice("none", 6, 5)),
+        "tiny": (features(160) * 1e-24, Choice("none", 6, 5)),
+        "huge": (features(SHORT) * 1e20, Choice("none", 6, 5)),
+        "equal-distances": (lattice(0)[0], Choice("none", 3, 8)),
+        "duplicates": (np.repeat(features(40), 4, axis=0), Choice("IV", 20, 4)),
+    }
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write OUT/CASE/model.onnx and golden.npz."""
+    parser = argparse.ArgumentParser(prog="golden", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("build/hard-cases/golden"))
+    arguments = parser.parse_args(argv)
+    with tempfile.TemporaryDirectory() as trials:
+        dataset = hard_trials(Path(trials))
+        for name, (X, choice) in vectors(dataset).items():
+            fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels_for(X)})
+            info = describe(dataset, fitted, {"t": Chosen(choice, 0.0)}, 1.2)
+            folder = arguments.out / name
+            with write_whole(folder / "model.onnx") as file:
+                file.write(to_onnx(fitted, info))
+            golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
+            print(folder)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

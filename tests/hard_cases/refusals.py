@@ -1,0 +1,189 @@
+"""What is not finite, or out of range, is refused wherever it can enter."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from edge.arm import Chain, Joint
+from edge.errors import InputError
+from edge.features import feature_vector
+from edge.frame import Frame
+from edge.joints import Joints
+from edge.layout import SkinLayout
+from edge.model import ModelInfo
+from edge.recording import Recording, load, save
+from edge.track import Tracker
+from tests.hard_cases.cases import Case
+from tests.hard_cases.frames import FOREARM, flicker_frames, series_of, taxels
+from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline
+from train.crossval import leave_one_out
+from train.pipeline import Choice, ContactClassifier
+from train.simulate.scene import from_dict
+
+BAD = (float("nan"), float("inf"), float("-inf"))
+
+
+def recording(bad: float, key: str) -> None:
+    t, joints = np.arange(3.0), np.zeros((3, 5))
+    {"t": t, "joints": joints.reshape(-1)}[key][2] = bad
+    trial = Recording(t, np.zeros((3, 4, 4), np.uint16), joints, None, {})
+    with tempfile.TemporaryDirectory() as folder:
+        save(Path(folder) / "x.npz", trial)
+
+
+def stored(bad: float, key: str) -> None:
+    arrays = {"t": np.arange(3.0), "frames": np.zeros((3, 4, 4), np.uint16)}
+    arrays["joints"] = np.zeros((3, 5))
+    arrays[key].reshape(-1)[2] = bad
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder) / "x.npz", meta=np.array("{}"), **arrays)
+        load(Path(folder) / "x.npz")
+
+
+def frame(bad: float, what: str) -> None:
+    times = np.full((16, 24), bad if what == "times" else 0.0)
+    joints = np.full(5, bad if what == "joints" else 0.0)
+    tracker = Tracker(FOREARM, chain=Chain.cody())
+    t = bad if what == "t" else 0.0
+    tracker.push(Frame(t, taxels((3, 3)), times=times, joints=joints))
+
+
+def line(bad: float) -> None:
+    lines = iter([json.dumps({"t": 1.0, "q": [bad]}).encode() + b"\n", None])
+    joints = Joints(lambda: next(lines), dof=1, now=lambda: 1.0)
+    if joints.at(1.0) is None and joints.malformed == 1:
+        raise InputError(joints.problem)
+
+
+@cache
+def small_model() -> Ours:
+    return Ours(features(30), components=5, k=3)
+
+
+def vector(bad: float) -> None:
+    x = features(1)[0]
+    x[43] = bad
+    small_model().model.decide(x)
+
+
+def graph(bad: float) -> None:
+    """Every position in one batch; the graph itself answers -1 and votes for nothing."""
+    queries = np.repeat(features(1, 1), 121, axis=0)
+    queries[np.arange(120), np.arange(120)] = bad
+    answer = small_model().model.run(queries)
+    refused = (answer["t_label"][:120] == -1).all() and not answer["t_scores"][:120].any()
+    if refused and answer["t_label"][120] >= 0:
+        raise InputError("label -1")
+
+
+def fit(bad: float) -> None:
+    X = features(12)
+    X[3, 3] = bad
+    ContactClassifier({"t": Choice("none", 2, 1)}).fit(X, {"t": labels_for(X)})
+
+
+def left_out(bad: float) -> None:
+    X = features(12)
+    X[3, 3] = bad
+    leave_one_out(X, labels_for(X))
+
+
+def window(bad: float) -> None:
+    feature_vector(series_of(flicker_frames(0)), bad)
+
+
+def metadata(bad: float) -> None:
+    text = small_model().model.info.to_json().replace('"window_s": 1.2', f'"window_s": {bad}')
+    ModelInfo.from_json(text.replace("nan", "NaN").replace("inf", "Infinity"), "model.onnx")
+
+
+def scene(bad: float) -> None:
+    thing = {"name": "x", "family": "rigid", "conditions": ["movable"], "mass_kg": bad}
+    from_dict({"object": [{**thing, "friction_static": 0.5, "friction_kinetic": 0.4}]})
+
+
+ENTRIES: dict[str, Callable[[float], object]] = {
+    "a recording's times, written": lambda bad: recording(bad, "t"),
+    "a recording's joint angles, written": lambda bad: recording(bad, "joints"),
+    "a recording's times, read": lambda bad: stored(bad, "t"),
+    "a recording's joint angles, read": lambda bad: stored(bad, "joints"),
+    "a frame's time": lambda bad: frame(bad, "t"),
+    "a frame's chip times": lambda bad: frame(bad, "times"),
+    "a frame's joint angles": lambda bad: frame(bad, "joints"),
+    "a line of joint angles": line,
+    "an angle given to the arm": lambda bad: Chain.cody().pose([bad] * 5),
+    "an arm's axis": lambda bad: Chain([Joint("j", (0.0, 0.0, bad))]),
+    "a skin's scale": lambda bad: SkinLayout.from_dict(
+        {"rows": 2, "cols": 2, "counts_per_newton": bad}
+    ),
+    "a skin's pitch": lambda bad: SkinLayout.from_dict({"rows": 2, "cols": 2, "pitch_m": bad}),
+    "a window": window,
+    "a feature vector": vector,
+    "the graph": graph,
+    "a training vector": fit,
+    "leave-one-out": left_out,
+    "a model's metadata": metadata,
+    "a scene's mass": scene,
+}
+
+
+def let_in(entry: str, bad: float) -> float:
+    """1 where an entry takes a value that is not finite."""
+    try:
+        ENTRIES[entry](bad)
+    except InputError:
+        return 0.0
+    return 1.0
+
+
+def beyond_error(size: float) -> float:
+    """1 where a finite vector too large for any distance gets a label."""
+    try:
+        small_model().model.decide(np.full(120, size))
+    except InputError:
+        return 0.0
+    return 1.0
+
+
+def usual() -> str:
+    X = features(30)
+    pipe = usual_pipeline(X, 5, 1, np.arange(30))
+    queries = np.repeat(features(1, 1), 3, axis=0).astype(np.float32)
+    queries[:, 43] = BAD
+    said = np.ravel(converted(pipe, X).run(None, {"X": queries})[0]).tolist()
+    try:
+        pipe.predict(queries)
+        raises = "answers"
+    except ValueError:
+        raises = "raises"
+    return f"skl2onnx answers NaN, inf and -inf with rows {said}; scikit-learn {raises}"
+
+
+CASES = [
+    Case(
+        "refusals",
+        f"NaN and infinity at {len(ENTRIES)} places where they can enter",
+        "one sentence, no result",
+        "let in",
+        0,
+        let_in,
+        [{"entry": entry, "bad": bad} for entry in ENTRIES for bad in BAD],
+        usual=usual,
+    ),
+    Case(
+        "refusals",
+        "finite, but beyond any distance",
+        "one sentence, no result",
+        "let in",
+        0,
+        beyond_error,
+        [{"size": s} for s in (1e200, -1e300, 1.7e308)],
+        usual=lambda: "float32 input: infinity from 3.4e38 on, then row 0's label",
+    ),
+]

@@ -1,0 +1,161 @@
+"""The simulator's hard cases, by its own judges."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from tests.hard_cases.cases import Case
+from tests.train.simulate.conftest import Rig
+from tests.train.simulate.test_simulate_stability import (
+    SPEED,
+    cases,
+    judge,
+    lugre,
+    naive_push,
+    tilt_cases,
+    tilt_error,
+)
+from train.simulate import contact
+from train.simulate.effects import tilt
+
+SEEDS = st.integers(0, 10**6)
+
+
+def judged(
+    stiffness: np.ndarray, mass: np.ndarray, h: np.ndarray, mu: np.ndarray, steps: int
+) -> float:
+    """Cases with a complaint, of a push against a spring with friction."""
+    rig = Rig(
+        h=h,
+        speed=SPEED,
+        slopes=stiffness[None],
+        intercepts=np.zeros((1, stiffness.size)),
+        effects=("sliding",),
+        mass_kg=mass,
+        friction_static=mu,
+        friction_kinetic=0.8 * mu,
+    )
+    trace = rig.run(steps)
+    wrong = 0
+    for i in range(stiffness.size):
+        one = type(trace)(**{k: v[:, i : i + 1] for k, v in vars(trace).items()})
+        wrong += bool(judge(one, stiffness[i], mass[i], h[i], mu[i], 0.8 * mu[i]))
+    return float(wrong)
+
+
+def grid_error(steps: int) -> float:
+    return judged(*cases(), steps)
+
+
+def around_error(stiffness: float, mass: float, h: float, mu: float) -> float:
+    one = [np.array([10.0**stiffness]), np.array([10.0**mass]), np.array([10.0**h])]
+    return judged(*one, np.array([mu]), 60)
+
+
+def grid_usual() -> str:
+    masses, springs = (1.0, 1e-3, 1e-6, 1e-9), (1e3, 1e6, 1e9, 1e12)
+    usable = {
+        scheme: sum(naive_push(scheme, k, m) for k in springs for m in masses)
+        for scheme in ("explicit", "semi-implicit", "rk4")
+    }
+    shares = ", ".join(f"{scheme} {n}" for scheme, n in usable.items())
+    grown = lugre(0.01, explicit=True)
+    return f"usable of 16 cases at 10 ms: {shares}; explicit LuGre grows to {grown:.0e}"
+
+
+def tilt_worst(seed: int, count: int) -> float:
+    state, free, c = tilt_cases(count, seed)
+    return float(tilt_error(state, free, c, tilt.solve(state, free, c)).max())
+
+
+def tilt_usual() -> str:
+    state, free, c = tilt_cases(4000, 1)
+    guarded = tilt.guarded
+    try:
+        tilt.guarded = lambda state, y, free, c, open_: y  # type: ignore[assignment]
+        left = tilt_error(state, free, c, tilt.solve(state, free, c))
+    finally:
+        tilt.guarded = guarded
+    return (
+        f"Newton without its line search: {(left > 1e-6).sum()} of 4000 wrong, {left.max():.0e} m"
+    )
+
+
+def shared_error(stiff: float, seed: int) -> float:
+    """Taxel forces that do not add up to the contact's, on a bed as stiff as `stiff` N/m."""
+    rng = np.random.default_rng(seed)
+    gaps = np.sort(rng.uniform(0.0, 1e-3, (7, 50)), axis=0)
+    gaps[0] = 0.0
+    k = np.full((7, 50), stiff)
+    slopes, intercepts = contact.sort_bed(gaps, k)
+    trace = Rig(h=0.01, slopes=slopes, intercepts=intercepts).run(30)
+    force = trace.force[-1]
+    loads = contact.spring_loads(trace.depth[-1][None], gaps, k, np.ones((1, 50)))
+    held = loads.sum(axis=(0, 1)) > 0.0
+    whole = contact.share_out(force, loads.copy()).sum(axis=(0, 1))
+    return float(np.abs(whole[held] / force[held] - 1.0).max(initial=0.0))
+
+
+def shared_usual() -> str:
+    gaps = np.zeros((7, 1))
+    gaps[1:] = 5e-4
+    k = np.full((7, 1), 1e15)
+    slopes, intercepts = contact.sort_bed(gaps, k)
+    trace = Rig(h=0.01, slopes=slopes, intercepts=intercepts).run(30)
+    loads = contact.spring_loads(trace.depth[-1][None], gaps, k, np.ones((1, 1)))
+    off = abs(float(loads.sum() / trace.force[-1, 0]) - 1.0)
+    return f"stiffness times depth at 1e15 N/m: off by {off:.1e}"
+
+
+CASES = [
+    Case(
+        "simulator",
+        "stiffness x mass x step x friction, 1e-3 to 1e15 N/m, 1e-9 to 1e9 kg, to 0.2 s",
+        "force, stick, energy ledger",
+        "cases with a complaint",
+        0,
+        grid_error,
+        [{"steps": 40}],
+        usual=grid_usual,
+    ),
+    Case(
+        "simulator",
+        "between the grid's points",
+        "force, stick, energy ledger",
+        "cases with a complaint",
+        0,
+        around_error,
+        [{"stiffness": 15.0, "mass": -9.0, "h": -0.7, "mu": 1.0}],
+        {
+            "stiffness": st.floats(-3, 15),
+            "mass": st.floats(-9, 9),
+            "h": st.floats(-3, -0.7),
+            "mu": st.floats(0.05, 1.0),
+        },
+    ),
+    Case(
+        "simulator",
+        "tilt on beds up to 1e12 N/m",
+        "the one minimum of a convex energy",
+        "metres from it",
+        1e-9,
+        tilt_worst,
+        [{"seed": 1, "count": 1000}],
+        {"seed": SEEDS, "count": st.just(200)},
+        tilt_usual,
+        examples=5,
+    ),
+    Case(
+        "simulator",
+        "taxel forces on a bed of 1e15 N/m",
+        "they add up to the contact's force",
+        "relative error",
+        1e-14,
+        shared_error,
+        [{"stiff": 1e15, "seed": 0}],
+        {"stiff": st.floats(2, 15).map(lambda e: 10.0**e), "seed": SEEDS},
+        shared_usual,
+        examples=6,
+    ),
+]
