@@ -46,6 +46,7 @@ class Mutant:
 
 
 PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/track.py"
+BUILD = "export/build.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/features.py", "edge/region.py"
 HARD = "tests/hard_cases/test_hard_cases.py"
 OF_PIPELINE, OF_GRAPH = "tests/train/test_pipeline.py", "tests/export/test_graph.py"
@@ -140,7 +141,7 @@ MUTANTS = (
     ),
     Mutant(
         "the graph's projection: high half",
-        GRAPH,
+        BUILD,
         'half = build.node("Sub", [build.node("Add", [d, step]), step])',
         'half = build.node("Mul", [d, build.constant(0.5)])',
         (OF_GRAPH, "scaling_agrees or equals_a_training_row or all_at_once"),
@@ -159,15 +160,15 @@ MUTANTS = (
     Mutant(
         "the shortlist is checked",
         GRAPH,
-        'sure = build.node("Less", [build.node("Add", [kth, build.constant(slack)]), reach])',
+        'sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])',
         'sure = build.node("LessOrEqual", [kth, kth])',
         (OF_GRAPH, "too_narrow"),
     ),
     Mutant(
         "the check allows for float32's rounding",
         GRAPH,
-        "slack = 2.0 * u * float(lengths.max())",
-        "slack = u = 0.0",
+        "slack = [2.0 * u * float(of.max()) for of in lengths]",
+        "slack, u = [0.0 for of in lengths], 0.0",
         (OF_GRAPH, "clusters"),
     ),
     Mutant(
@@ -180,15 +181,15 @@ MUTANTS = (
     Mutant(
         "the shortlist's rows are brought to float32's size",
         GRAPH,
-        "    unit = _unit(rows)\n",
-        "    unit = 1.0\n",
+        "units = [_unit(r) for r in rows]",
+        "units = [1.0 for r in rows]",
         (OF_GRAPH, "float32_cannot_hold"),
     ),
     Mutant(
         "no shortlist of nearly all rows",
         GRAPH,
-        "len(rows) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows)",
-        "len(rows) >= SHORTLIST_ROWS",
+        "short = len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
+        "short = len(rows[0]) >= SHORTLIST_ROWS",
         (OF_GRAPH, "voters_as_rows"),
     ),
     Mutant(
@@ -215,8 +216,8 @@ MUTANTS = (
     Mutant(
         "leave-one-out: equal distances at the partition's limit",
         CROSSVAL,
-        "among = np.flatnonzero(squares <= limit)",
-        "among = np.argpartition(squares, k - 1)[:k]",
+        "among = np.flatnonzero(near)",
+        "among = np.argpartition(row, k - 1)[:k]",
         (OF_CROSSVAL, "limit"),
     ),
     Mutant(
@@ -264,7 +265,7 @@ MUTANTS = (
     Mutant(
         "one frame alone begins no contact",
         TRACK,
-        "if self._run < self.settings.debounce:",
+        "if self._run < of.settings.debounce:",
         "if False:",
         (OF_TRACK, "one_frame_alone"),
     ),
