@@ -4,12 +4,18 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 
-.PHONY: help venv test lint types export demo bench faults soak hard-cases hard-cases-versions mutants clean
+.PHONY: help venv test lint types export demo demo-data golden study wheel wheel-test board-test \
+  hard-cases hard-cases-versions mutants bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
 	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
 	@echo "make demo     export, then replay: decisions on a small simulated set"
+	@echo "make study    every analysis of the paper, ours beside it: build/study/report.html; DATA= for yours"
+	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
+	@echo "make wheel-test   the wheel in an empty environment, away from here"
+	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
+	@echo "make demo-data    the model and touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make hard-cases   what each hard case costs us and the usual stack, as a table"
@@ -65,6 +71,15 @@ demo: $(READY)
 	$(BIN)/edge-classify replay --model $(DEMO)/model.onnx --summary $(DEMO)/unseen
 	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
 
+# The committed model and outputs that the tests hold the edge to.
+golden: $(READY)
+	$(BIN)/python -m tests.golden.make
+
+# The README's picture.
+docs/touch.png: $(READY)
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
+	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --scene --out $@
+
 BENCHVENV := $(VENV)/.bench
 
 $(BENCHVENV): $(READY)
@@ -76,11 +91,40 @@ bench: $(BENCHVENV)
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
 
+ifndef DATA
+study: $(SIMULATED)/.made
+STUDIED := --scene $(SCENE)
+endif
+
+study: $(READY)
+	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
+
 faults: $(READY)
 	$(BIN)/python -m bench.faults
 
 soak: $(READY)
 	$(BIN)/python -m bench.soak
+
+# Stale copies of modules would go into the wheel.
+wheel: $(READY)
+	rm -rf build/lib build/bdist.* dist
+	PIP_CONSTRAINT=$(CURDIR)/constraints.txt SOURCE_DATE_EPOCH=1577836800 \
+	  $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w dist .
+
+wheel-test: wheel
+	$(BIN)/python -m pytest board/test_wheel.py
+
+board-test: wheel
+	$(BIN)/python -m pytest board/test_aarch64.py -rs --capture=tee-sys
+
+DEMODATA := $(OUT)/demo-data
+
+demo-data: $(READY)
+	rm -rf $(DEMODATA)
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
+	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA)
+	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
 
 HARD := $(OUT)/hard-cases
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,8 @@ def feature_vector(
     wanted = measures.features(tuple(features))
     step = window_s / (samples - 1)
     times = np.arange(samples, dtype=np.float64) * step
-    values = np.stack([measured(series, feature) for feature in wanted])
+    places: dict[str, _Place] = {}
+    values = np.stack([_measured(series, feature, places) for feature in wanted])
     known = np.isfinite(values)
     if known.all():
         vector = _resample(times, series.t, values)
@@ -79,14 +81,12 @@ def feature_vector(
     return vector.reshape(-1)
 
 
-def measured(series: FeatureSeries, feature: Feature) -> NDArray[np.float64]:
-    """(n,) the feature's value (not its rate) in every frame; NaN where it cannot be known.
-
-    Raises:
-        InputError: the series was not measured for it.
-    """
+def _measured(
+    series: FeatureSeries, feature: Feature, places: dict[str, _Place]
+) -> NDArray[np.float64]:
+    """(n,) the feature's value (not its rate) in every frame; NaN where it cannot be known."""
     place, quantity = feature.place, feature.quantity
-    values: NDArray[Any] | None
+    values: NDArray[Any] | None = None
     if quantity == "motion":
         values = series.contact_motion
     elif quantity == "force_motion":
@@ -97,69 +97,92 @@ def measured(series: FeatureSeries, feature: Feature) -> NDArray[np.float64]:
         values = series.max_force
     elif (place, quantity) == ("contact", "area"):
         values = series.contact_area
-    else:
-        sums = series.places.get(place)
-        values = None if sums is None else _quantity(quantity, sums, series)
+    elif place in series.places:
+        if place not in places:
+            places[place] = _Place(series.places[place], series)
+        values = getattr(places[place], quantity)()
     if values is None:
         raise InputError(f"{feature.name} was not measured; name it where contacts are followed")
     return np.asarray(values, dtype=np.float64)
 
 
-def _quantity(quantity: str, sums: NDArray[np.int64], series: FeatureSeries) -> NDArray[Any]:
-    scale = 1.0 if series.counts_per_newton is None else series.counts_per_newton
-    if quantity == "max_force":
-        return np.asarray(sums[:, PEAK] / scale)
-    if quantity == "force":
-        return np.asarray(sums[:, FORCE] / scale)
-    if quantity == "area":
-        return sums[:, AREA]
-    if quantity in ("along", "around"):
-        return _centroid(quantity, sums, series.turn)
-    return _spread(quantity, sums)
+class _Place:
+    """The quantities of one place, from the sums measured there (n, 8)."""
 
+    def __init__(self, sums: NDArray[np.int64], series: FeatureSeries) -> None:
+        self._sums, self._turn = sums, series.turn
+        self._scale = 1.0 if series.counts_per_newton is None else series.counts_per_newton
+        self._force = sums[:, FORCE]
 
-def _centroid(quantity: str, sums: NDArray[np.int64], turn: int | None) -> NDArray[np.float64]:
-    force = sums[:, FORCE]
-    there = force > 0
-    centre = np.full(len(sums), np.nan)
-    np.divide(sums[:, ROWS if quantity == "along" else COLS], force, out=centre, where=there)
-    if quantity == "around" and turn is not None:
-        # A contact that crosses the seam goes on, it does not jump to the other end.
-        centre[there] = np.unwrap(centre[there] % turn, period=turn)
-    return centre
+    def max_force(self) -> NDArray[np.float64]:
+        return np.asarray(self._sums[:, PEAK] / self._scale)
 
+    def force(self) -> NDArray[np.float64]:
+        return np.asarray(self._force / self._scale)
 
-def _spread(quantity: str, sums: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Second central moments; 0 where nothing lies.
+    def area(self) -> NDArray[np.int64]:
+        return self._sums[:, AREA]
 
-    Variances times force squared are whole numbers, so nothing cancels. The width is the
-    determinant over the larger eigenvalue, as their difference would cancel; what rounding
-    leaves of the determinant of a perfect line is below 2^-25 of the skin's larger side.
-    """
-    force = sums[:, FORCE]
-    largest = int(np.abs(sums).max(initial=0))
-    # Skins whose sums squared leave 64 bits take Python's integers.
-    kind: Any = np.int64 if largest * max(int(force.max(initial=0)), 1) < 1 << 62 else object
-    s = sums.astype(kind)
-    scale = np.maximum(force, 1).astype(np.float64)
+    def along(self) -> NDArray[np.float64]:
+        return self._centroid(ROWS)
 
-    def central(both: int, one: int, other: int) -> NDArray[np.float64]:
-        product = s[:, FORCE] * s[:, both] - s[:, one] * s[:, other]
-        return np.asarray(product.astype(np.float64) / scale / scale)
+    def around(self) -> NDArray[np.float64]:
+        centre, there = self._centroid(COLS), self._force > 0
+        if self._turn is not None:
+            # A contact that crosses the seam goes on, it does not jump to the other end.
+            centre[there] = np.unwrap(centre[there] % self._turn, period=self._turn)
+        return centre
 
-    if quantity == "spread_along":
-        return np.sqrt(central(ROWS_ROWS, ROWS, ROWS))
-    if quantity == "spread_around":
-        return np.sqrt(central(COLS_COLS, COLS, COLS))
-    slant = central(ROWS_COLS, ROWS, COLS)
-    if quantity == "slant":
-        return slant
-    along, around = central(ROWS_ROWS, ROWS, ROWS), central(COLS_COLS, COLS, COLS)
-    larger = 0.5 * (along + around + np.hypot(along - around, 2.0 * slant))
-    if quantity == "length":
-        return np.sqrt(larger)
-    determinant = np.maximum(along * around - slant * slant, 0.0)
-    return np.sqrt(np.divide(determinant, larger, out=np.zeros(len(sums)), where=larger > 0.0))
+    def spread_along(self) -> NDArray[np.float64]:
+        return np.sqrt(self._central[0])
+
+    def spread_around(self) -> NDArray[np.float64]:
+        return np.sqrt(self._central[1])
+
+    def slant(self) -> NDArray[np.float64]:
+        return self._central[2]
+
+    def length(self) -> NDArray[np.float64]:
+        return np.sqrt(self._larger)
+
+    def width(self) -> NDArray[np.float64]:
+        """By the determinant over the larger eigenvalue, as their difference would cancel.
+
+        What rounding leaves of the determinant of a perfect line is below 2^-25 of the skin's
+        larger side.
+        """
+        along, around, slant = self._central
+        determinant = np.maximum(along * around - slant * slant, 0.0)
+        larger = self._larger
+        return np.sqrt(np.divide(determinant, larger, out=np.zeros_like(larger), where=larger > 0))
+
+    def _centroid(self, column: int) -> NDArray[np.float64]:
+        """NaN where nothing lies."""
+        centre = np.full(len(self._sums), np.nan)
+        np.divide(self._sums[:, column], self._force, out=centre, where=self._force > 0)
+        return centre
+
+    @cached_property
+    def _central(self) -> tuple[NDArray[np.float64], ...]:
+        """Variances along and around and the covariance; 0 where nothing lies.
+
+        Times force squared they are whole numbers, so nothing cancels.
+        """
+        bound = int(self._sums.max(initial=0)) * int(self._force.max(initial=0))
+        # Skins whose sums squared leave 64 bits take Python's integers.
+        s = self._sums if bound < 1 << 62 else self._sums.astype(object)
+        scale = np.maximum(self._force, 1).astype(np.float64)
+        triples = (ROWS_ROWS, ROWS, ROWS), (COLS_COLS, COLS, COLS), (ROWS_COLS, ROWS, COLS)
+        return tuple(
+            (s[:, FORCE] * s[:, both] - s[:, one] * s[:, other]).astype(np.float64) / scale / scale
+            for both, one, other in triples
+        )
+
+    @cached_property
+    def _larger(self) -> NDArray[np.float64]:
+        along, around, slant = self._central
+        larger = 0.5 * (along + around + np.hypot(along - around, 2.0 * slant))
+        return np.asarray(larger)
 
 
 def _resample(

@@ -10,6 +10,9 @@
 | `series_counts` | int64 (s, c) | `FeatureSeries.integers`: exact |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
+| `<task>_pvalues` | float64 (v, folds, labels + 1) | likewise, of a model with looks |
+| `look_vectors` | float64 (looks, w, width) | vectors for each look; the first m are the trials' |
+| `<task>_look_label`, ... | | the graph's outputs for `look_vectors`, each at its look |
 | `meta` | JSON text | `skin`, `bounds` {`scores`, `distances`, `features`, `time_s`} |
 
 A bound b allows abs(seen - expected) <= b * max(1, abs(expected)).
@@ -139,6 +142,7 @@ def _verify_path(
     info = model.info
     onsets = np.full(len(trials), np.nan)
     vectors = np.full((len(trials), info.width), np.nan)
+    look_vectors = np.full((len(info.looks_s), *vectors.shape), np.nan)
     starts = arrays["series_start"]
     counts: list[NDArray[np.int64]] = []
     wrong_length: Check | None = None
@@ -150,6 +154,8 @@ def _verify_path(
         if found is not None:
             onsets[i], series = found
             vectors[i] = feature_vector(series, info.window_s, info.samples, info.features)
+            for look, window in enumerate(info.looks_s):
+                look_vectors[look, i] = feature_vector(series, window, info.samples, info.features)
             seen = series.integers
             if seen.shape == rows.shape:
                 rows = seen
@@ -159,11 +165,16 @@ def _verify_path(
                 )
         counts.append(rows)
     expected = arrays["vectors"][: len(trials)]
+    at_looks = []
+    if info.looks_s:
+        stored = arrays["look_vectors"][:, : len(trials)]
+        at_looks = [_close("features at looks", look_vectors, stored, bounds["features"])]
     return [
         wrong_length or Check("series length", len(trials), 0.0, None),
         _exact("series counts", np.concatenate(counts), arrays["series_counts"]),
         _close("onset", onsets, arrays["onset_s"], bounds["time_s"]),
         _close("features", vectors, expected, bounds["features"]),
+        *at_looks,
     ]
 
 
@@ -176,23 +187,56 @@ def _verify_graph(
             f"{name}: its vectors are {vectors.shape[1:]} long, "
             f"{model.path} takes {model.info.width}; export both together"
         )
-    tasks = sorted(key.removesuffix("_label") for key in arrays if key.endswith("_label"))
+    tasks = sorted(
+        key.removesuffix("_label")
+        for key in arrays
+        if key.endswith("_label") and not key.endswith("_look_label")
+    )
     if tasks != sorted(model.info.tasks):
         raise InputError(
             f"{name}: is for the tasks {', '.join(tasks) or 'none'}, {model.path} answers "
             f"{', '.join(sorted(model.info.tasks))}; export both together"
         )
-    # One by one, as the board asks.
-    single = [model.run(vectors[i : i + 1]) for i in range(len(vectors))]
+    checks = _compare(model, outputs(model, vectors), arrays, bounds, "")
+    if model.info.looks_s:
+        at_looks = np.ascontiguousarray(arrays["look_vectors"], dtype=np.float64)
+        if at_looks.shape[::2] != (len(model.info.looks_s), model.info.width):
+            raise InputError(f"{name}: has no vectors for the model's looks; export both together")
+        seen = [outputs(model, rows, look) for look, rows in enumerate(at_looks)]
+        stacked = {key: np.stack([one[key] for one in seen]) for key in seen[0]}
+        checks += _compare(model, stacked, arrays, bounds, "look_")
+    return checks
+
+
+def parts(model: Model) -> tuple[str, ...]:
+    """What a model says of a task."""
+    return (*PARTS, "pvalues") if model.info.looks_s else PARTS
+
+
+def outputs(
+    model: Model, vectors: NDArray[np.float64], look: int | None = None
+) -> dict[str, NDArray[Any]]:
+    """The graph's outputs for vectors (n, width), asked one by one as the board does."""
+    single = [model.run(vectors[i : i + 1], look) for i in range(len(vectors))]
+    return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
+
+
+def _compare(
+    model: Model,
+    seen: dict[str, NDArray[Any]],
+    arrays: dict[str, NDArray[Any]],
+    bounds: dict[str, float],
+    prefix: str,
+) -> list[Check]:
     checks: list[Check] = []
     for task in model.info.tasks:
-        for part in PARTS:
-            key = f"{task}_{part}"
-            seen = np.concatenate([row[key] for row in single])
+        for part in parts(model):
+            key = f"{task}_{prefix}{part}"
+            values = seen[f"{task}_{part}"]
             if part in bounds:
-                checks.append(_close(key, seen, arrays[key], bounds[part]))
+                checks.append(_close(key, values, arrays[key], bounds[part]))
             else:
-                checks.append(_exact(key, seen, arrays[key]))
+                checks.append(_exact(key, values, arrays[key]))
     return checks
 
 

@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, field
 from typing import Any
 
+from edge.candidates import ALARMS, UNKNOWN, Candidates, check_rate
 from edge.errors import InputError
 from edge.features import feature_vector
 from edge.frame import Frame
 from edge.layout import SkinLayout
-from edge.model import Model
-from edge.track import Contact, Tracker, for_device
+from edge.model import Decision, Model
+from edge.track import Contact, Tracker, Tracks, for_device
 
 Event = dict[str, Any]
 """One JSON object; `event` says which."""
+
+
+@dataclass
+class _Waiting:
+    """A contact that has yet to be decided for some tasks."""
+
+    contact: Contact
+    number: int
+    look: int
+    """The next of the model's looks."""
+    tasks: list[str]
+    candidates: dict[str, Candidates] = field(default_factory=dict)
+    """By task, where an error rate was asked for."""
 
 
 class Watcher:
@@ -26,37 +41,82 @@ class Watcher:
       `latency_ms` (from the frame that completed the window to the decision) and `flags`;
     - `release`: `onset_s`, `release_s`.
 
+    With an error rate, a task is decided at the first of the model's looks that leaves one
+    label, else at the full window. `window_s` is then that look's, `confidence` is one less the
+    smallest error at which another label would be left, and a decision also has `error` (asked
+    for) and `left` (labels that were not struck out). The further flags are `unknown` (`label`
+    is "unknown": no label is left, or the contact lies too far from all that was trained) and
+    `unsure` (several are left, and the best of them was taken).
+
     Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended
     inside the window; its last values held), `missing_taxels` (taxels could not be read),
     `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
     measured on the skin, though the model's is in the world: see `run --without-joints`),
     `out_of_range` (`label` is
     None: the features are too large to be measured against the training rows).
+
+    With `several`, every region is followed on its own, and each event says of which `contact`
+    it is (counted from 1 in the order of their events); a decision then has its `place` too
+    ([x, y, z], see `edge.track.Contact.place`), None where it is not known.
     """
 
-    def __init__(self, model: Model, layout: SkinLayout | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        layout: SkinLayout | None = None,
+        *,
+        error: float | None = None,
+        alarms: float = ALARMS,
+        several: bool = False,
+    ) -> None:
         """Watch with a model.
 
         Args:
             model: what decides.
             layout: the skin that gives the frames; the model's own where None.
+            error: how often a label may be wrong, in (0, 1), to decide as soon as that allows;
+                None decides at the full window.
+            alarms: how often a trained thing may be called unknown for lying far from all.
+            several: follow every region, not the largest alone.
 
         Raises:
-            InputError: the skin is not the one that the model was made for.
+            InputError: the skin is not the one that the model was made for, a rate is outside
+                (0, 1), or the model has no calibration to hold an error rate with.
         """
         info = model.info
+        if error is not None:
+            check_rate(error, "the error rate")
+            check_rate(alarms, "the rate of false alarms")
+            if not info.looks_s:
+                raise InputError(
+                    f"{model.path}: has no calibration to hold an error rate with; "
+                    "export it with --looks"
+                )
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
-        self.tracker = Tracker(
+        self.several = several
+        self.tracker = (Tracks if several else Tracker)(
             self.layout,
             info.tracking,
             chain=info.chain,
             horizon_s=info.window_s,
             features=info.features,
         )
-        self._waiting: list[Contact] = []
-        self._current: Contact | None = None
-        self._last_s: float | None = None
+        self.error, self.alarms = error, alarms
+        self._waiting: list[_Waiting] = []
+        self._current: dict[int, Contact] = {}
+        """Contacts under way by their number."""
+        self._begun = 0
+
+    def _begin(self, contact: Contact, number: int) -> _Waiting:
+        tasks = self.model.info.tasks
+        if self.error is None:
+            return _Waiting(contact, number, len(self.model.looks_s) - 1, list(tasks))
+        left = {
+            name: Candidates(len(task.labels), self.error, self.alarms)
+            for name, task in tasks.items()
+        }
+        return _Waiting(contact, number, 0, list(tasks), left)
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -66,33 +126,64 @@ class Watcher:
         """
         began = time.perf_counter()
         events: list[Event] = []
-        contact = self.tracker.push(frame)
-        self._last_s = frame.t
-        if contact is not None:
-            if contact is not self._current:
-                self._current = contact
-                self._waiting.append(contact)
-                events.append({"event": "onset", "onset_s": contact.onset_s})
+        for contact in self.tracker.follow(frame):
+            number = self._number(contact)
+            if number is None:
+                self._begun += 1
+                number = self._begun
+                self._current[number] = contact
+                self._waiting.append(self._begin(contact, number))
+                events.append({"event": "onset", **self._which(number), "onset_s": contact.onset_s})
             if contact.ended:
+                del self._current[number]
                 events.append(
-                    {"event": "release", "onset_s": contact.onset_s, "release_s": frame.t}
+                    {
+                        "event": "release",
+                        **self._which(number),
+                        "onset_s": contact.onset_s,
+                        "release_s": frame.t,
+                    }
                 )
-        if self._waiting:
-            window = self.model.info.window_s
-            for waiting in [c for c in self._waiting if frame.t - c.onset_s >= window]:
+        for waiting in list(self._waiting):
+            age = frame.t - waiting.contact.onset_s
+            while waiting.tasks and age >= self.model.looks_s[waiting.look]:
+                events += self._look(waiting, began)
+            if not waiting.tasks:
                 self._waiting.remove(waiting)
-                events += self._decide(waiting, began, short=False)
         return events
+
+    def _number(self, contact: Contact) -> int | None:
+        for number, known in self._current.items():
+            if known is contact:
+                return number
+        return None
+
+    def _which(self, number: int) -> Event:
+        return {"contact": number} if self.several else {}
 
     def finish(self) -> list[Event]:
         """The stream has ended: decide what is still waiting, flagged `short`."""
         began = time.perf_counter()
         waiting, self._waiting = self._waiting, []
-        return [event for c in waiting for event in self._decide(c, began, short=True)]
+        return [event for one in waiting for event in self._look(one, began, short=True)]
 
-    def _decide(self, contact: Contact, began: float, *, short: bool) -> list[Event]:
+    def _look(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Event]:
+        """Look at a contact; what is decided no longer waits."""
         info = self.model.info
-        vector = feature_vector(contact.series(), info.window_s, info.samples, info.features)
+        last = len(self.model.looks_s) - 1
+        look = last if short else waiting.look
+        window = self.model.looks_s[look]
+        contact = waiting.contact
+        vector = feature_vector(contact.series(), window, info.samples, info.features)
+        common: Event = {
+            "event": "decision",
+            **self._which(waiting.number),
+            "window_s": window,
+            "onset_s": contact.onset_s,
+        }
+        if self.several:
+            place = contact.place()
+            common["place"] = None if place is None else [round(x, 6) for x in place.tolist()]
         flags = [
             flag
             for flag, raised in (
@@ -103,34 +194,60 @@ class Watcher:
             )
             if raised
         ]
-        common = {"event": "decision", "window_s": info.window_s, "onset_s": contact.onset_s}
         try:
-            decisions = self.model.decide(vector)
+            decisions = self.model.decide(vector, look)
         except InputError:
-            latency = (time.perf_counter() - began) * 1e3
-            return [
-                {
-                    **common,
-                    "task": task,
-                    "label": None,
-                    "confidence": 0.0,
-                    "latency_ms": round(latency, 3),
-                    "flags": [*flags, "out_of_range"],
-                }
-                for task in info.tasks
-            ]
-        latency = (time.perf_counter() - began) * 1e3
+            answers = {
+                task: {"label": None, "confidence": 0.0, "flags": [*flags, "out_of_range"]}
+                for task in waiting.tasks
+            }
+        else:
+            answers = {
+                task: answer
+                for task in waiting.tasks
+                if (answer := self._answer(waiting, task, decisions[task], flags, look == last))
+            }
+        waiting.look += 1
+        waiting.tasks = [task for task in waiting.tasks if task not in answers]
+        latency = round((time.perf_counter() - began) * 1e3, 3)
         return [
             {
                 **common,
                 "task": task,
+                "label": answer.pop("label"),
+                "confidence": answer.pop("confidence"),
+                "latency_ms": latency,
+                **answer,
+            }
+            for task, answer in answers.items()
+        ]
+
+    def _answer(
+        self, waiting: _Waiting, task: str, decision: Decision, flags: list[str], last: bool
+    ) -> Event | None:
+        """What a look says of a task; None where it must go on waiting."""
+        candidates = waiting.candidates.get(task)
+        if candidates is None:
+            return {
                 "label": decision.label,
                 "confidence": decision.confidence,
-                "latency_ms": round(latency, 3),
                 "flags": [*flags, "tie"] if decision.tie else list(flags),
             }
-            for task, decision in decisions.items()
-        ]
+        if decision.pvalues is not None and "short" not in flags:
+            candidates.look(decision.pvalues)
+        if not (candidates.settled or last):
+            return None
+        labels = self.model.info.tasks[task].labels
+        best = candidates.best(labels.index(decision.label))
+        sure = candidates.settled
+        more = ["unknown"] if candidates.unknown else [] if sure else ["unsure"]
+        return {
+            "label": UNKNOWN if candidates.unknown else labels[best],
+            "confidence": round(candidates.confidence(best), 6),
+            "error": candidates.error,
+            "left": [labels[i] for i in candidates.left],
+            "flags": flags + more,
+        }
 
 
 def require_joints(model: Model, dof: int | None, where: str) -> None:

@@ -174,6 +174,10 @@ class Measurer:
         # Columns as counted from each cut of the circle, and their squares.
         turned = np.where(cols < cols[:, None], cols + layout.cols, cols)
         self._cuts = np.concatenate([turned, turned**2]).astype(kind)
+        self._bases = np.stack([turned**0, turned, turned**2], axis=2).astype(kind)
+        # Their product with the sum of counts is a variance; beyond 64 bits Python's integers.
+        fits = largest * 65535 * layout.rows * layout.cols < 1 << 63
+        self._exact: Any = np.int64 if fits else object
 
     def measure(self, frame: Frame, contact: Region | None) -> list[int]:
         """`WIDTH` whole numbers a place, then the number of regions where it is asked for.
@@ -240,9 +244,8 @@ class Measurer:
         As for a region's centroid (`edge.region.Grid.col_sum`); of equal cuts the lowest.
         """
         n = self.layout.cols
-        sums = (self._cuts @ weights).astype(np.int64)
-        total = int(weights.sum())
-        first, second = sums[:n].tolist(), sums[n:].tolist()
-        variances = [total * b - a * a for a, b in zip(first, second, strict=True)]
-        cut = min(range(n), key=variances.__getitem__)
-        return np.stack([self._cols[:, 0], self._cuts[cut], self._cuts[n + cut]], axis=1)
+        sums = (self._cuts @ weights).astype(self._exact)
+        first, second = sums[:n], sums[n:]
+        cut = int((int(weights.sum()) * second - first * first).argmin())
+        basis: NDArray[Any] = self._bases[cut]
+        return basis

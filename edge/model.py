@@ -58,16 +58,27 @@ class ModelInfo:
     """Training trials."""
     data_digest: str
     versions: dict[str, str] = field(default_factory=dict)
+    looks_s: tuple[float, ...] = ()
+    """Windows at which the model can be asked, the last the full one; none without calibration."""
+    folds: tuple[int, ...] = ()
+    """Trials in each fold of the calibration."""
 
     @property
     def width(self) -> int:
         """Length of a feature vector."""
         return len(self.features) * self.samples
 
+    @property
+    def smallest_error(self) -> float:
+        """No label can be struck out at a smaller one: there are too few calibration trials."""
+        return sum(1.0 / (1 + size) for size in self.folds) / len(self.folds)
+
     def to_json(self) -> str:
         """As the model file carries it."""
+        calibration = {"looks_s": self.looks_s, "folds": self.folds} if self.looks_s else {}
         return json.dumps(
             {
+                **calibration,
                 "format": FORMAT,
                 "tasks": {name: vars(task) for name, task in self.tasks.items()},
                 "skin": self.layout.to_dict(),
@@ -123,6 +134,8 @@ class ModelInfo:
                 rows=int(meta["rows"]),
                 data_digest=str(meta["data_digest"]),
                 versions={str(k): str(v) for k, v in meta.get("versions", {}).items()},
+                looks_s=tuple(map(float, meta.get("looks_s", ()))),
+                folds=tuple(map(int, meta.get("folds", ()))),
             )
         except InputError:
             raise
@@ -145,6 +158,11 @@ class ModelInfo:
             raise InputError(f"{name}: its metadata names no task or no label; export it again")
         if not (0.0 < self.window_s <= 3600.0 and 2 <= self.samples <= 10000):
             raise InputError(f"{name}: its window or samples make no sense; export it again")
+        if self.looks_s:
+            before = (0.0, *self.looks_s[:-1])
+            rising = all(a < b for a, b in zip(before, self.looks_s, strict=True))
+            if not rising or self.looks_s[-1] != self.window_s or min(self.folds, default=0) < 1:
+                raise InputError(f"{name}: its looks make no sense; export it again")
         if (self.motion_frame == "world") != (self.chain is not None):
             raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
 
@@ -160,6 +178,7 @@ class Decision:
         distances: (k,) of the neighbours, nearest first, in PCA space.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
+        pvalues: (folds, labels + 1) of a model with looks, at this one; see `edge.candidates`.
     """
 
     label: str
@@ -168,6 +187,7 @@ class Decision:
     distances: NDArray[np.float64]
     neighbours: NDArray[np.int64]
     tie: bool
+    pvalues: NDArray[np.float64] | None = None
 
 
 class Model:
@@ -216,14 +236,20 @@ class Model:
         self._binding = self._session.io_binding()
         value = runtime.OrtValue.ortvalue_from_numpy
         self._binding.bind_ortvalue_input("features", value(self._input))
+        self._look = np.full(1, max(len(self.info.looks_s) - 1, 0), dtype=np.int64)
+        if self.info.looks_s:
+            self._binding.bind_ortvalue_input("look", value(self._look))
         for output, array in self._outputs.items():
             self._binding.bind_ortvalue_output(output, value(array))
 
     def _check(self, name: str) -> None:
         inputs = self._session.get_inputs()
         shape = inputs[0].shape if inputs else []
-        if len(inputs) != 1 or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
+        if not inputs or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
             raise InputError(f"{name}: has no float64 input `features`; export it again")
+        more = [(i.name, i.type, list(i.shape)) for i in inputs[1:]]
+        if more != ([("look", "tensor(int64)", [1])] if self.info.looks_s else []):
+            raise InputError(f"{name}: its inputs and its looks disagree; export it again")
         if len(shape) != 2 or shape[1] != self.info.width:
             raise InputError(
                 f"{name}: takes {shape[1:]} features, its metadata says {self.info.width}; "
@@ -241,23 +267,55 @@ class Model:
                         f"{name}: has no output {task}_{part} of width {width}, "
                         "as its metadata says; export it again"
                     )
+            folds = [len(self.info.folds), len(entry.labels) + 1]
+            if self.info.looks_s and list(outputs.get(f"{task}_pvalues", ()))[1:] != folds:
+                raise InputError(
+                    f"{name}: has no output {task}_pvalues of shape {folds}, "
+                    "as its metadata says; export it again"
+                )
 
-    def run(self, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-        """The graph's outputs for vectors (n, width), unguarded; for checks and benchmarks."""
-        values = self._session.run(self._names, {"features": vectors})
+    @property
+    def looks_s(self) -> tuple[float, ...]:
+        """Windows at which the model can be asked; the full one alone without calibration."""
+        return self.info.looks_s or (self.info.window_s,)
+
+    def run(self, vectors: NDArray[np.float64], look: int | None = None) -> dict[str, NDArray[Any]]:
+        """The graph's outputs for vectors (n, width), unguarded; for checks and benchmarks.
+
+        Args:
+            vectors: measured over the window of the look.
+            look: place in `looks_s`; the last where None.
+        """
+        given: dict[str, NDArray[Any]] = {"features": vectors}
+        if self.info.looks_s:
+            given["look"] = np.array([self._place(look)], dtype=np.int64)
+        values = self._session.run(self._names, given)
         return dict(zip(self._names, values, strict=True))
 
-    def decide(self, vector: ArrayLike) -> dict[str, Decision]:
+    def _place(self, look: int | None) -> int:
+        looks = len(self.looks_s)
+        if look is None:
+            return looks - 1
+        if not 0 <= look < looks:
+            raise InputError(f"{self.path}: has the looks 0 to {looks - 1}, not {look}")
+        return look
+
+    def decide(self, vector: ArrayLike, look: int | None = None) -> dict[str, Decision]:
         """Decide all tasks for one feature vector; not for several threads at once.
+
+        Args:
+            vector: (width,) measured over the window of the look.
+            look: place in `looks_s`; the last, the full window, where None.
 
         Raises:
             InputError: the vector has another length, or a value that is not finite (or is so
-                large that no distance to the training rows is).
+                large that no distance to the training rows is); the model has no such look.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != (self.info.width,):
             raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
         self._input[0] = x
+        self._look[0] = self._place(look)
         self._session.run_with_iobinding(self._binding)
         return {name: self._decision(name, task, x) for name, task in self.info.tasks.items()}
 
@@ -276,6 +334,7 @@ class Model:
             distances=outputs[f"{name}_distances"][0].copy(),
             neighbours=outputs[f"{name}_neighbours"][0].copy(),
             tie=shares.count(confidence) > 1,
+            pvalues=outputs[f"{name}_pvalues"][0].copy() if self.info.looks_s else None,
         )
 
     def _refusal(self, x: NDArray[np.float64]) -> InputError:

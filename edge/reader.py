@@ -38,7 +38,7 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
 HUNG_PAUSE_S, LONGEST_HUNG_PAUSE_S = 0.05, 1.0
 """Before a hung chip is: a try costs the adapter's timeout. Each pause is four times
 the one before."""
-GONE_PAUSE_S = 0.25
+GONE_PAUSE_S = 0.05
 """Between two tries to open a bus whose adapter has gone."""
 RETRIES_PER_FRAME = 12
 STEPS_PER_FRAME = 24

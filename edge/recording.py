@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge import npz
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.frame import Frame
@@ -249,8 +250,10 @@ def save_arrays(
     """Write arrays and their JSON metadata as one `.npz`, whole or not at all."""
     text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     with write_whole(path, overwrite=overwrite) as file:
-        write = np.savez_compressed if compress else np.savez
-        write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+        if compress:
+            np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+        else:
+            npz.write(file, {"meta": np.array(text), **arrays})
 
 
 def find(paths: list[str]) -> list[Path]:

@@ -228,6 +228,11 @@ class Region:
         """Lowest flat index (row * cols + col) of its taxels."""
         return self._grid.index(self.bits)
 
+    def touches(self, other: Region) -> bool:
+        """Whether a taxel of this region is next to, or the same as, one of the other's."""
+        of = self._grid
+        return bool((self.bits | of.touching(self.bits, of.wraps and of.cols > 1)) & other.bits)
+
     def __repr__(self) -> str:
         row, col = self.centroid
         return f"Region(area={self.area}, peak={self.peak}, centroid=({row:.2f}, {col:.2f}))"

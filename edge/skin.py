@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from edge.baseline import Baseline
 from edge.bus import Bus, BusError, LinuxBus
-from edge.chips.chip import Parsed
+from edge.calibration import dead_band
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError
 from edge.frame import Frame
-from edge.reader import NEVER, BusReader, Slot, State, frame_bytes
-from edge.skinfile import UNUSED, SkinFile, dead_band
+from edge.groups import Buffers, ChipGroup, buffers
+from edge.reader import NEVER, BusReader, Slot, State
+from edge.skinfile import UNUSED, SkinFile
 
 FOLLOW_FRAMES = 4
 """The baseline takes a step every so many frames: drift is slow, and steps cost time."""
@@ -56,30 +57,6 @@ class ChipStatus:
     state: str
     error: str
     recoveries: int
-
-
-class _Group:
-    """Chips that one parse call serves: of one kind, with the same number of taxels."""
-
-    def __init__(
-        self, slots: Sequence[Slot], chips: Sequence[int], rows: NDArray[np.uint8], first: int
-    ) -> None:
-        self.slots, self.rows = slots, rows
-        self.chips = np.array(chips, dtype=np.intp)
-        n = len(slots[0].spec.taxels)
-        self.stages = slice(first, first + len(slots) * n)
-        self.shape = (len(slots), n)
-        self.before = rows.copy()
-        self.unchanged = np.zeros(len(slots), dtype=np.int64)
-        """Readings in a row that gave the same bytes."""
-        self.noisy = np.zeros(len(slots), dtype=np.bool_)
-        self.any_noisy = False
-
-    def parse(self) -> Parsed | None:
-        for slot in self.slots:
-            if slot.chip is not None:
-                return slot.chip.parse(self.rows)
-        return None
 
 
 class _Worker(threading.Thread):
@@ -131,7 +108,7 @@ class Skin:
         """A taxel above this is being touched: the baseline is frozen, its chip is of interest."""
         self.following = True
         """The baseline follows drift."""
-        groups = _rows(file)
+        groups = buffers(file)
         self.readers = [
             BusReader(
                 bus,
@@ -177,11 +154,12 @@ class Skin:
             raise
         return skin
 
-    def _wire(self, groups: _Rows) -> None:
+    def _wire(self, groups: Buffers) -> None:
         """Index arrays from stages and chips to taxels."""
         n = self.layout.rows * self.layout.cols
+        limit = self.file.reading.stuck_frames
         self._groups = [
-            _Group([self._slots[i] for i in chips], chips, rows, first)
+            ChipGroup([self._slots[i] for i in chips], chips, rows, first, limit)
             for chips, rows, first in groups.groups
         ]
         total = sum(g.shape[0] * g.shape[1] for g in self._groups)
@@ -223,8 +201,9 @@ class Skin:
             noisy = np.zeros(len(self._slots) + 1, dtype=np.bool_)
             np.logical_or.at(noisy, self._chip_of, calibration.noise.ravel() >= NOISY)
             for group in self._groups:
-                group.noisy = noisy[group.chips]
-                group.any_noisy = bool(group.noisy.any())
+                if group.slots[0].spec.kind != "block":
+                    group.noisy = noisy[group.chips]
+                    group.any_noisy = bool(group.noisy.any())
 
     def start(self) -> list[ChipStatus]:
         """Identify and set up all chips.
@@ -353,7 +332,6 @@ class Skin:
 
     def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
         """Judge chips by what they serve: damaged words, or bytes that never change."""
-        limit = self.file.reading.stuck_frames
         for group in self._groups:
             if not self._whole[group.stages].all():
                 bad = ~self._whole[group.stages].reshape(group.shape).all(axis=1)
@@ -365,8 +343,8 @@ class Skin:
             np.copyto(group.before, group.rows)
             group.unchanged += fresh[group.chips]
             group.unchanged *= same & group.noisy
-            if int(group.unchanged.max()) >= limit:
-                for i in np.flatnonzero(group.unchanged >= limit).tolist():
+            if int(group.unchanged.max()) >= group.limit:
+                for i in np.flatnonzero(group.unchanged >= group.limit).tolist():
                     group.slots[i].suspect = True
                     good[group.chips[i]] = False
 
@@ -408,29 +386,3 @@ class Skin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Buffers: for each bus its chips' rows; the groups as (chips, rows, first stage)."""
-
-    by_bus: list[list[NDArray[np.uint8]]]
-    groups: list[tuple[list[int], NDArray[np.uint8], int]]
-
-
-def _rows(file: SkinFile) -> _Rows:
-    """One array for all chips of a kind, so that one call parses them."""
-    chips = file.chips
-    alike: dict[tuple[str, int, int], list[int]] = {}
-    for i, chip in enumerate(chips):
-        alike.setdefault((chip.kind, len(chip.taxels), chip.bits), []).append(i)
-    own: dict[int, NDArray[np.uint8]] = {}
-    groups, first = [], 0
-    for indices in alike.values():
-        rows = np.zeros((len(indices), frame_bytes(chips[indices[0]])), dtype=np.uint8)
-        own.update(zip(indices, rows, strict=True))
-        groups.append((indices, rows, first))
-        first += len(indices) * len(chips[indices[0]].taxels)
-    numbered = iter(range(len(chips)))
-    by_bus = [[own[next(numbered)] for _ in bus.chips] for bus in file.buses]
-    return _Rows(by_bus, groups)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import os
-import re
-import shutil
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +15,8 @@ from numpy.typing import NDArray
 from edge.bus import device_path
 from edge.chips import ad7147, block, mpr121, tca9548a
 from edge.errors import InputError
-from edge.files import write_whole
 from edge.layout import SkinLayout
+from edge.tables import Table
 
 KINDS = ("ad7147", "mpr121", "block")
 UNUSED = -1
@@ -148,74 +145,13 @@ class SkinFile:
         return self.layout.rows * self.layout.cols - len(served)
 
 
-class _Table:
-    """A TOML table whose keys are taken one by one; what is left over is unknown."""
-
-    def __init__(self, raw: object, where: str) -> None:
-        if not isinstance(raw, Mapping):
-            raise InputError(f"{where} must be a table, not {raw!r}")
-        self._raw, self.where = raw, where
-        self._known: list[str] = []
-
-    def get(self, key: str, default: Any = None) -> Any:
-        self._known.append(key)
-        return self._raw.get(key, default)
-
-    def fail(self, key: str, wanted: str) -> InputError:
-        return InputError(f"{self.where}: {key} must be {wanted}, not {self._raw.get(key)!r}")
-
-    def whole(self, key: str, default: int | None, allowed: Sequence[int] | range) -> int:
-        value = self.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
-            if key not in self._raw:
-                raise InputError(f"{self.where}: {key} is missing")
-            if isinstance(allowed, range) and allowed[0] >= 0x20 and allowed[-1] < 0x78:
-                wanted = f"{allowed[0]:#04x} to {allowed[-1]:#04x}"
-            elif isinstance(allowed, range):
-                wanted = f"a whole number of {allowed[0]} to {allowed[-1]}"
-            else:
-                wanted = f"one of {', '.join(map(str, allowed))}"
-            raise self.fail(key, wanted)
-        return value
-
-    def number(self, key: str, default: float, low: float, high: float) -> float:
-        value = self.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, "a number")
-        if not low <= value <= high:
-            raise self.fail(key, f"a number of {low:g} to {high:g}")
-        return float(value)
-
-    def flag(self, key: str, default: bool) -> bool:
-        value = self.get(key, default)
-        if not isinstance(value, bool):
-            raise self.fail(key, "true or false")
-        return value
-
-    def pair(self, key: str, value: object) -> tuple[int, int]:
-        if (
-            not isinstance(value, list)
-            or len(value) != 2
-            or any(isinstance(x, bool) or not isinstance(x, int) for x in value)
-        ):
-            raise InputError(f"{self.where}: {key} must be [row, col], not {value!r}")
-        return value[0], value[1]
-
-    def done(self) -> None:
-        unknown = sorted(set(self._raw) - set(self._known))
-        if unknown:
-            raise InputError(
-                f"{self.where}: unknown key {unknown[0]!r}; allowed: {', '.join(self._known)}"
-            )
-
-
 def load(path: str | os.PathLike[str]) -> SkinFile:
     """Read a skin's file.
 
     Raises:
         InputError: it cannot be read or makes no sense; the sentence names file and key.
     """
-    return parse(_text(path), os.fspath(path))
+    return parse(read_text(path), os.fspath(path))
 
 
 def shipped(name: str = "cody") -> Path:
@@ -223,7 +159,12 @@ def shipped(name: str = "cody") -> Path:
     return Path(__file__).parent / "skins" / f"{name}.toml"
 
 
-def _text(path: str | os.PathLike[str]) -> str:
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
     try:
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
@@ -242,8 +183,8 @@ def parse(text: str, where: str = "skin") -> SkinFile:
         raw = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{where}: not TOML: {error}") from None
-    top = _Table(raw, where)
-    skin = dict(_Table(top.get("skin", {}), f"{where}: [skin]")._raw)
+    top = Table(raw, where)
+    skin = dict(Table(top.get("skin", {}), f"{where}: [skin]").raw)
     name = skin.pop("name", Path(where).stem)
     if not isinstance(name, str):
         raise InputError(f"{where}: skin.name must be text, not {name!r}")
@@ -254,8 +195,8 @@ def parse(text: str, where: str = "skin") -> SkinFile:
             f"{where}: [skin] has an unknown key {unknown[0]!r}; allowed: name, {', '.join(known)}"
         )
     layout = SkinLayout.from_dict(skin, where=where)
-    signal, sign = _signal(_Table(top.get("signal", {}), f"{where}: [signal]"), layout)
-    reading = _reading(_Table(top.get("read", {}), f"{where}: [read]"))
+    signal, sign = _signal(Table(top.get("signal", {}), f"{where}: [signal]"), layout)
+    reading = _reading(Table(top.get("read", {}), f"{where}: [read]"))
     entries = top.get("bus")
     if not isinstance(entries, list) or not entries:
         raise InputError(f"{where}: no [[bus]] given")
@@ -263,12 +204,12 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     _check_buses(buses, layout, where)
     calibration = top.get("calibration")
     if calibration is not None:
-        calibration = _calibration(_Table(calibration, f"{where}: [calibration]"), layout)
+        calibration = _calibration(Table(calibration, f"{where}: [calibration]"), layout)
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
 
-def _signal(table: _Table, layout: SkinLayout) -> tuple[Signal, int]:
+def _signal(table: Table, layout: SkinLayout) -> tuple[Signal, int]:
     sign = table.whole("sign", 1, (1, -1))
     dead = table.get("dead", [])
     if not isinstance(dead, list):
@@ -292,7 +233,7 @@ def _signal(table: _Table, layout: SkinLayout) -> tuple[Signal, int]:
     return signal, sign
 
 
-def _reading(table: _Table) -> Reading:
+def _reading(table: Table) -> Reading:
     reading = Reading(
         rate_hz=table.number("rate_hz", 100.0, 0.1, 10_000.0),
         timeout_s=table.number("timeout_s", 0.02, 0.001, 10.0),
@@ -306,7 +247,7 @@ def _reading(table: _Table) -> Reading:
 
 
 def _bus(entry: object, index: int, layout: SkinLayout, sign: int, where: str) -> BusSpec:
-    table = _Table(entry, f"{where}: bus {index}")
+    table = Table(entry, f"{where}: bus {index}")
     device = table.get("device")
     if isinstance(device, bool) or not isinstance(device, int | str) or device == "":
         raise table.fail("device", 'a bus\'s number or its path, like 1 or "/dev/i2c-1"')
@@ -322,11 +263,11 @@ def _bus(entry: object, index: int, layout: SkinLayout, sign: int, where: str) -
         place = f"{where}: bus {index} chip {i}"
         if not isinstance(chip, Mapping):
             raise InputError(f"{place} must be a table, not {chip!r}")
-        specs.append(_chip(_Table({**given, **chip}, place), layout, sign))
+        specs.append(_chip(Table({**given, **chip}, place), layout, sign))
     return BusSpec(device_path(device), tuple(specs), clock_hz)
 
 
-def _chip(table: _Table, layout: SkinLayout, sign: int) -> ChipSpec:
+def _chip(table: Table, layout: SkinLayout, sign: int) -> ChipSpec:
     kind = table.get("kind")
     if kind not in KINDS:
         raise table.fail("kind", f"one of {', '.join(KINDS)}")
@@ -355,7 +296,7 @@ def _chip(table: _Table, layout: SkinLayout, sign: int) -> ChipSpec:
     return ChipSpec(kind, address, taxels, mux, channel, own, decimation, bits)
 
 
-def _taxels(table: _Table, layout: SkinLayout) -> tuple[int, ...]:
+def _taxels(table: Table, layout: SkinLayout) -> tuple[int, ...]:
     """Flat indices from `taxels`, or from `first` and `block`, row by row."""
     listed, first, extent = table.get("taxels"), table.get("first"), table.get("block")
     places: list[tuple[int, int] | None] = []
@@ -427,7 +368,7 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
                 owner[taxel] = f"bus {b} chip {c}"
 
 
-def _calibration(table: _Table, layout: SkinLayout) -> Calibration:
+def _calibration(table: Table, layout: SkinLayout) -> Calibration:
     arrays: dict[str, NDArray[np.float64]] = {}
     for key in ("baseline", "noise"):
         value = table.get(key)
@@ -451,73 +392,6 @@ def _calibration(table: _Table, layout: SkinLayout) -> Calibration:
         raise table.fail("taken", "a date and time")
     table.done()
     return Calibration(arrays["baseline"].astype(np.uint16), arrays["noise"], taken)
-
-
-def calibration_text(calibration: Calibration) -> str:
-    """The `[calibration]` table as TOML, a line a row of the skin."""
-
-    def rows(values: Iterable[Iterable[object]]) -> Iterator[str]:
-        for row in values:
-            yield f"  [{', '.join(map(str, row))}],\n"
-
-    lines = ["[calibration]\n"]
-    if calibration.taken is not None:
-        lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")
-    lines += ["baseline = [\n", *rows(calibration.baseline.tolist()), "]\n"]
-    noise = [[round(float(x), 3) for x in row] for row in calibration.noise]
-    lines += ["noise = [\n", *rows(noise), "]\n"]
-    return "".join(lines)
-
-
-def with_calibration(text: str, calibration: Calibration, where: str = "skin") -> str:
-    """The file's text with its `[calibration]` replaced; all else, comments too, stays.
-
-    Raises:
-        InputError: the file writes its calibration in a way that cannot be replaced.
-    """
-    before = parse(text, where)
-    table = re.compile(
-        r"^[ \t]*\[calibration\][ \t]*(#.*)?\n(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*", re.M
-    )
-    rest = table.sub("", text if text.endswith("\n") else text + "\n").rstrip("\n")
-    out = f"{rest}\n\n{calibration_text(calibration)}"
-    after = parse(out, where)
-    kept = all(
-        getattr(before, f.name) == getattr(after, f.name)
-        for f in fields(SkinFile)
-        if f.name != "calibration"
-    )
-    if not kept or after.calibration is None:
-        raise InputError(f"{where}: write [calibration] as a table of its own, at the end")
-    return out
-
-
-def save_calibration(path: str | os.PathLike[str], calibration: Calibration) -> Path:
-    """Put a calibration into a skin's file, whole or not at all; the old file stays beside it.
-
-    Returns:
-        Path of the old file, `skin.toml.bak`.
-
-    Raises:
-        InputError: the file cannot be read or written.
-    """
-    target = Path(path)
-    text = with_calibration(_text(target), calibration, os.fspath(path))
-    backup = target.with_name(f"{target.name}.bak")
-    with write_whole(backup) as file, open(target, "rb") as old:
-        shutil.copyfileobj(old, file)
-    with write_whole(target) as file:
-        file.write(text.encode())
-    return backup
-
-
-def dead_band(skin: SkinFile) -> NDArray[np.int32]:
-    """(rows * cols,) counts under which a taxel reads 0; at least 1, so that none is negative."""
-    floor = max(1, skin.signal.dead_band_counts)
-    if skin.calibration is None:
-        return np.full(skin.layout.rows * skin.layout.cols, floor, dtype=np.int32)
-    sigma = skin.signal.dead_band_sigma * skin.calibration.noise.ravel()
-    return np.maximum(floor, np.ceil(np.minimum(sigma, 65535.0))).astype(np.int32)
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:

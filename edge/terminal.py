@@ -13,9 +13,9 @@ from edge.layout import SkinLayout
 from edge.region import Region
 
 CLEAR, HOME, HIDE, SHOW, PLAIN = "\x1b[2J", "\x1b[H", "\x1b[?25l", "\x1b[?25h", "\x1b[0m"
-REST = tuple(range(233, 251, 2))
+REST = tuple(range(233, 242))
 """256-colour greys: taxels outside of every region, by force."""
-TOUCH = (52, 88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
+TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
 """Dark red to white: taxels of a region, by force."""
 LOST = 18
 """Dark blue: a taxel that cannot be read."""

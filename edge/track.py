@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from edge.errors import InputError
 from edge.frame import Frame
 from edge.layout import SkinLayout
 from edge.measures import COLS, FORCE, PAPER, ROWS, WIDTH, Measurer
-from edge.region import Region, largest_region
+from edge.region import Region, find_regions, largest_region
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,8 @@ class Contact:
     """A frame came without the joint angles that motion needs."""
     region: Region | None = None
     """The region followed so far."""
+    joints: NDArray[np.float64] | None = None
+    """The joint angles (dof,) when the region was last seen; None where not known."""
     _t: list[float] = field(default_factory=list)
     _measured: list[tuple[int, int, int, int]] = field(default_factory=list)
     _motion: list[float] = field(default_factory=list)
@@ -144,7 +147,7 @@ class Contact:
             if called.force_motion:
                 self._force_motion.append(self._force_motion[-1] if self._force_motion else 0.0)
             return
-        self.region = region
+        self.region, self.joints = region, frame.joints
         pose = self._pose(frame) if called.motion or called.force_motion else None
         if called.motion:
             self._measured.append((region.peak, region.area, *region.sums))
@@ -178,6 +181,20 @@ class Contact:
         if pose is not None:
             place = pose[:3, :3] @ place + pose[:3, 3]
         return math.dist(place, self._starts.setdefault(which, place))
+
+    def place(self) -> NDArray[np.float64] | None:
+        """(3,) where the region's centroid was last seen.
+
+        Metres (taxels where the pitch is unknown), in the frame of the arm's base; without an
+        arm in that of the link that carries the skin. None where joint angles were not known.
+        """
+        if self.region is None or (self.chain is not None and self.joints is None):
+            return None
+        place = self.layout.position(*self.region.centroid)
+        if self.chain is not None and self.joints is not None:
+            pose = self.chain.pose(self.joints)
+            place = pose[:3, :3] @ place + pose[:3, 3]
+        return place
 
     def series(self) -> FeatureSeries:
         """What was measured so far."""
@@ -239,13 +256,59 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
     )
 
 
-class Tracker:
-    """Finds contacts in a stream of frames and follows one at a time.
+class Follower:
+    """One region's way from its onset over contact to its end.
 
     A contact begins with the first of `debounce` frames in a row whose region has a peak above
-    the skin's onset count, and ends when `release` frames in a row have no taxel above its
-    threshold: two thresholds, so that a force that hovers at one of them is one contact.
+    the skin's onset count, and ends when `release` frames in a row have no taxel of it above
+    the threshold: two thresholds, so that a force that hovers at one of them is one contact.
     """
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+        self.contact: Contact | None = None
+        """What is followed, believed yet or not."""
+        self._confirmed = False
+        self._run = 0
+
+    @property
+    def region(self) -> Region | None:
+        """The region followed so far."""
+        return None if self.contact is None else self.contact.region
+
+    def push(self, frame: Frame, region: Region | None) -> Contact | None:
+        """Take in a frame and its region; the contact from the frame that confirms it on."""
+        return self._follow(frame, region) if self._confirmed else self._await(frame, region)
+
+    def _await(self, frame: Frame, region: Region | None) -> Contact | None:
+        of = self._tracker
+        if region is None or region.peak <= of.layout.onset:
+            self.contact = None
+            return None
+        if self.contact is None:
+            self.contact = Contact(_time(frame, region), of.layout, of.chain, of.measurer)
+            self._run = 0
+        self.contact.add(frame, region)
+        self._run += 1
+        if self._run < of.settings.debounce:
+            return None
+        self._confirmed, self._run = True, 0
+        return self.contact
+
+    def _follow(self, frame: Frame, region: Region | None) -> Contact:
+        contact = self.contact
+        assert contact is not None
+        if contact.last_s - contact.onset_s < self._tracker.horizon_s:
+            contact.add(frame, region)
+        self._run = 0 if region is not None else self._run + 1
+        if self._run >= self._tracker.settings.release:
+            contact.ended = True
+            self.contact, self._confirmed, self._run = None, False, 0
+        return contact
+
+
+class Tracker:
+    """Finds contacts in a stream of frames and follows the largest region, one at a time."""
 
     def __init__(
         self,
@@ -271,12 +334,10 @@ class Tracker:
         self.settings = settings or TrackSettings()
         self.chain = chain
         self.horizon_s = horizon_s
-        self._measurer = Measurer(layout, features, self.settings.connectivity)
         self.region: Region | None = None
         """The last frame's largest region."""
-        self._contact: Contact | None = None
-        self._confirmed = False
-        self._run = 0
+        self.measurer = Measurer(layout, features, self.settings.connectivity)
+        self._follower = Follower(self)
         self._t = -math.inf
 
     def push(self, frame: Frame) -> Contact | None:
@@ -290,6 +351,19 @@ class Tracker:
             InputError: the frame's shape is not the skin's, its time goes back, or a time or
                 joint angle is not finite.
         """
+        self._take(frame)
+        region = largest_region(
+            frame.counts,
+            self.layout.threshold_counts,
+            valid=frame.valid,
+            wraps=self.layout.wraps,
+            connectivity=self.settings.connectivity,
+            previous=self._follower.region,
+        )
+        self.region = region
+        return self._follower.push(frame, region)
+
+    def _take(self, frame: Frame) -> None:
         if frame.counts.shape != self.layout.shape:
             raise InputError(
                 f"a frame of {frame.counts.shape} taxels on a skin of {self.layout.shape}"
@@ -299,39 +373,76 @@ class Tracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
-        followed = None if self._contact is None else self._contact.region
-        region = largest_region(
+
+    def follow(self, frame: Frame) -> list[Contact]:
+        """Take in a frame, as `push`; the contacts that it belongs to: one or none."""
+        contact = self.push(frame)
+        return [] if contact is None else [contact]
+
+
+class Tracks(Tracker):
+    """Follows several regions at once, each as a contact of its own.
+
+    A region goes on with the contact that it shares the most taxels with; where it shares none,
+    with one that it touches. Where two contacts grow into one region, the
+    older one keeps it and the other ends; where a region parts in two, the larger share goes on
+    and the other part begins anew.
+    """
+
+    AT_MOST = 8
+    """Contacts at once, the largest first: a skin that flickers must not stall the loop."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        """Take the same arguments as `Tracker`."""
+        super().__init__(*arguments, **options)
+        self._followers: list[Follower] = []
+
+    def follow(self, frame: Frame) -> list[Contact]:
+        """Take in a frame.
+
+        Returns:
+            The contacts under way, oldest first, with those that the frame ended.
+
+        Raises:
+            InputError: as `Tracker.push`.
+        """
+        self._take(frame)
+        regions = find_regions(
             frame.counts,
             self.layout.threshold_counts,
             valid=frame.valid,
             wraps=self.layout.wraps,
             connectivity=self.settings.connectivity,
-            previous=followed,
         )
-        self.region = region
-        return self._follow(frame, region) if self._confirmed else self._await(frame, region)
+        self.region = regions[0] if regions else None
+        shares = _shared(self._followers, regions)
+        free = [region for i, region in enumerate(regions) if i not in shares.values()]
+        room = self.AT_MOST - len(self._followers)
+        begins = [region for region in free if region.peak > self.layout.onset][: max(room, 0)]
+        pushed = [
+            (follower, regions[shares[i]] if i in shares else None)
+            for i, follower in enumerate(self._followers)
+        ]
+        pushed += [(Follower(self), region) for region in begins]
+        contacts = [follower.push(frame, region) for follower, region in pushed]
+        self._followers = [follower for follower, _ in pushed if follower.contact is not None]
+        return [contact for contact in contacts if contact is not None]
 
-    def _await(self, frame: Frame, region: Region | None) -> Contact | None:
-        if region is None or region.peak <= self.layout.onset:
-            self._contact = None
-            return None
-        if self._contact is None:
-            self._contact = Contact(_time(frame, region), self.layout, self.chain, self._measurer)
-            self._run = 0
-        self._contact.add(frame, region)
-        self._run += 1
-        if self._run < self.settings.debounce:
-            return None
-        self._confirmed, self._run = True, 0
-        return self._contact
 
-    def _follow(self, frame: Frame, region: Region | None) -> Contact:
-        contact = self._contact
-        assert contact is not None
-        if contact.last_s - contact.onset_s < self.horizon_s:
-            contact.add(frame, region)
-        self._run = 0 if region is not None else self._run + 1
-        if self._run >= self.settings.release:
-            contact.ended = True
-            self._contact, self._confirmed, self._run = None, False, 0
-        return contact
+def _shared(followers: list[Follower], regions: list[Region]) -> dict[int, int]:
+    """{follower: region} by the most taxels in common, then the older, then the larger region."""
+    pairs = []
+    for i, follower in enumerate(followers):
+        before = follower.region
+        if before is None:
+            continue
+        for j, region in enumerate(regions):
+            if common := (before.bits & region.bits).bit_count():
+                pairs.append((0, -common, i, j))
+            elif before.touches(region):
+                pairs.append((1, 0, i, j))
+    found: dict[int, int] = {}
+    for _, _, i, j in sorted(pairs):
+        if i not in found and j not in found.values():
+            found[i] = j
+    return found

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from edge import __version__, measures
 from edge.cli import dispatch
 from edge.errors import InputError
@@ -17,9 +19,14 @@ from edge.files import write_whole
 from edge.model import Model, ModelInfo, Task
 from export import golden
 from export.graph import to_onnx
+from train.conformal import FEWEST, FOLDS, SequentialClassifier
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
 from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier, check_columns
+
+LOOKS = "0.2:1.2:0.1"
+MOST_TRIALS = 2000
+"""Beyond them calibration takes minutes, and must be asked for."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -51,6 +58,13 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--components", type=int, help="fix the number of principal components")
     top.add_argument("-k", "--k", type=int, help="fix the number of neighbours")
     top.add_argument("--window", type=float, default=WINDOW_S, help="seconds from onset (1.2)")
+    top.add_argument(
+        "--looks",
+        metavar="A:B:STEP",
+        help="calibrate decisions before the full window (edge-classify run --error), at these "
+        f"seconds from onset or at a list a,b,c; `none` for none (default: {LOOKS} with "
+        f"{FEWEST * FOLDS} to {MOST_TRIALS} trials, else none)",
+    )
     top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
     top.add_argument("--onset", type=int, help="counts above which a contact begins")
     top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (all cores)")
@@ -83,9 +97,16 @@ def run(arguments: argparse.Namespace) -> int:
         progress=True,
     )
     choices = {task: found.choice for task, found in chosen.items()}
-    classifier = ContactClassifier(choices, dataset.names).fit(X, y)
-    info = describe(dataset, classifier, chosen, arguments.window, arguments.samples)
-    data = to_onnx(classifier, info)
+    looks = _looks(arguments, len(dataset.trials))
+    if looks:
+        at_looks = np.stack([dataset.features(s, arguments.samples) for s in looks])
+        sequential = SequentialClassifier(choices, looks, dataset.names).fit(at_looks, y)
+        classifier = sequential.looks_[-1]
+    else:
+        sequential = None
+        classifier = ContactClassifier(choices, dataset.names).fit(X, y)
+    info = describe(dataset, classifier, chosen, arguments.window, arguments.samples, sequential)
+    data = to_onnx(sequential or classifier, info)
     path = arguments.out / "model.onnx"
     with write_whole(path) as file:
         file.write(data)
@@ -111,6 +132,47 @@ def _check_fixed(arguments: argparse.Namespace) -> None:
         raise InputError(f"--window must be above 0 and at most 60 seconds, not {arguments.window}")
 
 
+def _looks(arguments: argparse.Namespace, trials: int) -> tuple[float, ...]:
+    """The looks asked for, or the default ones where they can be calibrated."""
+    if arguments.looks is not None:
+        return parse_looks(arguments.looks, arguments.window)
+    if FEWEST * FOLDS <= trials <= MOST_TRIALS:
+        return parse_looks(LOOKS, arguments.window)
+    print(
+        f"no looks before the full window: {trials} trials are not the {FEWEST * FOLDS} to "
+        f"{MOST_TRIALS} that --looks takes by default",
+        file=sys.stderr,
+    )
+    return ()
+
+
+def parse_looks(text: str, window_s: float) -> tuple[float, ...]:
+    """Seconds from onset out of `a:b:step`, `a,b,c` or `none`; the full window comes last.
+
+    Raises:
+        InputError: it is none of them, or a look is not above 0.
+    """
+    if text == "none":
+        return ()
+    wrong = InputError(
+        f"--looks must be like {LOOKS} or 0.3,0.6,1.2 (seconds above 0) or none, not {text!r}"
+    )
+    try:
+        if ":" in text:
+            first, last, step = map(float, text.split(":"))
+            if not (0.0 < first <= last <= 60.0 and step >= 0.01):
+                raise wrong
+            count = int((last - first) / step + 1e-9) + 1
+            looks = {round(first + i * step, 9) for i in range(count)}
+        else:
+            looks = {float(part) for part in text.split(",")}
+    except ValueError:
+        raise wrong from None
+    if not all(0.0 < look <= 60.0 for look in looks):
+        raise wrong
+    return (*sorted(look for look in looks if look < window_s), window_s)
+
+
 def _tasks(dataset: DataSet, wanted: list[str] | None) -> tuple[str, ...]:
     if wanted is None:
         return dataset.tasks
@@ -128,6 +190,7 @@ def describe(
     chosen: dict[str, Chosen],
     window_s: float,
     samples: int = SAMPLES,
+    sequential: SequentialClassifier | None = None,
 ) -> ModelInfo:
     """The metadata that makes the model file describe itself."""
     return ModelInfo(
@@ -156,6 +219,8 @@ def describe(
             "python": platform.python_version(),
             **{name: version(name) for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")},
         },
+        looks_s=() if sequential is None else tuple(sequential.looks_s),
+        folds=() if sequential is None else sequential.sizes_,
     )
 
 

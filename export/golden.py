@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.features import feature_vector
-from edge.golden import PARTS, first_series
+from edge.golden import first_series, outputs, parts
 from edge.model import Model
 from edge.recording import Recording, load, save_arrays
 from train.dataset import DataSet
@@ -22,6 +22,7 @@ VECTORS = 256
 BOUNDS = {
     "scores": 1e-15,
     "distances": 1e-12,
+    "pvalues": 1e-15,
     "features": 1e-12,
     "time_s": 1e-9,
 }
@@ -29,10 +30,11 @@ BOUNDS = {
 squares of coordinates that are the same bits everywhere: its relative error is below
 22 * 2^-53 = 2.4e-15. Features are interpolated in a few operations, and motion passes through
 sines and cosines that differ by an ulp between C libraries: below 100 ulp of metres. The bounds
-leave a factor of 40 and more."""
+leave a factor of 40 and more. P-values are quotients of counts; what is counted has a slack of
+1e-9 (`train.conformal.SLACK`), a million times what distances differ by."""
 
 
-def trials_of(dataset: DataSet, count: int = TRIALS) -> list[int]:
+def trials_of(dataset: DataSet, count: int) -> list[int]:
     """Trials spread evenly over the labels of the finest task."""
     finest = max(dataset.tasks, key=lambda task: len(set(dataset.labels(task))))
     order = np.argsort(dataset.labels(finest), kind="stable")
@@ -59,6 +61,11 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     )
 
 
+def wanted(model: Model) -> list[tuple[str, str]]:
+    """(task, part) of all that the model says."""
+    return [(task, part) for task in model.info.tasks for part in parts(model)]
+
+
 def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
     """Run the exported model on trials and vectors, and store what it gave.
 
@@ -66,15 +73,15 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     beyond them, and two that are not finite (label -1).
     """
     info = model.info
-    parts: list[Recording] = []
+    pieces: list[Recording] = []
     found: list[tuple[float, Any]] = []
-    for i in trials_of(dataset):
+    for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
         part = trimmed(load(trial.path), trial.onset_s, model)
         series = first_series(part, model)
         if series is None:
             continue
-        parts.append(part)
+        pieces.append(part)
         found.append(series)
     rng = np.random.default_rng(20120101)
     own = np.stack(
@@ -87,12 +94,11 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     wrong = np.repeat(own[:1], 2, axis=0)
     wrong[0, 5], wrong[1, -1] = np.nan, np.inf
     vectors = np.concatenate([own, rows, mixed, wrong])
-    single = [model.run(vectors[i : i + 1]) for i in range(len(vectors))]
     arrays: dict[str, NDArray[Any]] = {
-        "start": np.cumsum([0, *(len(p.t) for p in parts)]),
-        "t": np.concatenate([p.t for p in parts]),
-        "frames": np.concatenate([p.frames for p in parts]),
-        "valid": np.concatenate([p.valid for p in parts if p.valid is not None]),
+        "start": np.cumsum([0, *(len(p.t) for p in pieces)]),
+        "t": np.concatenate([p.t for p in pieces]),
+        "frames": np.concatenate([p.frames for p in pieces]),
+        "valid": np.concatenate([p.valid for p in pieces if p.valid is not None]),
         "onset_s": np.array([onset for onset, _ in found]),
         "series_start": np.cumsum([0, *(len(s.t) for _, s in found)]),
         "series_t": np.concatenate([s.t for _, s in found]),
@@ -100,9 +106,22 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         "vectors": vectors,
     }
     if info.chain is not None:
-        arrays["joints"] = np.concatenate([p.joints for p in parts if p.joints is not None])
-    for task in info.tasks:
-        for key in (f"{task}_{part}" for part in PARTS):
-            arrays[key] = np.concatenate([row[key] for row in single])
-    meta = {"skin": parts[0].meta.get("skin", {}), "bounds": BOUNDS, "model": info.data_digest}
+        arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
+    answers = outputs(model, vectors)
+    arrays |= {f"{task}_{what}": answers[f"{task}_{what}"] for task, what in wanted(model)}
+    if info.looks_s:
+        arrays["look_vectors"] = at_looks = np.stack(
+            [
+                np.stack([feature_vector(s, window, info.samples, info.features) for _, s in found])
+                for window in info.looks_s
+            ]
+        )
+        # Besides the trials, which were trained with, points between them.
+        between = 0.5 * (at_looks + np.roll(at_looks, 1, axis=1))
+        arrays["look_vectors"] = at_looks = np.concatenate([at_looks, between], axis=1)
+        seen = [outputs(model, rows, look) for look, rows in enumerate(at_looks)]
+        for task, what in wanted(model):
+            arrays[f"{task}_look_{what}"] = np.stack([one[f"{task}_{what}"] for one in seen])
+    bounds = {key: BOUNDS[key] for key in BOUNDS if info.looks_s or key != "pvalues"}
+    meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays, meta, compress=True)

@@ -8,20 +8,23 @@ obeys the tie rule, and answers what is not finite with label -1.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import onnx
 from numpy.typing import NDArray
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.model import METADATA_KEY, ModelInfo
 from edge.onnxfile import check
-from train.pipeline import ContactClassifier, Projection
+from export.build import OPSET, Builder, project, widened
+from export.looks import pvalues
+from train.conformal import SequentialClassifier
+from train.pipeline import ContactClassifier
 
-OPSET = 18
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
 SHORTLIST_ROWS = 1024
@@ -32,82 +35,9 @@ FLOAT32_FIT = (2.0**-16, 2.0**16)
 """Lengths of rows whose float32 squares and products need no scaling."""
 
 
-class Builder:
-    """Nodes and constants of a graph under construction, either the main one or a branch."""
-
-    def __init__(self, scope: Any, container: Any) -> None:
-        self._scope, self._container = scope, container
-        self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
-        self._branch: list[onnx.NodeProto] | None = None
-
-    def constant(self, value: Any, dtype: Any = np.float64) -> str:
-        """Name of a constant; equal ones are stored once."""
-        array = np.asarray(value, dtype=dtype)
-        key = (array.dtype.str, array.shape, array.tobytes())
-        if key not in self._constants:
-            name = self._scope.get_unique_variable_name("constant")
-            tensor = numpy_helper.from_array(np.ascontiguousarray(array).reshape(array.shape))
-            self._container.add_initializer(name, tensor.data_type, list(array.shape), tensor)
-            self._constants[key] = name
-        return self._constants[key]
-
-    def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
-        """Add an operator of one output and return its name."""
-        return self.nodes(operator, inputs, [output], **attributes)[0]
-
-    def nodes(
-        self, operator: str, inputs: list[str], outputs: list[str], **attributes: Any
-    ) -> list[str]:
-        """Add an operator; an output named "" gets a name of its own."""
-        names = [o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs]
-        label = self._scope.get_unique_operator_name(operator)
-        if self._branch is not None:
-            self._branch.append(helper.make_node(operator, inputs, names, name=label, **attributes))
-        else:
-            self._container.add_node(
-                operator, inputs, names, op_version=OPSET, name=label, **attributes
-            )
-        return names
-
-    def branch(self, name: str, outputs: dict[str, Any], make: Any) -> onnx.GraphProto:
-        """The graph of what `make()` adds; it returns the outputs' names in order.
-
-        Args:
-            name: of the graph.
-            outputs: {name: tensor type}, each (rows, columns).
-            make: adds nodes to this builder.
-        """
-        self._branch = []
-        made = make()
-        infos = []
-        for seen, (wanted, kind) in zip(made, outputs.items(), strict=True):
-            unique = self._scope.get_unique_variable_name(wanted)
-            self.node("Identity", [seen], unique)
-            infos.append(helper.make_tensor_value_info(unique, kind, [None, None]))
-        nodes, self._branch = self._branch, None
-        return helper.make_graph(nodes, name, [], infos)
-
-
-def project(build: Builder, x: str, projection: Projection) -> str:
-    """Features (n, p) to coordinates (n, c); see `train.pipeline.Projection`."""
-    d = build.node("Sub", [x, build.constant(projection.mean)])
-    if not (projection.gain == 1.0).all():
-        d = build.node("Mul", [d, build.constant(projection.gain)])
-    halves = []
-    for grid in (projection.high, projection.low):
-        step = build.constant(grid)
-        half = build.node("Sub", [build.node("Add", [d, step]), step])
-        halves.append(half)
-        if grid == projection.high:
-            d = build.node("Sub", [d, half])
-    weights = build.constant(projection.weights)
-    high, low = (build.node("MatMul", [half, weights]) for half in halves)
-    return build.node("Add", [high, low])
-
-
-def _measured(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> list[str]:
+def _measured(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k: int) -> list[str]:
     """Squared distances and rows (n, k) of the nearest, every row measured directly."""
-    columns = build.constant(rows.T)  # (c, rows): sums over c then run along memory
+    columns = build.by_look([r.T for r in rows])  # (c, rows): sums over c then run along memory
     point = build.node("Unsqueeze", [z, build.constant([2], np.int64)])
     gaps = build.node("Sub", [columns, point])
     squares = build.node("ReduceSumSquare", [gaps, build.constant([1], np.int64)], keepdims=0)
@@ -127,7 +57,7 @@ def _unit(rows: NDArray[np.float64]) -> float:
     return math.ldexp(1.0, 1 - math.frexp(longest)[1])
 
 
-def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> list[str]:
+def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k: int) -> list[str]:
     """As `_measured`, where a float32 product first picks the rows worth measuring.
 
     With b a training row and q the query, |b - q|^2 - |q|^2 = |b|^2 - 2 b.q is computed in
@@ -139,26 +69,27 @@ def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> l
     That holds as long as float32 neither overflows nor loses squares, so rows of another size
     are scaled by a power of two first.
     """
-    c = rows.shape[1]
-    unit = _unit(rows)
-    if unit != 1.0:
-        rows = rows * unit
-        z = build.node("Mul", [z, build.constant(unit)])
-    lengths = (rows**2).sum(axis=1)
+    c = rows[0].shape[1]
+    units = [_unit(r) for r in rows]
+    scaled = any(unit != 1.0 for unit in units)
+    if scaled:
+        rows = [r * unit for r, unit in zip(rows, units, strict=True)]
+        z = build.node("Mul", [z, build.by_look(units)])
+    lengths = [(r**2).sum(axis=1) for r in rows]
     u = (c + 8) * 2.0**-23
-    slack = 2.0 * u * float(lengths.max())
+    slack = [2.0 * u * float(of.max()) for of in lengths]
     count = k + SHORTLIST
 
     def ints(*values: int) -> str:
         return build.constant(values, np.int64)
 
     single = build.node("Cast", [z], to=TensorProto.FLOAT)
-    product = build.node("MatMul", [single, build.constant(-2.0 * rows.T, np.float32)])
-    rough = build.node("Add", [product, build.constant(lengths, np.float32)])
+    product = build.node("MatMul", [single, build.by_look([-2.0 * r.T for r in rows], np.float32)])
+    rough = build.node("Add", [product, build.by_look(lengths, np.float32)])
     values, picked = build.nodes("TopK", [rough, ints(count)], ["", ""], largest=0, sorted=1)
     # In the order of the rows, so that equal distances go to the earlier one.
     ordered, _ = build.nodes("TopK", [picked, ints(count)], ["", ""], largest=0, sorted=1)
-    near = build.node("Gather", [build.constant(rows), ordered], axis=0)
+    near = build.node("Gather", [build.by_look(rows), ordered], axis=0)
     gaps = build.node("Sub", [near, build.node("Unsqueeze", [z, ints(1)])])
     squares = build.node("ReduceSumSquare", [gaps, ints(2)], keepdims=0)
     short, places = build.nodes("TopK", [squares, ints(k)], ["", ""], largest=0, sorted=1)
@@ -173,7 +104,7 @@ def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> l
             build.node("Mul", [length, build.constant(1.0 - u)]),
         ],
     )
-    sure = build.node("Less", [build.node("Add", [kth, build.constant(slack)]), reach])
+    sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])
     flags = build.node("Cast", [sure], to=TensorProto.FLOAT)
     all_sure = build.node("ReduceMin", [flags, ints(0, 1)], keepdims=0)
     outputs = {"squares": TensorProto.DOUBLE, "rows": TensorProto.INT64}
@@ -186,8 +117,8 @@ def _shortlisted(build: Builder, z: str, rows: NDArray[np.float64], k: int) -> l
         then_branch=then,
         else_branch=other,
     )
-    if unit != 1.0:
-        near_squares = build.node("Mul", [near_squares, build.constant(unit**-2)])
+    if scaled:
+        near_squares = build.node("Mul", [near_squares, build.by_look([u**-2 for u in units])])
     return [near_squares, near_rows]
 
 
@@ -232,54 +163,73 @@ def _decide(
     build.node("Squeeze", [label, axis], f"{task}_label")
 
 
+def _looks(model: ContactClassifier | SequentialClassifier) -> list[ContactClassifier]:
+    return model.looks_ if isinstance(model, SequentialClassifier) else [model]
+
+
 def _convert(scope: Any, operator: Any, container: Any) -> None:
-    model: ContactClassifier = operator.raw_operator
+    model: ContactClassifier | SequentialClassifier = operator.raw_operator
+    looks = _looks(model)
+    last = looks[-1]
     build = Builder(scope, container)
     names = {output.raw_name: output.full_name for output in operator.outputs}
     x = operator.inputs[0].full_name
+    if len(operator.inputs) > 1:
+        build.look = build.node("Squeeze", [operator.inputs[1].full_name])
+    kept = {task: max(look.components_[task] for look in looks) for task in model.choices}
     groups: dict[tuple[str, int], int] = {}
     for task, choice in model.choices.items():
-        key = (choice.scaling, model.components_[task])
+        key = (choice.scaling, kept[task])
         groups[key] = max(groups.get(key, 0), choice.k)
-    points = {s: project(build, x, p) for s, p in model.projections_.items()}
+    points = {s: project(build, x, [m.projections_[s] for m in looks]) for s in last.projections_}
     near: dict[tuple[str, int], list[str]] = {}
     for (scaling, components), k in groups.items():
-        rows = model.rows_[scaling]
-        z = _first(build, points[scaling], rows.shape[1], components)
+        rows = widened([m.rows_[scaling] for m in looks])
+        z = _first(build, points[scaling], rows[0].shape[1], components)
         # A shortlist of most rows saves nothing.
-        short = len(rows) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows)
+        short = len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])
         find = _shortlisted if short else _measured
-        near[scaling, components] = find(build, z, rows[:, :components], k)
+        near[scaling, components] = find(build, z, [r[:, :components] for r in rows], k)
     for task, choice in model.choices.items():
-        key = (choice.scaling, model.components_[task])
+        key = (choice.scaling, kept[task])
         found = [_first(build, name, groups[key], choice.k) for name in near[key]]
         _decide(
             build,
             names[f"{task}_label"].removesuffix("_label"),
-            model.labels_[task],
-            len(model.classes_[task]),
+            last.labels_[task],
+            len(last.classes_[task]),
             choice.k,
             found,
         )
+    if isinstance(model, SequentialClassifier):
+        pvalues(build, x, model, names)
 
 
-def _outputs(model: ContactClassifier) -> list[tuple[str, Any]]:
+def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for task, choice in model.choices.items():
+        classes = len(_looks(model)[-1].classes_[task])
         found += [
             (f"{task}_label", Int64TensorType([None])),
-            (f"{task}_scores", DoubleTensorType([None, len(model.classes_[task])])),
+            (f"{task}_scores", DoubleTensorType([None, classes])),
             (f"{task}_distances", DoubleTensorType([None, choice.k])),
             (f"{task}_neighbours", Int64TensorType([None, choice.k])),
         ]
+        if isinstance(model, SequentialClassifier):
+            shape = [None, model.folds, classes + 1]
+            found.append((f"{task}_pvalues", DoubleTensorType(shape)))
     return found
 
 
 def _parse(
-    scope: Any, model: ContactClassifier, inputs: list[Any], custom_parsers: Any = None
+    scope: Any,
+    model: ContactClassifier | SequentialClassifier,
+    inputs: list[Any],
+    custom_parsers: Any = None,
 ) -> list[Any]:
-    operator = scope.declare_local_operator("ContactClassifier", model)
-    operator.inputs.append(inputs[0])
+    operator = scope.declare_local_operator(type(model).__name__, model)
+    for given in inputs:
+        operator.inputs.append(given)
     for name, kind in _outputs(model):
         operator.outputs.append(scope.declare_local_variable(name, kind))
     return list(operator.outputs)
@@ -314,18 +264,23 @@ def _in_order(nodes: list[onnx.NodeProto], known: set[str]) -> list[onnx.NodePro
     return ordered
 
 
-def to_onnx(model: ContactClassifier, info: ModelInfo) -> bytes:
-    """The fitted tasks and the metadata as a checked, self-contained ONNX file."""
+def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) -> bytes:
+    """The fitted tasks and the metadata as a checked, self-contained ONNX file.
+
+    A `SequentialClassifier` gives a second input, `look` int64 (1,), and for each task the
+    output `<task>_pvalues` (n, folds, labels + 1); see `train.conformal`.
+    """
+    kind = type(model)
     update_registered_converter(
-        ContactClassifier, "ContactClassifier", _shapes, _convert, parser=_parse, overwrite=True
+        kind, kind.__name__, _shapes, _convert, parser=_parse, overwrite=True
     )
+    inputs: list[tuple[str, Any]] = [("features", DoubleTensorType([None, info.width]))]
+    if isinstance(model, SequentialClassifier):
+        inputs.append(("look", Int64TensorType([1])))
     proto = convert_sklearn(
-        model,
-        name="edge-classify",
-        initial_types=[("features", DoubleTensorType([None, info.width]))],
-        target_opset={"": OPSET},
+        model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
     )
-    nodes = _in_order(list(proto.graph.node), {"features"})
+    nodes = _in_order(list(proto.graph.node), {name for name, _ in inputs})
     del proto.graph.node[:]
     proto.graph.node.extend(nodes)
     proto.ir_version = IR_VERSION

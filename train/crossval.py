@@ -14,14 +14,82 @@ from dataclasses import dataclass
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.features import FEATURES
-from train.pipeline import SCALINGS, Choice, principal_axes, scale_of
+from train.pipeline import SCALINGS, Choice, leading_axes, scale_of
 
 MAX_COMPONENTS = 20
 MAX_K = 20
+
+
+def split_neighbours(
+    X: NDArray[np.float64],
+    train: NDArray[np.int64],
+    test: NDArray[np.int64],
+    scaling: str,
+    max_components: int,
+    max_k: int,
+    features: Sequence[str] = FEATURES,
+    first: NDArray[np.int64] | None = None,
+) -> NDArray[np.int64]:
+    """Neighbours of some trials among others, for each number of components.
+
+    A product's rounding hangs on a row's place in the matrix, so equal trials are given the
+    coordinates of the first of them: they are then equally far, and at 0 from each other.
+
+    Args:
+        X: (n, features * samples).
+        train: (m,) rows of X, rising; scaling and components are fitted on them alone.
+        test: (t,) rows of X.
+        scaling: one of `train.pipeline.SCALINGS`.
+        max_components: components tried, from 1.
+        max_k: neighbours wanted, at most m.
+        features: names of the feature types, in the order of X.
+        first: (n,) `first_equal(X)`, where it is at hand.
+
+    Returns:
+        (t, max_components, max_k) rows of X, nearest first, equal distances in the order of the
+        rows. Beyond the numerical rank a further component adds nothing, so its row repeats.
+    """
+    known = X[train]
+    _, gain = scale_of(known, scaling, features)
+    columns = np.repeat(gain, X.shape[1] // len(features))
+    mean = known.mean(axis=0)
+    scaled = (X - mean) * columns
+    axes = leading_axes(scaled[train], max_components)
+    z = (scaled @ axes.T)[first_equal(X) if first is None else first]
+    places, queries = z[train], z[test]
+    rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
+    used = len(axes)
+    for near, query in zip(rows, queries, strict=True):
+        gaps = (places - query).T  # (components, m)
+        order = _nearest(np.cumsum(gaps * gaps, axis=0), max_k)
+        near[:used] = train[order]
+        near[used:] = train[order[-1]] if used else train[:max_k]
+    return rows
+
+
+def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) for each row of X the first row that is equal to it."""
+    seen: dict[bytes, int] = {}
+    whole = np.ascontiguousarray(X, dtype=np.float64) + 0.0  # -0 becomes 0
+    return np.array([seen.setdefault(row.tobytes(), i) for i, row in enumerate(whole)])
+
+
+def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
+    """(components, k) places of the k smallest of each row, by value and then by place."""
+    m = squares.shape[1]
+    if m <= 4 * k:
+        return np.argsort(squares, axis=1, kind="stable")[:, :k]
+    limits = np.partition(squares, k - 1, axis=1)[:, k - 1 : k]
+    order = np.empty((len(squares), k), dtype=np.int64)
+    for out, row, near in zip(order, squares, squares <= limits, strict=True):
+        among = np.flatnonzero(near)
+        out[:] = among[np.argsort(row[among], kind="stable")[:k]]
+    return order
 
 
 def fold_neighbours(
@@ -33,56 +101,11 @@ def fold_neighbours(
     features: Sequence[str] = FEATURES,
     first: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
-    """Neighbours of one left-out trial for each number of components.
-
-    A product's rounding hangs on a row's place in the matrix, so equal trials are given the
-    coordinates of the first of them: they are then equally far, and at 0 from each other.
-
-    Args:
-        X: (n, features * samples).
-        test: the trial left out.
-        scaling: one of `SCALINGS`.
-        max_components: how many are tried, from 1.
-        max_k: neighbours given.
-        features: names of the feature types, in the order of X.
-        first: (n,) `first_equal(X)`, where it is at hand.
-
-    Returns:
-        (max_components, max_k) rows of X, nearest first, equal distances in the order of the
-        rows. Beyond the numerical rank a further component adds nothing, so its row repeats.
-    """
-    keep = np.arange(len(X)) != test
-    train = X[keep]
-    _, gain = scale_of(train, scaling, features)
-    columns = np.repeat(gain, X.shape[1] // len(features))
-    mean = train.mean(axis=0)
-    scaled = (X - mean) * columns
-    _, axes, _ = principal_axes(scaled[keep])
-    z = (scaled @ axes[:max_components].T)[first_equal(X) if first is None else first]
-    gaps = z[test] - z[keep]
-    squares = np.cumsum(gaps * gaps, axis=1)
-    rows = np.empty((max_components, max_k), dtype=np.int64)
-    where = np.flatnonzero(keep)
-    for c in range(max_components):
-        if c < squares.shape[1]:
-            order = _nearest(squares[:, c], max_k)
-        rows[c] = where[order]
-    return rows
-
-
-def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) for each row of X the first row that is equal to it."""
-    _, first, group = np.unique(X, axis=0, return_index=True, return_inverse=True)
-    return np.asarray(first[group.reshape(-1)])
-
-
-def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """The k smallest by (value, index): a partition finds the limit, a stable sort the order."""
-    if k >= len(squares):
-        return np.argsort(squares, kind="stable")[:k]
-    limit = np.partition(squares, k - 1)[k - 1]
-    among = np.flatnonzero(squares <= limit)
-    return among[np.argsort(squares[among], kind="stable")[:k]]
+    """(max_components, max_k) `split_neighbours` of one trial among all others."""
+    train = np.delete(np.arange(len(X)), test)
+    form = scaling, max_components, max_k, features, first
+    found: NDArray[np.int64] = split_neighbours(X, train, np.array([test]), *form)[0]
+    return found
 
 
 def votes_right(
@@ -152,9 +175,11 @@ def _chunk(
     features: Sequence[str],
 ) -> NDArray[np.int64]:
     first = first_equal(X)
-    return np.stack(
-        [fold_neighbours(X, int(i), scaling, components, k, features, first) for i in tests]
-    )
+    # Matrices this small only lose by several threads; processes share the work instead.
+    with threadpool_limits(1):
+        return np.stack(
+            [fold_neighbours(X, int(i), scaling, components, k, features, first) for i in tests]
+        )
 
 
 def accuracies(rows: NDArray[np.int64], y: NDArray[np.str_]) -> NDArray[np.float64]:

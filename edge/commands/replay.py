@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from edge.commands.sure import add_error, check_error
 from edge.errors import InputError
 from edge.live import Event, Watcher, require_joints
 from edge.model import Model
@@ -30,12 +31,15 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="accuracy and a confusion matrix per task on stderr, where recordings are labelled",
     )
+    add_error(parser)
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
     parser.set_defaults(run=run)
 
 
-def decide(model: Model, recording: Recording, name: str) -> list[Event]:
-    """All events of one recording.
+def decide(
+    model: Model, recording: Recording, name: str, error: float | None = None
+) -> list[Event]:
+    """All events of one recording, decided early where an error rate is given.
 
     Raises:
         InputError: the recording does not suit the model; the sentence names `name`.
@@ -43,7 +47,7 @@ def decide(model: Model, recording: Recording, name: str) -> list[Event]:
     joints = recording.joints
     require_joints(model, None if joints is None else joints.shape[1], name)
     try:
-        watcher = Watcher(model, recording.layout)
+        watcher = Watcher(model, recording.layout, error=error)
         events = [event for frame in recording for event in watcher.push(frame)]
         events += watcher.finish()
     except InputError as error:
@@ -56,12 +60,13 @@ def decide(model: Model, recording: Recording, name: str) -> list[Event]:
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 2 where a file could not be used."""
     model = Model(arguments.model)
+    check_error(model, arguments.error)
     summary = Summary(model.info.tasks)
     failed = 0
     for path in _paths(arguments.recordings):
         try:
             recording = load(path)
-            events = decide(model, recording, str(path))
+            events = decide(model, recording, str(path), arguments.error)
         except InputError as error:
             failed += 1
             print(f"edge-classify: {error}", file=sys.stderr)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import json
 import signal
 import sys
+import time
+from contextlib import ExitStack
 from typing import Any
 
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
+from edge.commands.sure import add_error, check_error
+from edge.lines import Lines
 from edge.live import Event, Watcher
 from edge.loop import Loop, Schedule, stop_on
 from edge.model import Model
+from edge.notify import Notifier
 from edge.skin import ChipStatus
+from edge.touchmap import MapFile
 
 
 def add_parser(commands: Any) -> None:
@@ -21,9 +26,11 @@ def add_parser(commands: Any) -> None:
         "run",
         help="read the skin and decide, live",
         description="Reads the skin and prints one JSON object a line: contacts, decisions, "
-        "chips that fail and come back. Ctrl-C ends it after the line at hand.",
+        "chips that fail and come back. Ctrl-C or SIGTERM ends it after the line at hand. "
+        "Under systemd it says when it is ready and that it is alive.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
+    add_error(parser)
     add_skin(parser, joint_options=True)
     parser.add_argument(
         "--without-joints",
@@ -31,6 +38,12 @@ def add_parser(commands: Any) -> None:
         default="flag",
         help="when angles are missing at a contact's onset: flag the decision missing_pose "
         "(default), or measure that contact's motion on the skin and flag it skin_motion",
+    )
+    parser.add_argument("--udp", metavar="HOST:PORT", help="send each line as a datagram there too")
+    parser.add_argument(
+        "--map",
+        metavar="FILE",
+        help="follow every region on its own, and append each contact with its place to FILE",
     )
     parser.set_defaults(run=run)
 
@@ -61,42 +74,58 @@ def end_event(schedule: Schedule, frames: int) -> Event:
     }
 
 
-def emit(events: list[Event]) -> None:
-    """Print events, a line each, at once."""
-    for event in events:
-        sys.stdout.write(json.dumps(event, ensure_ascii=False) + "\n")
-    if events:
-        sys.stdout.flush()
-
-
 def run(arguments: argparse.Namespace) -> int:
-    """Read, watch, print, until the recording or the user ends it."""
+    """Read, watch, print, until the recording, the user or the service manager ends it."""
     model = Model(arguments.model)
+    check_error(model, arguments.error)
     chain = model.info.chain
-    with stop_on(signal.SIGINT) as stop, open_skin(arguments) as opened:
+    with ExitStack() as stack:
+        stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
+        notifier = stack.enter_context(Notifier(now=time.monotonic))
+        lines = stack.enter_context(Lines(udp=arguments.udp))
+        opened = stack.enter_context(open_skin(arguments))
         on_skin = arguments.without_joints == "skin"
         if not on_skin:
             check_joints(model, arguments, opened)
         skin = opened.skin
         dof = None if chain is None else chain.dof
-        with open_joints(arguments, opened, dof) as joints:
-            watcher = Watcher(model, skin.layout)
-            # The model's threshold counts where it is the lower one.
-            skin.touch_counts = min(skin.touch_counts, watcher.layout.threshold_counts)
-            loop = Loop(
-                skin,
-                joints=joints if chain is not None else None,
-                lasts_s=opened.lasts_s,
-                stop=stop,
+        joints = stack.enter_context(open_joints(arguments, opened, dof))
+        watcher = Watcher(
+            model, skin.layout, error=arguments.error, several=arguments.map is not None
+        )
+        touch_map = None
+        if arguments.map is not None:
+            touch_map = stack.enter_context(MapFile(arguments.map, model.info))
+        # The model's threshold counts where it is the lower one.
+        skin.touch_counts = min(skin.touch_counts, watcher.layout.threshold_counts)
+        loop = Loop(
+            skin,
+            joints=joints if chain is not None else None,
+            lasts_s=opened.lasts_s,
+            stop=stop,
+        )
+
+        def emit(events: list[Event]) -> None:
+            lines.write(events)
+            if touch_map is not None and events:
+                touch_map.write(events)
+
+        notifier.ready(f"reading {opened.source}")
+        frames = 0
+        for frame in loop.frames():
+            frames += 1
+            notifier.alive()
+            emit([chip_event(status, frame.t) for status in skin.changes()])
+            if on_skin:
+                # A contact keeps the chain that it finds at its first frame.
+                watcher.tracker.chain = None if frame.joints is None else chain
+            emit(watcher.push(frame))
+        notifier.stopping()
+        emit(watcher.finish())
+        emit([end_event(loop.schedule, frames)])
+        if lines.lost:
+            print(
+                f"edge-classify: {lines.lost} lines could not be sent to {arguments.udp}",
+                file=sys.stderr,
             )
-            frames = 0
-            for frame in loop.frames():
-                frames += 1
-                emit([chip_event(status, frame.t) for status in skin.changes()])
-                if on_skin:
-                    # A contact keeps the chain that it finds at its first frame.
-                    watcher.tracker.chain = None if frame.joints is None else chain
-                emit(watcher.push(frame))
-            emit(watcher.finish())
-            emit([end_event(loop.schedule, frames)])
     return 0

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import yourdfpy
 
 from edge.arm import Chain, Joint
 from edge.errors import InputError
@@ -38,6 +37,7 @@ def test_a_urdf_chain_agrees_with_yourdfpy(urdf):
     chain = Chain.from_urdf(urdf, "base", "hand")
     assert chain.names == ("pan", "slide", "roll")
     assert chain.limits == ((-2.0, 2.0), (0.0, 0.5), None)
+    yourdfpy = pytest.importorskip("yourdfpy", reason="a workstation's package")
     robot = yourdfpy.URDF.load(str(urdf), build_scene_graph=True, load_meshes=False)
     rng = np.random.default_rng(0)
     for q in rng.uniform(-3, 3, (50, 3)):

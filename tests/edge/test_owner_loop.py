@@ -14,8 +14,8 @@ from edge.recording import load
 def skin(tmp_path, forearm):
     """The owner's own skin file: Cody's, with the thresholds of this skin."""
     text = skinfile.shipped("cody").read_text()
-    text = text.replace("threshold_counts = 200", f"threshold_counts = {forearm.threshold_counts}")
-    text = text.replace("onset_counts = 500", f"onset_counts = {forearm.onset_counts}")
+    text = text.replace("threshold_counts = 40", f"threshold_counts = {forearm.threshold_counts}")
+    text = text.replace("onset_counts = 60", f"onset_counts = {forearm.onset_counts}")
     path = tmp_path / "skin.toml"
     path.write_text(text)
     return path
@@ -37,7 +37,7 @@ def test_record_export_run(skin, recordings, tmp_path, capsys):
     assert run("calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)[0] == 0
 
     trials = tmp_path / "trials"
-    shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(4)]
+    shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(3)]
     for name in shown:
         labels = load(recordings / f"{name}.npz").labels
         given = [part for task in labels for part in ("--label", f"{task}={labels[task]}")]

@@ -10,6 +10,7 @@ from edge import skinfile
 from edge.errors import EdgeError
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.groups import SEQUENCE_FRAMES
 from edge.skin import Skin
 from edge.skinfile import BusSpec, Reading
 
@@ -92,6 +93,22 @@ def test_block_chips_of_each_width_serve_a_whole_skin():
             frame = skin.read()
         np.testing.assert_array_equal(frame.counts, picture)
         assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
+
+
+def test_a_microcontroller_that_hangs_is_told_by_its_sequence_number():
+    chip = replace(
+        CODY.chips[0], kind="block", address=0x28, mux=None, channel=None,
+        taxels=tuple(range(384)),
+    )  # fmt: skip
+    file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
+    with fake_skin(file, lambda t: PICTURE) as skin:
+        valid = []
+        for k in range(100):
+            if k < 50:
+                skin.clock.sleep_until(k * 0.01)  # then its time stands still
+            valid.append(bool(skin.read().valid.all()))
+    assert valid.index(False) == 49 + SEQUENCE_FRAMES
+    assert not any(valid[49 + SEQUENCE_FRAMES :])
 
 
 def test_chips_of_different_kinds_make_one_skin():
@@ -200,14 +217,14 @@ def test_the_baseline_follows_drift_until_something_touches():
 
 
 def test_drift_is_not_followed_beyond_its_limit():
-    signal = replace(CODY.signal, drift_limit_counts=50, drift_counts_per_s=1000.0)
+    signal = replace(CODY.signal, drift_limit_counts=10, drift_counts_per_s=1000.0)
     file = replace(CODY, signal=signal)
-    level = np.full((16, 24), 150, dtype=np.uint16)
+    level = np.full((16, 24), 30, dtype=np.uint16)
     with fake_skin(file, lambda t: level) as skin:
         for i in range(300):
             skin.clock.sleep_until(i * 0.01)
             frame = skin.read()
-    assert (frame.counts == 100).all()
+    assert (frame.counts == 20).all()
 
 
 def test_a_skin_without_a_single_chip_says_so():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from edge import skinfile
+from edge.calibration import calibration_text, dead_band, save_calibration, with_calibration
 from edge.errors import InputError
 from edge.skinfile import Calibration, Reading
 
@@ -130,12 +131,12 @@ def same(a, b):
 def test_a_calibration_is_written_replaced_and_read_back(tail):
     first = calibration(1)
     second = calibration(2, datetime(2026, 11, 21, 9, 0, 0, tzinfo=UTC))
-    once = skinfile.with_calibration(SMALL + tail, first)
+    once = with_calibration(SMALL + tail, first)
     # As a user may move it: a calibration in the middle of the file.
-    middle = SMALL + skinfile.calibration_text(first) + tail
+    middle = SMALL + calibration_text(first) + tail
     for text in (once, middle):
         assert same(skinfile.parse(text).calibration, first)
-        twice = skinfile.with_calibration(text, second)
+        twice = with_calibration(text, second)
         file = skinfile.parse(twice)
         assert same(file.calibration, second)
         assert twice.count("[calibration]") == 1
@@ -147,7 +148,7 @@ def test_a_calibration_is_written_replaced_and_read_back(tail):
 def test_a_calibration_that_cannot_be_replaced_is_refused():
     inline = "calibration.taken = 2026-01-01T00:00:00Z\n" + SMALL
     with pytest.raises(InputError, match="calibration"):
-        skinfile.with_calibration(inline, calibration())
+        with_calibration(inline, calibration())
 
 
 @pytest.mark.parametrize(
@@ -170,7 +171,7 @@ def test_a_damaged_calibration_is_refused(key, value):
 def test_saving_a_calibration_keeps_the_old_file(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text(SMALL)
-    backup = skinfile.save_calibration(path, calibration(3))
+    backup = save_calibration(path, calibration(3))
     assert backup.read_text() == SMALL
     assert same(skinfile.load(path).calibration, calibration(3))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["skin.toml", "skin.toml.bak"]
@@ -180,12 +181,12 @@ def test_a_file_that_is_wrong_is_left_alone(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text(SMALL.replace("sign = -1", "sign = 2"))
     with pytest.raises(InputError):
-        skinfile.save_calibration(path, calibration())
+        save_calibration(path, calibration())
     assert [p.name for p in tmp_path.iterdir()] == ["skin.toml"]
 
 
 def test_the_dead_band_is_six_sigma_and_never_less_than_one_count():
-    file = skinfile.parse(SMALL + skinfile.calibration_text(calibration(4)))
+    file = skinfile.parse(SMALL + calibration_text(calibration(4)))
     noise = file.calibration.noise.ravel()
     expected = np.maximum(1, np.ceil(6 * noise)).astype(int)
-    assert skinfile.dead_band(file).tolist() == expected.tolist()
+    assert dead_band(file).tolist() == expected.tolist()

@@ -140,7 +140,7 @@ MUTANTS = (
     ),
     Mutant(
         "the graph's projection: high half",
-        GRAPH,
+        "export/build.py",
         'half = build.node("Sub", [build.node("Add", [d, step]), step])',
         'half = build.node("Mul", [d, build.constant(0.5)])',
         (OF_GRAPH, "scaling_agrees or equals_a_training_row or all_at_once"),
@@ -159,15 +159,15 @@ MUTANTS = (
     Mutant(
         "the shortlist is checked",
         GRAPH,
-        'sure = build.node("Less", [build.node("Add", [kth, build.constant(slack)]), reach])',
+        'sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])',
         'sure = build.node("LessOrEqual", [kth, kth])',
         (OF_GRAPH, "too_narrow"),
     ),
     Mutant(
         "the check allows for float32's rounding",
         GRAPH,
-        "slack = 2.0 * u * float(lengths.max())",
-        "slack = u = 0.0",
+        "slack = [2.0 * u * float(of.max()) for of in lengths]",
+        "slack = [0.0 for of in lengths]\n    u = 0.0",
         (OF_GRAPH, "clusters"),
     ),
     Mutant(
@@ -180,15 +180,15 @@ MUTANTS = (
     Mutant(
         "the shortlist's rows are brought to float32's size",
         GRAPH,
-        "    unit = _unit(rows)\n",
-        "    unit = 1.0\n",
+        "units = [_unit(r) for r in rows]",
+        "units = [1.0 for r in rows]",
         (OF_GRAPH, "float32_cannot_hold"),
     ),
     Mutant(
         "no shortlist of nearly all rows",
         GRAPH,
-        "len(rows) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows)",
-        "len(rows) >= SHORTLIST_ROWS",
+        "len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
+        "len(rows[0]) >= SHORTLIST_ROWS",
         (OF_GRAPH, "voters_as_rows"),
     ),
     Mutant(
@@ -215,8 +215,15 @@ MUTANTS = (
     Mutant(
         "leave-one-out: equal distances at the partition's limit",
         CROSSVAL,
-        "among = np.flatnonzero(squares <= limit)",
-        "among = np.argpartition(squares, k - 1)[:k]",
+        "among = np.flatnonzero(near)",
+        "among = np.argpartition(row, k - 1)[:k]",
+        (OF_CROSSVAL, "limit"),
+    ),
+    Mutant(
+        "leave-one-out: equal trials are equally far",
+        CROSSVAL,
+        "z = (scaled @ axes.T)[first_equal(X) if first is None else first]",
+        "z = scaled @ axes.T",
         (OF_CROSSVAL, "limit"),
     ),
     Mutant(
@@ -264,7 +271,7 @@ MUTANTS = (
     Mutant(
         "one frame alone begins no contact",
         TRACK,
-        "if self._run < self.settings.debounce:",
+        "if self._run < of.settings.debounce:",
         "if False:",
         (OF_TRACK, "one_frame_alone"),
     ),

@@ -6,9 +6,17 @@ from sklearn.model_selection import GridSearchCV, LeaveOneOut
 from sklearn.pipeline import Pipeline
 
 from edge.errors import InputError
-from train.crossval import choose, leave_one_out, neighbours, votes_right
+from train.crossval import choose, leave_one_out, neighbours, split_neighbours, votes_right
 from train.dataset import load_trials
-from train.pipeline import SCALINGS, FeatureScaler, NearestNeighbours, PrincipalComponents, vote
+from train.pipeline import (
+    SCALINGS,
+    FeatureScaler,
+    NearestNeighbours,
+    PrincipalComponents,
+    leading_axes,
+    principal_axes,
+    vote,
+)
 
 
 def sklearn_table(X, y, scaling, components, ks):
@@ -147,3 +155,48 @@ def test_too_few_trials_and_values_that_are_not_finite_are_named():
     X[3, 3] = np.inf
     with pytest.raises(InputError, match="trial 3"):
         leave_one_out(X, y)
+
+
+def subspace_gap(ours: np.ndarray, exact: np.ndarray) -> float:
+    """Largest sine between the spans of the first 1, 2, ... axes."""
+    worst = 0.0
+    for c in range(1, len(ours) + 1):
+        left = ours[:c] - ours[:c] @ exact[:c].T @ exact[:c]
+        worst = max(worst, float(np.linalg.norm(left, 2)))
+    return worst
+
+
+@pytest.mark.parametrize("shape", [(60, 24), (24, 60)])
+@pytest.mark.parametrize("decades", [2, 3.9, 8, 15])
+def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
+    """Below 1e-4 of the largest singular value the covariance is not trusted any more."""
+    rng = np.random.default_rng(5)
+    side = min(shape)
+    left = np.linalg.qr(rng.normal(size=(shape[0], side)))[0]
+    left = np.linalg.qr(left - left.mean(axis=0))[0]
+    right = np.linalg.qr(rng.normal(size=(shape[1], side)))[0]
+    X = left * 10.0 ** -np.linspace(0, decades, side) @ right.T
+    ours = leading_axes(X, side - 2)
+    _, exact, _ = principal_axes(X)
+    assert len(ours) == min(side - 2, len(exact))
+    assert subspace_gap(ours, exact[: len(ours)]) < 1e-7
+    assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7
+
+
+def test_leading_axes_of_fewer_dimensions_than_asked_for():
+    X = np.outer(np.arange(9.0), np.ones(12))
+    assert len(leading_axes(X, 5)) == 1
+    assert leading_axes(np.ones((9, 12)), 5).shape == (0, 12)
+
+
+def test_a_group_left_out_is_fitted_without_any_of_its_trials():
+    X, _ = overlapping(30)
+    train, test = np.arange(0, 30, 2), np.array([1, 7])
+    rows = split_neighbours(X, train, test, "IV", 6, 15)
+    assert rows.shape == (2, 6, 15)
+    assert (np.sort(rows, axis=2) == train).all()
+    scaled = FeatureScaler("IV").fit(X[train])
+    fitted = PrincipalComponents(6).fit(scaled.transform(X[train]))
+    places = fitted.transform(scaled.transform(X))
+    known = NearestNeighbours(15).fit(places[train], np.array(["x"] * 15))
+    assert (train[known.kneighbors(places[test])[1]] == rows[:, 5]).all()

@@ -33,7 +33,7 @@ def test_training_and_the_board_compute_the_same_bits(recordings, exported):
         seen = []
         for frame in recording:
             watcher.push(frame)
-            seen += [c for c in watcher._waiting if c not in seen]
+            seen += [w.contact for w in watcher._waiting if w.contact not in seen]
         vector = feature_vector(seen[0].series(), 1.2)
         assert vector.tobytes() == expected.tobytes()
 

@@ -1,0 +1,60 @@
+"""What `count.c` counts: the board's path over a recording, a mark before and after each step.
+
+Run as `python count_guest.py MODEL RECORDING` under the plugin. Prints the names of the steps,
+a line for each pair of marks.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from edge.features import feature_vector
+from edge.golden import first_series
+from edge.live import Watcher
+from edge.model import Model
+from edge.recording import load
+
+REPEATS = 20
+
+
+def main() -> None:
+    model, recording = Model(sys.argv[1]), load(sys.argv[2])
+    mark = os.getppid
+    names = []
+    info = model.info
+    found = first_series(recording, model)
+    assert found is not None, "the recording has no contact"
+    series = found[1]
+    vector = feature_vector(series, info.window_s, info.samples, info.features)
+    model.decide(vector)
+    for _ in range(REPEATS):
+        mark()
+        mark()
+        mark()
+        feature_vector(series, info.window_s, info.samples, info.features)
+        mark()
+        mark()
+        model.decide(vector)
+        mark()
+        names += ["nothing", "feature vector", "model"]
+    for _ in range(2):  # caches fill in the first round
+        watcher = Watcher(model, recording.layout)
+        for frame in recording:
+            mark()
+            events = watcher.push(frame)
+            mark()
+            kinds = {event["event"] for event in events}
+            if "decision" in kinds:
+                names.append("frame that decides")
+            elif kinds:
+                names.append("frame with another event")
+            elif watcher.tracker.region is not None:
+                names.append("frame in contact")
+            else:
+                names.append("frame without contact")
+    print("\n".join(names))
+
+
+if __name__ == "__main__":
+    main()

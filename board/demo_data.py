@@ -1,0 +1,54 @@
+"""The demo that the wheel carries: a model and four unseen touches, with golden outputs.
+
+    python board/demo_data.py build/demo-data
+
+takes `model.onnx`, `known/` and `unseen/` from that folder (see `make demo-data`) and replaces
+`edge/demo/` and `tests/golden/demo.npz`.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from edge.golden import first_series
+from edge.model import Model
+from edge.recording import load, save_arrays
+from export import golden
+from train.dataset import load_trials
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+TOUCHES = ("cardboard-box-fixed", "cardboard-box-movable", "foam-block-fixed", "pillow-movable")
+META = ("arm", "labels", "skin", "source", "trial")
+
+
+def main(folder: Path) -> None:
+    """Write the files."""
+    demo = CHECKOUT / "edge" / "demo"
+    for old in (*demo.glob("*.npz"), *demo.glob("*.onnx")):
+        old.unlink()
+    (demo / "model.onnx").write_bytes((folder / "model.onnx").read_bytes())
+    model = Model(demo / "model.onnx")
+    for touch in TOUCHES:
+        recording = load(folder / "unseen" / f"{touch}-00.npz")
+        found = first_series(recording, model)
+        assert found is not None, f"{touch} touches nothing"
+        short = golden.trimmed(replace(recording, valid=None), found[0], model)
+        arrays = {"t": short.t - short.t[0], "frames": short.frames}
+        if short.joints is not None:
+            arrays["joints"] = short.joints
+        meta = {key: short.meta[key] for key in META if key in short.meta}
+        save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
+    info = model.info
+    known = load_trials([folder / "known"], tracking=info.tracking, features=info.features)
+    golden.write(
+        CHECKOUT / "tests" / "golden" / "demo.npz",
+        model,
+        load_trials([demo], tracking=info.tracking, features=info.features),
+        known.features(info.window_s, info.samples),
+    )
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

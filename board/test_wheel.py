@@ -1,0 +1,118 @@
+"""The wheel as an owner gets it: into an empty environment, away from the checkout.
+
+`make wheel-test` builds it and runs this.
+"""
+
+import ast
+import json
+import os
+import subprocess
+import venv
+import zipfile
+from email.parser import Parser
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+LARGEST = 200_000
+
+
+@pytest.fixture(scope="session")
+def wheel() -> Path:
+    wheels = sorted((CHECKOUT / "dist").glob("edge_classify-*.whl"))
+    assert len(wheels) == 1, "build it with `make wheel`"
+    return wheels[0]
+
+
+@pytest.fixture(scope="session")
+def contents(wheel) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.fixture(scope="session")
+def command(wheel, tmp_path_factory):
+    """Runs `edge-classify ...` of a fresh environment, in an empty folder."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    venv.create(folder / "env", with_pip=True)
+    python = folder / "env" / "bin" / "python"
+    pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "-c", CHECKOUT / "constraints.txt", wheel], check=True)
+    (folder / "work").mkdir()
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+
+    def run(*arguments, program="edge-classify"):
+        return subprocess.run(
+            [folder / "env" / "bin" / program, *map(str, arguments)],
+            cwd=folder / "work",
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+def test_it_is_small(wheel):
+    assert wheel.stat().st_size < LARGEST
+
+
+def test_it_holds_edge_alone_and_all_of_it(contents):
+    inside = {name for name in contents if ".dist-info/" not in name}
+    tracked = subprocess.run(
+        ["git", "ls-files", "edge"], cwd=CHECKOUT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert inside == set(tracked)
+
+
+def test_it_is_typed(contents):
+    assert "edge/py.typed" in contents
+
+
+def test_it_names_three_dependencies_one_version_and_a_licence(contents):
+    (metadata,) = (v for k, v in contents.items() if k.endswith(".dist-info/METADATA"))
+    fields = Parser().parsestr(metadata.decode())
+    needed = [
+        need.split(">")[0] for need in fields.get_all("Requires-Dist") if "extra ==" not in need
+    ]
+    assert sorted(needed) == ["numpy", "onnxruntime", "smbus2"]
+    source = ast.parse((CHECKOUT / "edge" / "__init__.py").read_text())
+    (version,) = (n.value.value for n in source.body if isinstance(n, ast.Assign))
+    assert fields["Version"] == version
+    assert fields["License-Expression"] == "BSD-3-Clause"
+    assert any(name.endswith("/LICENSE") for name in contents)
+
+
+def test_the_demo_decides(command):
+    done = command("demo")
+    assert done.returncode == 0, done.stderr
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    decisions = [line for line in lines if line["event"] == "decision"]
+    assert {line["task"] for line in decisions} == {"category", "mobility", "object"}
+    assert {line["label"] for line in decisions} >= {"rigid-fixed", "rigid-movable", "soft-fixed"}
+    assert all(line["label"] == line["expected"] for line in decisions)
+    assert (
+        done.stderr == f"edge-classify: {len(decisions)} of {len(decisions)} decisions are right\n"
+    )
+
+
+def test_the_golden_outputs_are_met(command):
+    where = command("-c", "import edge.demo; print(edge.demo.MODEL)", program="python")
+    golden = CHECKOUT / "tests" / "golden" / "demo.npz"
+    done = command("verify", "--model", where.stdout.strip(), "--golden", golden)
+    assert done.returncode == 0, done.stderr
+
+
+def test_nothing_of_the_workstation_is_there(command):
+    code = "import importlib.util as u, sys; sys.exit(any(map(u.find_spec, sys.argv[1:])))"
+    modules = ("train", "export", "sklearn", "onnx", "scipy", "matplotlib", "tqdm")
+    assert command("-c", code, *modules, program="python").returncode == 0
+
+
+def test_a_command_without_hardware_says_so_in_one_sentence(command):
+    done = command("run", "--model", "model.onnx", "--skin", "skin.toml")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("edge-classify: ")

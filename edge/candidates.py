@@ -1,0 +1,86 @@
+"""Which labels a contact can still have, look by look."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+
+UNKNOWN = "unknown"
+"""What a contact is called that no label fits."""
+ALARMS = 0.05
+"""How often a contact with a trained thing may be called unknown for lying far from all."""
+
+
+def check_rate(value: float, what: str) -> float:
+    """The value where it is a rate inside (0, 1).
+
+    Raises:
+        InputError: it is not; the sentence names `what`.
+    """
+    if not 0.0 < value < 1.0:
+        raise InputError(f"{what} must be above 0 and below 1, not {value:g}")
+    return value
+
+
+class Candidates:
+    """The labels of one task that a contact can still have.
+
+    A model with looks gives at every look, for each fold of its calibration, a p-value a label
+    and one for its lying far from all that was trained (see `train.conformal`). A label keeps
+    the least p-value of its looks in each fold; it is struck out, for good, once their mean over
+    the folds is at most `error`.
+
+    Args:
+        labels: how many there are.
+        error: how often the true label may be struck out, in (0, 1).
+        alarms: how often a trained thing may be called unknown for lying far from all.
+    """
+
+    def __init__(self, labels: int, error: float, alarms: float = ALARMS) -> None:
+        self.error, self.alarms = error, alarms
+        self._least: NDArray[np.float64] | None = None
+        self._mean = np.ones(labels + 1)
+
+    def look(self, pvalues: NDArray[np.float64]) -> None:
+        """Take in a look's p-values (folds, labels + 1)."""
+        self._least = pvalues if self._least is None else np.minimum(self._least, pvalues)
+        self._mean = self._least.mean(axis=0)
+
+    @property
+    def pvalues(self) -> NDArray[np.float64]:
+        """(labels,) over the looks so far."""
+        return self._mean[:-1]
+
+    @property
+    def left(self) -> list[int]:
+        """Labels that are not struck out."""
+        return np.flatnonzero(self.pvalues > self.error).tolist()
+
+    @property
+    def unknown(self) -> bool:
+        """No label is left, or the contact lies too far from all that was trained."""
+        return bool(self._mean[-1] <= self.alarms) or not self.left
+
+    @property
+    def settled(self) -> bool:
+        """Further looks cannot change the answer: one label is left, or the contact is unknown."""
+        return self.unknown or len(self.left) == 1
+
+    def best(self, favourite: int) -> int:
+        """The label of the largest p-value; of equal ones the favourite, else the first."""
+        largest = self.pvalues.max()
+        if self.pvalues[favourite] == largest:
+            return favourite
+        return int(self.pvalues.argmax())
+
+    def confidence(self, label: int) -> float:
+        """One less the smallest error (or rate of false alarms) that would leave another answer.
+
+        Args:
+            label: the answer; where the contact is unknown, it makes no difference.
+        """
+        if self.unknown:
+            return float(1.0 - min(self.pvalues.max(), self._mean[-1]))
+        return float(1.0 - np.delete(self.pvalues, label).max(initial=0.0))

@@ -1,0 +1,63 @@
+"""`edge-classify demo`: decisions without a skin, a model or a recording of one's own."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from edge import demo
+from edge.fake.player import play, skin_file
+from edge.live import Event, Watcher
+from edge.loop import Loop
+from edge.model import Model
+from edge.recording import Recording, load
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "demo",
+        help="decide on touches that come with the program",
+        description="Plays the recordings that come with the program onto fake chips, reads "
+        "those with the real drivers, and decides with the model that comes with it: the whole "
+        "path but for the wires. Model and recordings are simulated.",
+    )
+    parser.set_defaults(run=run)
+
+
+def events(model: Model, recording: Recording) -> Iterator[Event]:
+    """What `edge-classify run` would say of a recording on fake chips."""
+    skin, playback = play(skin_file(recording.layout), recording)
+    with skin:
+        watcher = Watcher(model, skin.layout)
+        for frame in Loop(skin, joints=playback, lasts_s=playback.ends).frames():
+            yield from watcher.push(frame)
+        yield from watcher.finish()
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the events; 1 where a decision is not the recording's label."""
+    model = Model(demo.MODEL)
+    right = asked = 0
+    for path in demo.recordings():
+        right_here, asked_here = _show(model, path)
+        right, asked = right + right_here, asked + asked_here
+    print(f"edge-classify: {right} of {asked} decisions are right", file=sys.stderr)
+    return 0 if asked and right == asked else 1
+
+
+def _show(model: Model, path: Path) -> tuple[int, int]:
+    recording = load(path)
+    right = asked = 0
+    for event in events(model, recording):
+        line = {"source": path.stem, **event}
+        if event["event"] == "decision":
+            line["expected"] = recording.labels[event["task"]]
+            asked += 1
+            right += line["expected"] == event["label"]
+        print(json.dumps(line, ensure_ascii=False), flush=True)
+    return right, asked

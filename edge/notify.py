@@ -1,0 +1,83 @@
+"""Word to the service manager: ready, alive, stopping (sd_notify(3): one datagram each)."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+
+NEVER = float("inf")
+
+
+class Notifier:
+    """Says to systemd how the service is; says nothing where no systemd listens.
+
+    >>> Notifier({}, now=lambda: 0.0).ready()
+    """
+
+    def __init__(self, environment: Mapping[str, str] = os.environ, *, now: Callable[[], float]):
+        """Take the manager's address from the environment.
+
+        Args:
+            environment: NOTIFY_SOCKET (a path, or @name in the abstract namespace), and where
+                the manager watches, WATCHDOG_USEC and WATCHDOG_PID.
+            now: a clock in seconds that never goes back.
+        """
+        self._now = now
+        self._socket: socket.socket | None = None
+        address = environment.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        if address[:1] in ("@", "/"):
+            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+            self._socket.setblocking(False)
+        self.period_s = _watchdog_s(environment) / 2.0
+        """Half of what the manager allows between two signs of life; infinity where it does not
+        watch."""
+        self._due = now()
+
+    def ready(self, status: str = "") -> None:
+        """The service does its work from now on."""
+        self._send("READY=1" + (f"\nSTATUS={status}" if status else ""))
+
+    def alive(self) -> None:
+        """A sign of life; call it each round of the loop: it is sent as often as is needed."""
+        if self.period_s == NEVER:
+            return
+        now = self._now()
+        if now >= self._due:
+            self._due = now + self.period_s
+            self._send("WATCHDOG=1")
+
+    def stopping(self) -> None:
+        """The service was asked to end, and does."""
+        self._send("STOPPING=1")
+
+    def close(self) -> None:
+        """Say no more; twice is fine."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def __enter__(self) -> Notifier:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _send(self, text: str) -> None:
+        if self._socket is not None:
+            # A manager that has gone, or is too busy to listen, must not end the service.
+            with suppress(OSError):
+                self._socket.sendto(text.encode(), self._address)
+
+
+def _watchdog_s(environment: Mapping[str, str]) -> float:
+    """Seconds between two signs of life that the manager allows this process."""
+    if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
+        return NEVER
+    try:
+        microseconds = int(environment["WATCHDOG_USEC"])
+    except (KeyError, ValueError):
+        return NEVER
+    return microseconds * 1e-6 if microseconds > 0 else NEVER

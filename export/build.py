@@ -1,0 +1,117 @@
+"""Nodes and constants of an ONNX graph, and the projection that all its parts share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import helper, numpy_helper
+
+OPSET = 18
+
+
+class Builder:
+    """Nodes and constants of a graph under construction, either the main one or a branch.
+
+    Attributes:
+        look: name of the scalar that says which look is asked for; unused without looks.
+    """
+
+    def __init__(self, scope: Any, container: Any, look: str = "") -> None:
+        self._scope, self._container = scope, container
+        self.look = look
+        self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
+        self._branch: list[onnx.NodeProto] | None = None
+
+    def constant(self, value: Any, dtype: Any = np.float64) -> str:
+        """Name of a constant; equal ones are stored once."""
+        array = np.asarray(value, dtype=dtype)
+        key = (array.dtype.str, array.shape, array.tobytes())
+        if key not in self._constants:
+            name = self._scope.get_unique_variable_name("constant")
+            tensor = numpy_helper.from_array(np.ascontiguousarray(array).reshape(array.shape))
+            self._container.add_initializer(name, tensor.data_type, list(array.shape), tensor)
+            self._constants[key] = name
+        return self._constants[key]
+
+    def by_look(self, values: Sequence[Any], dtype: Any = np.float64) -> str:
+        """Name of the value of the look that is asked for: one of the stacked constants."""
+        if len(values) == 1:
+            return self.constant(values[0], dtype)
+        stack = self.constant(np.stack(values), dtype)
+        return self.node("Gather", [stack, self.look], axis=0)
+
+    def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
+        """Add an operator of one output and return its name."""
+        return self.nodes(operator, inputs, [output], **attributes)[0]
+
+    def nodes(
+        self, operator: str, inputs: list[str], outputs: list[str], **attributes: Any
+    ) -> list[str]:
+        """Add an operator; an output named "" gets a name of its own."""
+        names = [o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs]
+        label = self._scope.get_unique_operator_name(operator)
+        if self._branch is not None:
+            self._branch.append(helper.make_node(operator, inputs, names, name=label, **attributes))
+        else:
+            self._container.add_node(
+                operator, inputs, names, op_version=OPSET, name=label, **attributes
+            )
+        return names
+
+    def branch(self, name: str, outputs: dict[str, Any], make: Any) -> onnx.GraphProto:
+        """The graph of what `make()` adds; it returns the outputs' names in order.
+
+        Args:
+            name: of the graph.
+            outputs: {name: tensor type}, each (rows, columns).
+            make: adds nodes to this builder.
+        """
+        self._branch = []
+        made = make()
+        infos = []
+        for seen, (wanted, kind) in zip(made, outputs.items(), strict=True):
+            unique = self._scope.get_unique_variable_name(wanted)
+            self.node("Identity", [seen], unique)
+            infos.append(helper.make_tensor_value_info(unique, kind, [None, None]))
+        nodes, self._branch = self._branch, None
+        return helper.make_graph(nodes, name, [], infos)
+
+
+class Affine(Protocol):
+    """What `project` reads of a `train.pipeline.Projection`, or of several stacked."""
+
+    mean: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    high: Any
+    low: Any
+    weights: NDArray[np.float64]
+
+
+def project(build: Builder, x: str, looks: Sequence[Affine]) -> str:
+    """Features (n, p) to coordinates (n, c); see `train.pipeline.Projection`."""
+    d = build.node("Sub", [x, build.by_look([p.mean for p in looks])])
+    if not all((p.gain == 1.0).all() for p in looks):
+        d = build.node("Mul", [d, build.by_look([p.gain for p in looks])])
+    grids = [build.by_look([p.high for p in looks]), build.by_look([p.low for p in looks])]
+    halves = []
+    for step in grids:
+        half = build.node("Sub", [build.node("Add", [d, step]), step])
+        halves.append(half)
+        if step == grids[0]:
+            d = build.node("Sub", [d, half])
+    weights = build.by_look(widened([p.weights for p in looks]))
+    high, low = (build.node("MatMul", [half, weights]) for half in halves)
+    return build.node("Add", [high, low])
+
+
+def widened(arrays: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """Arrays with columns of zeros added up to the widest: coordinates that are always 0."""
+    most = max(array.shape[-1] for array in arrays)
+    return [
+        np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, most - array.shape[-1])])
+        for array in arrays
+    ]

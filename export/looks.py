@@ -1,0 +1,134 @@
+"""The p-values of a `SequentialClassifier` as nodes of its graph; see `train.conformal`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from onnx import TensorProto
+
+from export.build import Builder, project, widened
+from train.conformal import Calibration, Ranking, SequentialClassifier
+from train.pipeline import Projection
+
+
+@dataclass
+class Folds:
+    """The projections of all folds at one look, stacked for `export.build.project`."""
+
+    mean: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    high: NDArray[np.float64]
+    low: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, folds: list[Projection]) -> Folds:
+        """Arrays that broadcast against features (n, 1, 1, p) to coordinates (n, folds, 1, c)."""
+        return cls(
+            mean=np.stack([p.mean for p in folds])[:, None],
+            gain=np.stack([p.gain for p in folds])[:, None],
+            high=np.array([p.high for p in folds])[:, None, None],
+            low=np.array([p.low for p in folds])[:, None, None],
+            weights=np.stack(widened([p.weights for p in folds])),
+        )
+
+
+def pvalues(build: Builder, x: str, model: SequentialClassifier, names: dict[str, str]) -> None:
+    """Features (n, p) to the outputs `<task>_pvalues` (n, folds, labels + 1).
+
+    Args:
+        build: of the graph, which knows the look.
+        x: name of the features.
+        model: fitted.
+        names: of the outputs in the graph.
+    """
+    wide = build.node("Unsqueeze", [x, build.constant([1, 2], np.int64)])
+    points: dict[str, tuple[str, int]] = {}
+    squares: dict[tuple[str, int], str] = {}
+    for task, choice in model.choices.items():
+        calibration = model.calibrations_[task]
+        if choice.scaling not in points:
+            looks = [Folds.of(folds) for folds in calibration.projections]
+            z = project(build, wide, looks)
+            # (n, folds, c, 1), against rows (folds, c, rows): sums then run along memory.
+            axes = [build.constant([axis], np.int64) for axis in (2, 3)]
+            z = build.node("Unsqueeze", [build.node("Squeeze", [z, axes[0]]), axes[1]])
+            points[choice.scaling] = z, max(look.weights.shape[-1] for look in looks)
+        z, have = points[choice.scaling]
+        c = calibration.rows.shape[-1]
+        if (choice.scaling, c) not in squares:
+            if c < have:
+                ints = [build.constant([i], np.int64) for i in (0, c, 2)]
+                z = build.node("Slice", [z, *ints])
+            rows = build.by_look([look.transpose(0, 2, 1) for look in calibration.rows])
+            gaps = build.node("Sub", [rows, z])
+            squares[choice.scaling, c] = build.node(
+                "ReduceSumSquare", [gaps, build.constant([2], np.int64)], keepdims=0
+            )
+        _task(build, squares[choice.scaling, c], calibration, names[f"{task}_pvalues"])
+
+
+def _task(build: Builder, squares: str, calibration: Calibration, output: str) -> None:
+    """Squared distances (n, folds, rows) to the p-values of one task."""
+    classes = calibration.classes
+
+    def ints(*values: int) -> str:
+        return build.constant(values, np.int64)
+
+    # (folds, labels, rows): which rows have the label.
+    own = calibration.labels[:, None, :] == np.arange(classes)[:, None]
+    split = build.node("Unsqueeze", [squares, ints(2)])
+    apart = build.node("Where", [build.constant(own, bool), split, build.constant(np.inf)])
+    nearest = build.node("ReduceMin", [apart, ints(3)], keepdims=0)  # (n, folds, labels)
+    count = min(classes, 2)
+    two, _ = build.nodes("TopK", [nearest, ints(count)], ["", ""], axis=2, largest=0, sorted=1)
+    first = build.node("Slice", [two, ints(0), ints(1), ints(2)])
+    zero = build.constant(0.0)
+    if classes == 1:
+        ratio = build.node("Where", [build.node("LessOrEqual", [nearest, first]), zero, zero])
+    else:
+        second = build.node("Slice", [two, ints(1), ints(2), ints(2)])
+        is_first = build.node("LessOrEqual", [nearest, first])
+        other = build.node("Where", [is_first, second, first])
+        same = build.node("LessOrEqual", [nearest, zero])
+        ratio = build.node("Where", [same, zero, build.node("Div", [nearest, other])])
+    parts = [
+        _pvalues(
+            build,
+            score,
+            [[both[which] for both in look] for look in calibration.rankings],
+            calibration.maxima[which],
+            calibration.sizes,
+        )
+        for which, score in enumerate((ratio, first))
+    ]
+    build.node("Concat", parts, output, axis=2)
+
+
+def _pvalues(
+    build: Builder,
+    scores: str,
+    rankings: list[list[Ranking]],
+    maxima: NDArray[np.float64],
+    sizes: NDArray[np.int64],
+) -> str:
+    """Scores (n, folds, labels) to their p-values."""
+    last = build.constant([3], np.int64)
+    limits = build.by_look([np.stack([r.limits for r in look])[:, None] for look in rankings])
+    scale = build.by_look([np.array([[r.scale] for r in look]) for look in rankings])
+
+    def counted(flags: str) -> str:
+        numbers = build.node("Cast", [flags], to=TensorProto.DOUBLE)
+        return build.node("ReduceSum", [numbers, last], keepdims=0)
+
+    below = counted(build.node("Less", [limits, build.node("Unsqueeze", [scores, last])]))
+    one = build.constant(1.0)
+    share = build.node("Div", [scale, build.node("Add", [scale, scores])])
+    ranks = build.node("Add", [below, build.node("Sub", [one, share])])
+    wide = build.node("Unsqueeze", [ranks, last])
+    at_least = counted(build.node("LessOrEqual", [wide, build.constant(maxima[:, None])]))
+    total: Any = build.constant((1.0 + sizes)[:, None])
+    return build.node("Div", [build.node("Add", [at_least, one]), total])

@@ -1,0 +1,83 @@
+"""A recording on fake chips: what goes in at the registers comes out as frames."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from edge import skinfile
+from edge.errors import InputError
+from edge.fake.clock import PacedClock
+from edge.fake.player import Playback, fake_skin, play, skin_file
+from edge.layout import SkinLayout
+from edge.loop import Loop
+from edge.recording import Recording
+
+
+def noise(shape, n=20, top=65536):
+    frames = np.random.default_rng(sum(shape)).integers(0, top, (n, *shape)).astype(np.uint16)
+    return Recording(np.arange(n) / 100.0, frames)
+
+
+@pytest.mark.parametrize("shape", [(16, 24), (13, 6), (1, 1), (100, 90)])
+def test_a_skin_of_any_shape_gives_back_its_recording(shape):
+    """Cody's chips where the shape is Cody's, else microcontrollers; 9000 taxels take three."""
+    recording = noise(shape, top=40000)
+    skin, playback = play(skin_file(recording.layout), recording)
+    with skin:
+        frames = [frame.counts for frame in Loop(skin, lasts_s=playback.ends).frames()]
+    np.testing.assert_array_equal(frames, recording.frames)
+
+
+def test_raw_values_saturate_as_a_chip_does():
+    layout = SkinLayout(rows=16, cols=24)
+    recording = noise((16, 24))
+    skin, _ = play(skin_file(layout), recording)
+    with skin:
+        counts = skin.read().counts
+    np.testing.assert_array_equal(counts, np.minimum(recording.frames[0], 65534 - 20946))
+
+
+def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():
+    frames = np.arange(3, dtype=np.uint16).reshape(3, 1, 1)
+    recording = Recording(np.array([5.0, 5.01, 5.04]), frames)
+    once, looped = Playback(recording), Playback(recording, loop=True)
+    times = [0.0, 0.0099, 0.01, 0.039, 0.04, 0.9]
+    assert [int(once(t)[0, 0]) for t in times] == [0, 0, 1, 1, 2, 2]
+    assert once.ends == pytest.approx(0.06)
+    assert looped.ends == math.inf
+    assert [int(looped(t)[0, 0]) for t in (0.05, 0.061, 0.071)] == [2, 0, 1]
+
+
+def test_noise_is_repeatable_by_seed_and_as_large_as_asked():
+    cody = skinfile.load(skinfile.shipped("cody"))
+    quiet = np.full((16, 24), 500, dtype=np.uint16)
+
+    def counts(seed):
+        with fake_skin(cody, lambda t: quiet, noise_counts=5.0, seed=seed) as skin:
+            skin.following = False
+            return np.array([skin.read().counts for _ in range(20)], dtype=int)
+
+    first = counts(1)
+    np.testing.assert_array_equal(first, counts(1))
+    assert (first != counts(2)).any()
+    assert np.std(first) == pytest.approx(5.0, abs=0.2)
+
+
+def test_a_paced_clock_is_no_faster_than_real_time():
+    clock = PacedClock()
+    began = time.monotonic()
+    clock.sleep_until(0.05)
+    assert time.monotonic() - began >= 0.0499
+    assert clock.now() == 0.05
+
+
+def test_a_recording_of_another_shape_is_refused():
+    with pytest.raises(InputError, match="3 x 3 taxels, the skin 'cody forearm' 16 x 24"):
+        play(skinfile.load(skinfile.shipped("cody")), noise((3, 3)))
+
+
+def test_a_fake_skin_has_an_end():
+    with pytest.raises(InputError, match="at most 400000 taxels"):
+        skin_file(SkinLayout(rows=1000, cols=1000))

@@ -1,0 +1,59 @@
+"""The demo that the wheel carries, and the golden outputs of its model."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from edge import demo
+from edge.cli import main
+from edge.recording import load
+
+GOLDEN = Path(__file__).parent / "golden" / "demo.npz"
+
+
+def test_the_demo_touches_one_of_each_category_and_gets_them_right(capsys):
+    assert main(["demo"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    decided = {line["label"] for line in lines if line.get("task") == "category"}
+    assert decided == {"rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"}
+    assert all(line["label"] == line["expected"] for line in lines if line["event"] == "decision")
+
+
+@pytest.mark.parametrize("path", demo.recordings(), ids=lambda path: path.stem)
+def test_the_chips_in_between_change_no_decision(path, capsys):
+    """What the drivers read off the fake chips is what the recording holds."""
+    assert main(["replay", "--model", str(demo.MODEL), str(path)]) == 0
+    straight = decisions(capsys.readouterr().out)
+    main(["demo"])
+    assert straight == [d for d in decisions(capsys.readouterr().out) if d[0] == path.stem]
+    assert len(straight) == len(load(path).labels)
+
+
+def decisions(text):
+    lines = [json.loads(line) for line in text.splitlines()]
+    return [
+        (Path(line["source"]).stem, line["task"], line["label"], line["confidence"])
+        for line in lines
+        if line["event"] == "decision"
+    ]
+
+
+def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, capsys):
+    from dataclasses import replace
+
+    from edge.recording import save
+
+    other = load(demo.recordings()[0])
+    labels = {**other.labels, "mobility": "movable"}
+    save(tmp_path / "wrong.npz", replace(other, meta={**other.meta, "labels": labels}))
+    monkeypatch.setattr(demo, "recordings", lambda: [tmp_path / "wrong.npz"])
+    assert main(["demo"]) == 1
+    assert capsys.readouterr().err == "edge-classify: 2 of 3 decisions are right\n"
+
+
+def test_the_committed_golden_outputs_are_met(capsys):
+    assert main(["verify", "--model", str(demo.MODEL), "--golden", str(GOLDEN)]) == 0
+    checks = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert {check["name"] for check in checks} >= {"series counts", "object_neighbours"}
+    assert min(check["rows"] for check in checks) >= len(demo.recordings())

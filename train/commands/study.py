@@ -1,0 +1,49 @@
+"""`python -m train study`: the paper's analyses on a data set."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "study",
+        help="every analysis of the paper on a data set, ours beside the paper's",
+        description="Writes OUT/report.html (nothing outside it is linked), each plot as PNG and "
+        "each table as CSV.",
+    )
+    parser.add_argument(
+        "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
+    )
+    parser.add_argument(
+        "--scene",
+        help="the scene that the recordings were simulated from: adds what needs simulating anew "
+        "(speeds, stiffness, sensor effects) and the paper's numbers",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/study"), help="folder (build/study)"
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (all cores)"
+    )
+    parser.add_argument("--address", help="of a Dask scheduler that runs the sweeps instead")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Work and write."""
+    from train.study.run import study
+
+    report = study(
+        arguments.data,
+        arguments.out,
+        scene=arguments.scene,
+        jobs=arguments.jobs,
+        address=arguments.address,
+    )
+    print(report)
+    return 0

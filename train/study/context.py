@@ -1,0 +1,133 @@
+"""What every section of the study works on, and what it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from edge.features import FEATURES, SAMPLES, WINDOW_S
+from edge.recording import Recording
+from edge.track import FeatureSeries
+from train.dataset import DataSet
+from train.simulate.scene import Scene
+from train.study import skins
+from train.study.score import Labels, Result
+
+
+@dataclass
+class Table:
+    """A table of the report; it is a CSV file too."""
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[Any, ...]] = field(default_factory=list)
+
+
+@dataclass
+class Figure:
+    """A plot of the report; it is a PNG file too."""
+
+    name: str
+    title: str
+    png: bytes
+
+
+@dataclass
+class Section:
+    """A heading with text, tables and plots."""
+
+    title: str
+    text: list[str] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    figures: list[Figure] = field(default_factory=list)
+
+
+@dataclass
+class Context:
+    """A data set, its recordings, and the processes to work with.
+
+    Attributes:
+        dataset: followed for the paper's three features, up to 2 s.
+        recordings: of the dataset's trials, in their order.
+        scene: what they were simulated from, or None.
+        jobs: processes.
+        cluster: a joblib backend that is not this machine's, or None.
+        ours: {(table, setting, task): accuracy in percent}, beside the paper's numbers.
+    """
+
+    dataset: DataSet
+    recordings: list[Recording]
+    scene: Scene | None
+    jobs: int
+    cluster: str | None = None
+    ours: dict[tuple[str, str, str], float] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> Labels:
+        """{task: (n,) labels}."""
+        return {task: self.dataset.labels(task) for task in self.dataset.tasks}
+
+    @property
+    def series(self) -> list[FeatureSeries | None]:
+        """Of each trial."""
+        return [trial.series for trial in self.dataset.trials]
+
+    def vectors(
+        self, window_s: float = WINDOW_S, names: Sequence[str] = FEATURES
+    ) -> NDArray[np.float64]:
+        """The trials' feature vectors."""
+        return skins.vectors(self.series, window_s, SAMPLES, names)
+
+    def map(
+        self, what: str, function: Callable[..., Any], cases: Sequence[tuple[Any, ...]]
+    ) -> list[Any]:
+        """function(*case) of each case, in order, by all processes, with a progress bar."""
+        # A memory map would make arrays read-only files; these are small.
+        run = Parallel(
+            n_jobs=self.jobs, backend=self.cluster, return_as="generator", max_nbytes=None
+        )
+        work = (delayed(_single)(function, case) for case in cases)
+        return list(tqdm(run(work), total=len(cases), desc=f"{what:<22}", leave=True))
+
+    def follow_again(
+        self, what: str, cases: Sequence[tuple[list[Recording], dict[str, Any]]]
+    ) -> list[list[FeatureSeries | None]]:
+        """Each case's recordings followed anew; `follow`'s other arguments where they differ."""
+        data = self.dataset
+        base = {"layout": data.layout, "tracking": data.tracking, "chain": data.chain}
+        return self.map(
+            what, _follow, [(recordings, {**base, **given}) for recordings, given in cases]
+        )
+
+
+def _single(function: Callable[..., Any], case: tuple[Any, ...]) -> Any:
+    with threadpool_limits(1):
+        return function(*case)
+
+
+def _follow(recordings: list[Recording], given: dict[str, Any]) -> list[FeatureSeries | None]:
+    return skins.follow(recordings, **given)
+
+
+def percent(value: float) -> float:
+    """To two places, as the paper prints them."""
+    return round(100.0 * value, 2)
+
+
+SCORE = ("accuracy %", "from %", "to %", "k", "components")
+"""Columns of a result: with its 95 % binomial interval."""
+
+
+def score(result: Result) -> tuple[Any, ...]:
+    """The cells of `SCORE`."""
+    low, high = result.interval
+    cells = (result.k, result.components) if result.k else ("", "")
+    return (percent(result.accuracy), percent(low), percent(high), *cells)

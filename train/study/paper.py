@@ -1,0 +1,142 @@
+"""The paper's 46 accuracies, with their places (Tables I to III), and ours beside them."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from edge.summary import wilson
+from train.study.context import Context, Section, Table, percent
+
+PAPER = Path(__file__).with_name("paper.csv")
+TRIALS = 140
+FIG10_TASKS = ("category", "object")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number of the paper.
+
+    Attributes:
+        place: where it stands.
+        table: I, II or III.
+        setting: taxels, scaling or features, as the study names them.
+        task: category, mobility or object.
+        percent: leave-one-out accuracy.
+        k, components: of the best cell where the paper gives them, else "".
+    """
+
+    place: str
+    table: str
+    setting: str
+    task: str
+    percent: float
+    k: str
+    components: str
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % binomial interval of 140 trials, in percent."""
+        low, high = wilson(round(self.percent * TRIALS / 100.0), TRIALS)
+        return percent(low), percent(high)
+
+
+def entries() -> list[Entry]:
+    """All 46."""
+    with open(PAPER, encoding="utf-8", newline="") as file:
+        return [
+            Entry(**{**row, "percent": float(row["percent"])})  # type: ignore[arg-type]
+            for row in csv.DictReader(file)
+        ]
+
+
+def section(context: Context) -> Section:
+    """Each of the paper's numbers beside ours, and the rank correlations."""
+    side = Table(
+        "paper",
+        "The paper's 46 numbers and ours",
+        (
+            "place",
+            "task",
+            "paper %",
+            "interval from %",
+            "to %",
+            "ours %",
+            "difference",
+            "within",
+        ),
+    )
+    pairs: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    inside = 0
+    for entry in entries():
+        ours = context.ours.get((entry.table, entry.setting, entry.task))
+        if ours is None:
+            continue
+        low, high = entry.interval
+        hit = low <= ours <= high
+        inside += hit
+        gap = round(ours - entry.percent, 2)
+        cells = (entry.place, entry.task, entry.percent, low, high, ours, gap)
+        side.rows.append((*cells, "yes" if hit else "no"))
+        pairs.setdefault((entry.table, entry.task), []).append((entry.percent, ours))
+    ranks = Table(
+        "paper_ranks",
+        "Does ours order the settings as the paper does? Spearman's rank correlation",
+        ("table", "task", "settings", "rank correlation", "mean difference", "within interval"),
+    )
+    for (table, task), values in pairs.items():
+        theirs, ours_too = np.array(values).T
+        varies = np.ptp(ours_too) > 0 and np.ptp(theirs) > 0
+        rank = (
+            round(float(spearmanr(theirs, ours_too).statistic), 2) if varies else "none: all equal"
+        )
+        within = sum(
+            row[-1] == "yes"
+            for row in side.rows
+            if row[0].startswith(f"Table {table},") and row[1] == task
+        )
+        mean = round(float((ours_too - theirs).mean()), 2)
+        ranks.rows.append((table, task, len(values), rank, mean, f"{within} of {len(values)}"))
+    found = Section(
+        "Ours beside the paper's",
+        [
+            f"{inside} of {len(side.rows)} numbers lie within the 95 % binomial interval of the "
+            f"paper's {TRIALS} trials. The paper's accuracies and ours are of different trials of "
+            "different objects: the interval alone says what chance explains.",
+            *_disagreements(side, ranks),
+        ],
+        [side, ranks],
+    )
+    return found
+
+
+def _disagreements(side: Table, ranks: Table) -> list[str]:
+    """What the table says, in words."""
+    outside = sorted((row for row in side.rows if row[-1] == "no"), key=lambda r: -abs(r[6]))
+    if not outside:
+        return ["No number lies outside."]
+    text = [
+        "Outside, the largest first: "
+        + "; ".join(f"{r[0]} ({r[1]}) {r[6]:+.2f} points" for r in outside[:12])
+        + ("; and more in the table." if len(outside) > 12 else ".")
+    ]
+    higher = sum(row[6] > 0 for row in outside)
+    text.append(
+        f"Of the {len(outside)} outside, {higher} are higher here, "
+        f"{len(outside) - higher} lower. "
+        "Higher means that the simulation holds information which the real skin did not give "
+        "(it repeats too well, or its noise, covers and drift are too kind); lower, that it "
+        "lacks some that the real contacts had."
+    )
+    backwards = [r for r in ranks.rows if isinstance(r[3], float) and r[3] < 0]
+    if backwards:
+        text.append(
+            "Ordered against the paper: "
+            + "; ".join(f"Table {r[0]}, {r[1]} ({r[3]:+.2f})" for r in backwards)
+            + ". There the simulation cannot speak for the paper's conclusion."
+        )
+    return text

@@ -1,0 +1,128 @@
+"""Effect of taxel resolution (Table I, Fig. 9), by larger taxels and by fewer chips."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from edge.layout import SkinLayout
+from edge.recording import Recording
+from train.study import plots
+from train.study.classify import papers
+from train.study.context import SCORE, Context, Figure, Section, Table, percent, score
+from train.study.score import evaluate
+from train.study.skins import masked, pooled, pooled_layout, thinned, vectors
+
+HOW = {"sum": np.add, "maximum": np.maximum}
+SHARES = (1, 2, 4, 8)
+
+
+def layouts(layout: SkinLayout) -> list[SkinLayout]:
+    """The skin, and 2 x 2 of its taxels as one again and again, down to one taxel."""
+    found = [layout]
+    while found[-1].rows * found[-1].cols > 1:
+        found.append(pooled_layout(found[-1]))
+    # As the paper, from 6 taxels to 1 in one step.
+    return [skin for skin in found if not 1 < skin.rows * skin.cols < 4]
+
+
+def coarser(
+    recordings: list[Recording], layout: SkinLayout, how: str
+) -> list[tuple[SkinLayout, list[Recording]]]:
+    """The recordings of every skin of `layouts` but the first."""
+    wanted = {skin.shape for skin in layouts(layout)[1:]}
+    found: list[tuple[SkinLayout, list[Recording]]] = []
+    skin = layout
+    while skin.rows * skin.cols > 1:
+        skin = pooled_layout(skin)
+        recordings = [pooled(recording, skin, HOW[how]) for recording in recordings]
+        if skin.shape in wanted:
+            found.append((skin, recordings))
+    return found
+
+
+def section(context: Context) -> Section:
+    """Table I and Fig. 9."""
+    layout = context.dataset.layout
+    skins = layouts(layout)
+    taxels = [skin.rows * skin.cols for skin in skins]
+    recordings = context.recordings
+    cases = [
+        (trials, {"layout": skin})
+        for how in HOW
+        for skin, trials in coarser(recordings, layout, how)
+    ]
+    cases += [
+        ([masked(r, kept) for r in recordings], {"layout": layout})
+        for kept in (thinned(layout.shape, share) for share in SHARES[1:])
+    ]
+    series = context.follow_again("taxel resolution", cases)
+    X = [context.vectors(), *(vectors(found) for found in series)]
+    results = context.map("its accuracy", evaluate, [(x, context.labels) for x in X])
+    levels = len(skins) - 1
+    table = Table(
+        "resolution",
+        "Larger taxels",
+        ("taxels", "rows", "columns", "pooling", "task", *SCORE, "paper %", "without contact"),
+    )
+    by_how = {}
+    for i, how in enumerate(HOW):
+        part = slice(1 + i * levels, 1 + (i + 1) * levels)
+        by_how[how] = [results[0], *results[part]]
+        lost = [0, *(sum(s is None for s in found) for found in series[i * levels :][:levels])]
+        for skin, n, found, none in zip(skins, taxels, by_how[how], lost, strict=True):
+            for task, r in found.items():
+                given = papers("I", task).get(str(n), "")
+                cells = (n, skin.rows, skin.cols, how, task, *score(r), given, none)
+                table.rows.append(cells)
+                if how == "sum":
+                    context.ours["I", str(n), task] = percent(r.accuracy)
+    chips = Table(
+        "chips",
+        "The same taxels, fewer of them read",
+        ("part of the chips", "taxels read", "task", *SCORE),
+    )
+    fewer = [results[0], *results[1 + 2 * levels :]]
+    for share, found in zip(SHARES, fewer, strict=True):
+        read = int((thinned(layout.shape, share) & layout.alive).sum())
+        chips.rows += [(f"1/{share}", read, task, *score(r)) for task, r in found.items()]
+    figures = []
+    for how, found in by_how.items():
+        by_task = {task: [r[task] for r in found] for task in context.labels}
+        theirs: dict[str, list[tuple[float, float]]] = {
+            task: sorted((float(n), p) for n, p in papers("I", task).items())
+            for task in by_task
+            if papers("I", task) and context.scene
+        }
+        png = plots.lines(
+            taxels,
+            by_task,
+            label="taxels",
+            title=f"Effect of taxel resolution (Fig. 9), pooled by {how}",
+            paper=theirs,
+            logarithmic=True,
+            ticks=[str(n) for n in taxels],
+        )
+        figures.append(Figure(f"resolution_{how}", f"Resolution, {how}", png))
+    png = plots.lines(
+        SHARES,
+        {task: [r[task] for r in fewer] for task in context.labels},
+        label="one chip read in",
+        title="Reading fewer chips",
+        logarithmic=True,
+        ticks=[str(s) for s in SHARES],
+    )
+    figures.append(Figure("chips", "Fewer chips", png))
+    return Section(
+        "Effect of taxel resolution (Table I, Fig. 9)",
+        [
+            "A larger taxel carries all that presses on it, so what it reads is the sum of its "
+            "parts' forces; that is what we set beside the paper. The maximum, a taxel that feels "
+            "its most loaded part alone, is shown for comparison. The threshold in newtons stays. "
+            "With one taxel, area says only whether there is contact and motion is that of the "
+            "skin's middle, which the joint angles still give.",
+            "Fewer chips: blocks of 4 x 3 taxels are left unread, spread like a checkerboard; "
+            "this saves time on the wire, which larger taxels would too.",
+        ],
+        [table, chips],
+        figures,
+    )

@@ -1,0 +1,112 @@
+"""The whole study: one data set in, one report out."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing, nullcontext
+from pathlib import Path
+from typing import Any
+
+import joblib
+
+from edge.errors import InputError
+from edge.recording import load
+from train.dataset import load_trials
+from train.simulate import scene as scenes
+from train.study import beyond, classify, honest, paper, report, resolution, robust
+from train.study.context import Context, Section
+
+SECTIONS: tuple[Callable[[Context], Section | None], ...] = (
+    classify.confusion,
+    resolution.section,
+    classify.window,
+    classify.scaling,
+    classify.features,
+    honest.section,
+    robust.section,
+    beyond.section,
+)
+LONGEST_S = 2.0
+FEWEST = 20
+"""Trials below which a grid of 20 components makes no sense."""
+
+
+def study(
+    data: Sequence[str],
+    out: Path,
+    *,
+    scene: str | None = None,
+    jobs: int = 1,
+    address: str | None = None,
+) -> Path:
+    """Run every analysis and write the report; its path.
+
+    Args:
+        data: recordings and folders of them.
+        out: folder.
+        scene: what they were simulated from; without it, what needs simulating is left out.
+        jobs: processes on this machine.
+        address: of a Dask scheduler that runs the sweeps instead.
+
+    Raises:
+        InputError: the data set cannot be used, or there is no scheduler.
+    """
+    began = time.perf_counter()
+    if jobs < 1:
+        raise InputError(f"--jobs must be at least 1, not {jobs}")
+    source = None if scene is None else scenes.load(scene)
+    dataset = load_trials(data, horizon_s=LONGEST_S, progress=True)
+    if len(dataset.trials) < FEWEST:
+        raise InputError(
+            f"{len(dataset.trials)} trials are too few to study; give {FEWEST} or more"
+        )
+    recordings = [load(trial.path) for trial in dataset.trials]
+    context = Context(dataset, recordings, source, jobs)
+    with _cluster(address) as backend:
+        context.cluster = backend
+        sections = [found for part in SECTIONS if (found := part(context)) is not None]
+    if source is not None:
+        sections.insert(5, paper.section(context))
+    took = time.perf_counter() - began
+    layout = dataset.layout
+    lead = [
+        f"{len(dataset.trials)} trials, {layout.rows} x {layout.cols} taxels, tasks "
+        + ", ".join(f"{task} ({len(set(y))} classes)" for task, y in context.labels.items())
+        + f"; force in {layout.force_unit}s, motion in {layout.length_unit}s in the "
+        + f"{'skin' if dataset.chain is None else 'world'}'s frame. "
+        + (
+            f"Simulated: scene {source.name}, seed {source.seed}."
+            if source is not None
+            else "Recorded, or simulated elsewhere."
+        ),
+        "Accuracies are of leave-one-out cross-validation unless said otherwise, with 95 % "
+        "binomial (Wilson) intervals. Nothing was tuned to the paper's tables here.",
+    ]
+    if dataset.untouched:
+        lead.append(f"{len(dataset.untouched)} recordings without a contact are left out.")
+    title = "What a touch tells: " + (source.name if source is not None else Path(data[0]).name)
+    written = report.write(out, title, lead, sections)
+    print(f"study: {len(sections)} sections in {took:.0f} s", file=sys.stderr)
+    return written
+
+
+def _cluster(address: str | None) -> Any:
+    """A context that gives the joblib backend's name, or None for this machine."""
+    if address is None:
+        return nullcontext(None)
+    from contextlib import contextmanager
+
+    from distributed import Client
+
+    @contextmanager
+    def connected() -> Any:
+        try:
+            client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+        except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(f"no Dask scheduler at {address}: {error}") from None
+        with closing(client), joblib.parallel_config("dask"):
+            yield "dask"
+
+    return connected()
