@@ -11,7 +11,18 @@ from importlib import import_module
 from edge import __version__
 from edge.errors import EdgeError
 
-COMMANDS = ("check", "scan", "calibrate", "record", "run", "view", "replay", "verify", "demo")
+COMMANDS = (
+    "check",
+    "scan",
+    "calibrate",
+    "record",
+    "run",
+    "view",
+    "replay",
+    "verify",
+    "bench",
+    "demo",
+)
 """Modules of `edge.commands`, in the order of the help; each has `add_parser(subparsers)`,
 which sets `run`: a function of the parsed arguments that returns the exit status."""
 

@@ -46,6 +46,7 @@ class Mutant:
 
 
 PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/track.py"
+BUILD = "export/build.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/features.py", "edge/region.py"
 HARD = "tests/hard_cases/test_hard_cases.py"
 OF_PIPELINE, OF_GRAPH = "tests/train/test_pipeline.py", "tests/export/test_graph.py"
@@ -71,8 +72,8 @@ MUTANTS = (
     Mutant(
         "a column that is constant but for rounding weighs nothing",
         PIPELINE,
-        "    centred[:, still] = 0.0\n",
-        "",
+        "still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)",
+        "still = np.zeros(X.shape[1], dtype=bool)",
         (OF_PIPELINE, "without_variance or told_nothing"),
     ),
     Mutant(
@@ -140,7 +141,7 @@ MUTANTS = (
     ),
     Mutant(
         "the graph's projection: high half",
-        GRAPH,
+        BUILD,
         'half = build.node("Sub", [build.node("Add", [d, step]), step])',
         'half = build.node("Mul", [d, build.constant(0.5)])',
         (OF_GRAPH, "scaling_agrees or equals_a_training_row or all_at_once"),
@@ -159,16 +160,16 @@ MUTANTS = (
     Mutant(
         "the shortlist is checked",
         GRAPH,
-        'sure = build.node("Less", [build.node("Add", [kth, build.constant(slack)]), reach])',
+        'sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])',
         'sure = build.node("LessOrEqual", [kth, kth])',
         (OF_GRAPH, "too_narrow"),
     ),
     Mutant(
         "the check allows for float32's rounding",
         GRAPH,
-        "slack = 2.0 * u * float(lengths.max())",
-        "slack = u = 0.0",
-        (OF_GRAPH, "too_narrow or near_duplicates"),
+        "slack = [2.0 * u * float(of.max()) for of in lengths]",
+        "slack, u = [0.0 for of in lengths], 0.0",
+        (OF_GRAPH, "clusters"),
     ),
     Mutant(
         "the shortlist is measured in the order of the rows",
@@ -180,15 +181,15 @@ MUTANTS = (
     Mutant(
         "the shortlist's rows are brought to float32's size",
         GRAPH,
-        "    unit = _unit(rows)\n",
-        "    unit = 1.0\n",
+        "units = [_unit(r) for r in rows]",
+        "units = [1.0 for r in rows]",
         (OF_GRAPH, "float32_cannot_hold"),
     ),
     Mutant(
         "no shortlist of nearly all rows",
         GRAPH,
-        "len(rows) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows)",
-        "len(rows) >= SHORTLIST_ROWS",
+        "short = len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
+        "short = len(rows[0]) >= SHORTLIST_ROWS",
         (OF_GRAPH, "voters_as_rows"),
     ),
     Mutant(
@@ -215,9 +216,9 @@ MUTANTS = (
     Mutant(
         "leave-one-out: equal distances at the partition's limit",
         CROSSVAL,
-        "among = np.flatnonzero(squares <= limit)",
-        "among = np.argpartition(squares, k - 1)[:k]",
-        (OF_CROSSVAL, "earlier_row or duplicates"),
+        "among = np.flatnonzero(near)",
+        "among = np.argpartition(row, k - 1)[:k]",
+        (OF_CROSSVAL, "limit"),
     ),
     Mutant(
         "leave-one-out refuses what is not finite",
@@ -264,7 +265,7 @@ MUTANTS = (
     Mutant(
         "one frame alone begins no contact",
         TRACK,
-        "if self._run < self.settings.debounce:",
+        "if self._run < of.settings.debounce:",
         "if False:",
         (OF_TRACK, "one_frame_alone"),
     ),

@@ -1,0 +1,316 @@
+"""`edge-classify bench`: what each stage costs on this machine."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge import __version__
+from edge.commands.check import FRAMES
+from edge.errors import EdgeError, InputError
+from edge.fake.player import frame_bits
+from edge.features import feature_vector
+from edge.files import write_whole
+from edge.frame import Frame
+from edge.live import Watcher
+from edge.loop import garbage_aside
+from edge.model import Model
+from edge.region import largest_region
+from edge.skinfile import SkinFile, frame_rate, load
+from edge.track import Tracker
+
+FORMAT = 1
+RATE_HZ = 100.0
+COLD_STARTS = 5
+COLD = "import sys; from edge.live import Watcher; from edge.model import Model; \
+Watcher(Model(sys.argv[1]))"
+Timings = dict[str, float | int]
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "bench",
+        help="time each stage of a decision on this machine",
+        description="Times each stage on a touch that grows over the model's skin, and writes "
+        "medians, 99th percentiles, memory and cold start as JSON: `make tradeoff "
+        "BOARD=board.json` reckons with them.",
+    )
+    parser.add_argument("--model", required=True, help="model.onnx")
+    parser.add_argument("--out", required=True, metavar="board.json", help="the file to write")
+    parser.add_argument(
+        "--skin", metavar="skin.toml", help="count this skin's wire time from its transactions"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=2000, help="how often a stage is timed (default: 2000)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, write, and print a line a stage on stderr."""
+    if not 20 <= arguments.rounds <= 1_000_000:
+        raise InputError(f"--rounds must be 20 to 1000000, not {arguments.rounds}")
+    model = Model(arguments.model)
+    skin = None if arguments.skin is None else load(arguments.skin)
+    board = measure(model, arguments.rounds, skin)
+    with write_whole(arguments.out) as file:
+        file.write(json.dumps(board, indent=1, ensure_ascii=False).encode() + b"\n")
+    for name, stage in board["stages"].items():
+        print(
+            f"{name:<10} {stage['median_us']:>9.1f} us median {stage['p99_us']:>9.1f} us p99",
+            file=sys.stderr,
+        )
+    print(
+        f"memory     {board['memory_mb']:>9.1f} MB\ncold start {board['cold_start_ms']:>9.1f} ms "
+        f"(median of {COLD_STARTS})",
+        file=sys.stderr,
+    )
+    if board["wire"] is not None:
+        print(
+            f"wire       {board['wire']['frame_ms']:>9.3f} ms a frame, counted from the drivers' "
+            "transactions",
+            file=sys.stderr,
+        )
+    print(arguments.out)
+    return 0
+
+
+def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
+    """All that board.json holds.
+
+    Args:
+        model: to time.
+        rounds: how often each stage is timed.
+        skin: whose wire time is counted, or None.
+    """
+    with garbage_aside():
+        stages = time_stages(model, rounds)
+    return {
+        "format": FORMAT,
+        "machine": machine(),
+        "model": {
+            "sha256": hashlib.sha256(Path(model.path).read_bytes()).hexdigest(),
+            "data_digest": model.info.data_digest,
+            "bytes": os.path.getsize(model.path),
+            "rows": model.info.rows,
+            "features": list(model.info.features),
+            "samples": model.info.samples,
+            "window_s": model.info.window_s,
+            "looks_s": list(model.info.looks_s),
+            "tasks": {
+                name: {"components": task.components, "k": task.k, "scaling": task.scaling}
+                for name, task in model.info.tasks.items()
+            },
+        },
+        "rounds": rounds,
+        "stages": stages,
+        "memory_mb": round(peak_memory_mb(), 1),
+        "cold_start_ms": round(cold_start_ms(model.path), 1),
+        "wire": None if skin is None else wire(skin),
+    }
+
+
+def touch(model: Model, seconds: float) -> list[Frame]:
+    """Frames of a touch that begins at once and grows in force and area on the model's skin."""
+    layout, chain = model.info.layout, model.info.chain
+    rows = np.arange(layout.rows)[:, None] - layout.rows // 2
+    cols = np.arange(layout.cols) - layout.cols // 2
+    distance = np.hypot(rows, cols)
+    frames = []
+    for i in range(math.ceil(seconds * RATE_HZ) + 1):
+        age = i / RATE_HZ
+        force = (layout.onset + 1) * (2.0 + 3.0 * age)
+        reach = 1.0 + 2.0 * age
+        counts = np.minimum(force * np.maximum(0.0, 1.0 - distance / (reach + 1.0)), 65535)
+        joints = None if chain is None else np.full(chain.dof, 0.1 * age)
+        frames.append(
+            Frame(
+                counts=counts.astype(np.uint16),
+                valid=np.ones(layout.shape, dtype=bool),
+                t=age,
+                joints=joints,
+            )
+        )
+    return frames
+
+
+def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
+    """Median and 99th percentile of each stage in microseconds.
+
+    `region`: the largest region of a frame. `track`: that, the arm's pose, and what the features
+    call for. `features`: a contact's series to its vector. `decision`: ONNX Runtime and the
+    answers of all tasks. `frame`: all that a frame in a contact costs. `last`: all that the
+    frame costs at which a decision falls due.
+    """
+    info = model.info
+    frames = touch(model, info.window_s)
+    layout = Watcher(model).layout
+    inside = frames[1:-2]
+    settings = {"threshold": layout.threshold_counts, "valid": None, "wraps": layout.wraps}
+    tracker = Tracker(
+        layout, info.tracking, chain=info.chain, horizon_s=info.window_s, features=info.features
+    )
+    series = None
+    for frame in frames:
+        contact = tracker.push(frame)
+        series = contact.series() if contact is not None else series
+    if series is None:
+        raise EdgeError(f"{model.path}: no touch rises above its onset count; export it again")
+    vector = feature_vector(series, info.window_s, info.samples, info.features)
+    model.decide(vector)
+
+    def pushed(make: Callable[[], Any], take: Callable[[list[float]], list[float]]) -> list[float]:
+        """Times of pushing the touch into what `make` gives, over and over."""
+        seen: list[float] = []
+        while len(seen) < rounds:
+            target = make()
+            times = []
+            for frame in frames:
+                began = time.perf_counter_ns()
+                target.push(frame)
+                times.append((time.perf_counter_ns() - began) / 1e3)
+            seen += take(times)
+        return seen
+
+    def fresh() -> Tracker:
+        return Tracker(
+            layout, info.tracking, chain=info.chain, horizon_s=info.window_s, features=info.features
+        )
+
+    deciding = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
+    few = max(rounds // 10, 20)
+    last: list[float] = []
+    while len(last) < few:
+        watcher = Watcher(model)
+        for i, frame in enumerate(frames[: deciding + 1]):
+            began = time.perf_counter_ns()
+            watcher.push(frame)
+            if i == deciding:
+                last.append((time.perf_counter_ns() - began) / 1e3)
+    repeated = [frame.counts for frame in inside]
+    return {
+        "region": summary(
+            timed(
+                lambda i: largest_region(repeated[i % len(repeated)], **settings),  # type: ignore[arg-type]
+                rounds,
+            )
+        ),
+        "track": summary(pushed(fresh, lambda times: times[1:-2])),
+        "features": summary(
+            timed(
+                lambda i: feature_vector(series, info.window_s, info.samples, info.features),
+                rounds,
+            )
+        ),
+        "decision": summary(timed(lambda i: model.decide(vector), rounds)),
+        "frame": summary(pushed(lambda: Watcher(model), lambda times: times[1:-2])),
+        "last": summary(last),
+    }
+
+
+def timed(call: Callable[[int], Any], rounds: int) -> list[float]:
+    """Microseconds of each of so many calls."""
+    times = []
+    for i in range(rounds):
+        began = time.perf_counter_ns()
+        call(i)
+        times.append((time.perf_counter_ns() - began) / 1e3)
+    return times
+
+
+def summary(times: list[float]) -> Timings:
+    """Median, 99th percentile (nearest rank) and number of some times in microseconds."""
+    ordered = sorted(times)
+    rank = math.ceil(0.99 * len(ordered)) - 1
+    return {
+        "median_us": round(float(np.median(ordered)), 2),
+        "p99_us": round(ordered[rank], 2),
+        "n": len(ordered),
+    }
+
+
+def peak_memory_mb() -> float:
+    """Largest resident size of this process so far, megabytes."""
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1 << 20 if sys.platform == "darwin" else 1 << 10)
+
+
+def cold_start_ms(path: str) -> float:
+    """Median milliseconds from starting Python to a watcher that is ready."""
+    times = []
+    for _ in range(COLD_STARTS):
+        began = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, "-c", COLD, path], capture_output=True, text=True, check=False
+        )
+        times.append((time.perf_counter() - began) * 1e3)
+        if done.returncode != 0:
+            raise EdgeError(f"{path}: a fresh Python cannot load it: {done.stderr.strip()[-200:]}")
+    return float(np.median(times))
+
+
+def machine() -> dict[str, Any]:
+    """What this machine is."""
+    return {
+        "name": platform.node(),
+        "kind": kind(),
+        "architecture": platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "versions": {
+            "edge-classify": __version__,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "onnxruntime": _onnxruntime_version(),
+        },
+    }
+
+
+def kind() -> str:
+    """The board's model, else the processor's name."""
+    try:
+        text = Path("/proc/device-tree/model").read_text(encoding="utf-8", errors="replace")
+        return text.strip("\x00 \n")
+    except OSError:
+        pass
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"
+
+
+def _onnxruntime_version() -> str:
+    from importlib.metadata import version
+
+    return version("onnxruntime")
+
+
+def wire(skin: SkinFile) -> dict[str, Any]:
+    """Wire time of a frame, counted from the drivers' own transactions over a counting bus."""
+    bits: NDArray[np.float64] = np.array(frame_bits(skin, FRAMES)) / FRAMES
+    rate = frame_rate(bits.tolist(), [bus.clock_hz for bus in skin.buses])
+    return {
+        "skin": skin.name,
+        "bits": bits.tolist(),
+        "clock_hz": [bus.clock_hz for bus in skin.buses],
+        "frame_ms": round(1e3 / rate, 4),
+        "frame_rate_hz": round(rate, 2),
+    }

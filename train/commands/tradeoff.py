@@ -1,0 +1,54 @@
+"""`python -m train tradeoff`: what accuracy costs in time."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "tradeoff",
+        help="what accuracy costs in time: waiting, the wire, arithmetic",
+        description="Writes OUT/report.html (nothing outside it is linked), each plot as PNG, "
+        "each table as CSV, and front.json, which `python -m export --front` reads.",
+    )
+    parser.add_argument(
+        "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
+    )
+    parser.add_argument(
+        "--board",
+        required=True,
+        metavar="board.json",
+        help="of `edge-classify bench` with a model that was fitted on these recordings",
+    )
+    parser.add_argument("--scene", help="what they were simulated from: draws the physical floor")
+    parser.add_argument(
+        "--task", help="of the picture and of front.json (category, else the first)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/tradeoff"), help="folder (build/tradeoff)"
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (all cores)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Work and write."""
+    from train.tradeoff.run import tradeoff
+
+    report = tradeoff(
+        arguments.data,
+        arguments.out,
+        arguments.board,
+        scene_path=arguments.scene,
+        jobs=arguments.jobs,
+        main=arguments.task,
+    )
+    print(report)
+    return 0

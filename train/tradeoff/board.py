@@ -1,0 +1,84 @@
+"""board.json of `edge-classify bench`: what arithmetic costs on a machine."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+
+from edge.errors import InputError
+
+STAGES = ("track", "features", "decision")
+
+
+@dataclass(frozen=True)
+class Board:
+    """A machine's figures for one model.
+
+    Attributes:
+        name: the machine.
+        digest: SHA-256 over the recordings that the model was fitted on.
+        stages_s: {stage: median seconds}.
+        features: how many the model measures.
+        model: SHA-256 of the model file.
+    """
+
+    name: str
+    digest: str
+    stages_s: dict[str, float]
+    features: int
+    model: str
+
+    def arithmetic_s(self, features: int) -> float:
+        """Seconds from the window's last frame to the decision.
+
+        The decision itself is the benched model's, of all its tasks: fewer components or
+        neighbours move it by microseconds.
+        """
+        share = features / self.features
+        return (
+            self.stages_s["track"] + self.stages_s["features"] * share + self.stages_s["decision"]
+        )
+
+
+def read(path: str | os.PathLike[str]) -> Board:
+    """Read a board file.
+
+    Raises:
+        InputError: it is missing, or is none; the sentence names it.
+    """
+    name = os.fspath(path)
+    try:
+        with open(name, "rb") as file:
+            text = file.read(1 << 20)
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    try:
+        found = json.loads(text)
+        board = Board(
+            name=f"{found['machine']['kind']} ({found['machine']['name']})",
+            digest=str(found["model"]["data_digest"]),
+            stages_s={stage: float(found["stages"][stage]["median_us"]) / 1e6 for stage in STAGES},
+            features=len(found["model"]["features"]),
+            model=str(found["model"]["sha256"]),
+        )
+        if board.features < 1 or not all(0.0 < s < 1e3 for s in board.stages_s.values()):
+            raise ValueError("a stage takes no time")
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{name}: not a board file; make one with `edge-classify bench --out {name}`"
+        ) from None
+    return board
+
+
+def check(board: Board, path: str, digest: str) -> None:
+    """Refuse a board file that was made with a model of other recordings.
+
+    Raises:
+        InputError: the sentence names `path`.
+    """
+    if board.digest != digest:
+        raise InputError(
+            f"{path}: was made with a model of other recordings (digest {board.digest[:12]}, "
+            f"these have {digest[:12]}); bench the model that was exported from these"
+        )

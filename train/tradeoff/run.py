@@ -1,0 +1,329 @@
+"""The whole of it: recordings and a board's figures in; picture, tables and ready settings out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from edge.errors import InputError
+from edge.features import FEATURES, SAMPLES, feature_vector
+from edge.files import write_whole
+from edge.layout import SkinLayout
+from edge.recording import load
+from edge.track import FeatureSeries
+from train.crossval import choose
+from train.dataset import DataSet, load_trials
+from train.pipeline import Choice
+from train.simulate import scene as scenes
+from train.study import skins
+from train.study.context import Figure, Section, Table
+from train.study.report import write
+from train.tradeoff import board as boards
+from train.tradeoff import early, plots
+from train.tradeoff.accuracy import Point, front, nested, thinned
+from train.tradeoff.wires import Wire, wires
+
+WINDOWS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.2)
+LOOKS = tuple(round(0.1 * i, 1) for i in range(2, 13))
+FEWER = (("max_force",), ("max_force", "contact_area"))
+PAPER = ("none", 1.2)
+"""The paper's operating point: no scaling, 1.2 s, its three features, all taxels (IV-A)."""
+FEWEST = 40
+Case = tuple[str, int, tuple[str, ...], str, float, int]
+"""Skin's name, taxels, features, scaling, window, every so-manieth frame."""
+
+
+def tradeoff(
+    data: Sequence[str],
+    out: Path,
+    board_path: str,
+    *,
+    scene_path: str | None = None,
+    jobs: int = 1,
+    main: str | None = None,
+) -> Path:
+    """Measure every setting worth showing and write the report; its path.
+
+    Args:
+        data: recordings and folders of them.
+        out: folder.
+        board_path: board.json of a model that was fitted on these recordings.
+        scene_path: what they were simulated from, for the physical floor.
+        jobs: processes.
+        main: the task of the picture and of front.json; `category` where there is one.
+
+    Raises:
+        InputError: the data cannot be used, or the board file is none or another model's.
+    """
+    board = boards.read(board_path)
+    scene = None if scene_path is None else scenes.load(scene_path)
+    dataset = load_trials(data, horizon_s=WINDOWS[-1], progress=True)
+    boards.check(board, board_path, dataset.digest)
+    if len(dataset.trials) < FEWEST:
+        raise InputError(f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}")
+    if main is None:
+        main = "category" if "category" in dataset.tasks else dataset.tasks[0]
+    if main not in dataset.tasks:
+        raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
+    points = measured(dataset, board, jobs)
+    best = {task: front([p for p in points if p.task == task]) for task in dataset.tasks}
+    both = {task: _early(dataset, task, jobs) for task in dataset.tasks}
+    floors = {} if scene is None else early.floors(scene)
+    sections = [
+        _deals(points, best, main, board),
+        _stopping(both, floors, main),
+    ]
+    lead = [
+        f"{len(dataset.trials)} trials, {len(points)} points. Time runs from onset to "
+        "decision: waiting for the window, the wire, arithmetic. Accuracies are nested: the "
+        "trial told took no part in scaling, components, neighbours, or the choice of their "
+        "numbers; intervals are Wilson's, 95 %.",
+        f"Arithmetic is that of {board.name}, measured by edge-classify bench with the model "
+        f"{board.model[:12]}. Wire times are counted from the drivers' own transactions over a "
+        "counting bus.",
+    ]
+    report = write(out, "What accuracy costs in time", lead, sections)
+    with write_whole(out / "front.json") as file:
+        file.write(json.dumps(fronts(best, main, board.name), indent=1).encode() + b"\n")
+    return report
+
+
+def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[Point]:
+    """Every setting worth showing, of every task."""
+    recordings = [load(trial.path) for trial in dataset.trials]
+    rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in recordings]))
+    layout = dataset.layout
+    series: dict[str, list[FeatureSeries | None]] = {"": [t.series for t in dataset.trials]}
+    layouts: dict[str, SkinLayout] = {"": layout}
+    name = ""
+    while layouts[name].rows * layouts[name].cols > 1:
+        coarse = skins.pooled_layout(layouts[name])
+        recordings = [skins.pooled(r, coarse, np.add) for r in recordings]
+        name = f"{coarse.rows} x {coarse.cols}"
+        layouts[name] = coarse
+        series[name] = skins.follow(
+            recordings, coarse, dataset.tracking, dataset.chain, FEATURES, WINDOWS[-1]
+        )
+    wired = {name: wires(each) for name, each in layouts.items()}
+    cases: list[Case] = []
+    for name, each in layouts.items():
+        taxels = each.rows * each.cols
+        sets: list[tuple[tuple[str, ...], str]] = [(FEATURES, "IV")]
+        if not name:
+            sets += [(FEATURES, "none"), *((few, "IV") for few in FEWER)]
+        for every in sorted({wire.every(rate) for wire in wired[name]}):
+            for features, scaling in sets if every == 1 else sets[:1]:
+                cases += [(name, taxels, features, scaling, w, every) for w in WINDOWS]
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    work = (delayed(nested)(_vectors(series[case[0]], case), y, case[3], case[2]) for case in cases)
+    results = Parallel(n_jobs=jobs, return_as="generator")(work)
+    points: list[Point] = []
+    for case, found in zip(cases, tqdm(results, total=len(cases), desc="settings"), strict=True):
+        name, taxels, features, scaling, window, every = case
+        for wire in wired[name]:
+            if wire.every(rate) != every:
+                continue
+            for task, result in found.items():
+                points.append(
+                    Point(
+                        task=task,
+                        taxels=taxels,
+                        wire=wire.name,
+                        features=features,
+                        scaling=scaling,
+                        components=result.components,
+                        k=result.k,
+                        window_s=window,
+                        wire_s=_wire_s(wire, rate),
+                        arithmetic_s=board.arithmetic_s(len(features)),
+                        result=result,
+                        whole=not name,
+                    )
+                )
+    return points
+
+
+def _wire_s(wire: Wire, rate_hz: float) -> float:
+    """On average half a period passes until the next frame, which then takes its time."""
+    return 0.5 * wire.every(rate_hz) / rate_hz + wire.frame_s
+
+
+def _vectors(series: Sequence[FeatureSeries | None], case: Case) -> NDArray[np.float64]:
+    _, _, features, _, window, every = case
+    X = np.zeros((len(series), len(features) * SAMPLES))
+    for row, one in zip(X, series, strict=True):
+        if one is not None:
+            row[:] = feature_vector(thinned(one, every), window, SAMPLES, features)
+    return X
+
+
+def _early(dataset: DataSet, task: str, jobs: int) -> early.Beside:
+    X = np.stack([dataset.features(window) for window in LOOKS])
+    labels = dataset.labels(task)
+    chosen = choose(X[-1], {task: labels}, scalings=["IV"], jobs=jobs)[task].choice
+    choice = Choice(chosen.scaling, chosen.components, chosen.k)
+    return early.beside(X, labels, choice, LOOKS, FEATURES)
+
+
+def _deals(
+    points: Sequence[Point], best: dict[str, list[Point]], main: str, board: boards.Board
+) -> Section:
+    arithmetic = max(p.arithmetic_s / p.seconds for p in points)
+    wire = max(p.wire_s / p.seconds for p in points)
+    picture = plots.deals([p for p in points if p.task == main], best[main], main, paper_point)
+    columns = (
+        "task", "taxels", "wire", "features", "scaling", "components", "k",
+        "window ms", "wire ms", "arithmetic ms", "time ms",
+        "accuracy %", "low %", "high %", "front", "paper's point",
+    )  # fmt: skip
+    every = Table("points", "Every point", columns, [])
+    few = Table("front", "The best deals: no other is faster and as accurate", columns, [])
+    for point in sorted(points, key=lambda p: (p.task != main, p.task, p.seconds)):
+        low, high = point.result.interval
+        row = (
+            point.task,
+            point.taxels,
+            point.wire,
+            " ".join(point.features),
+            point.scaling,
+            point.components,
+            point.k,
+            round(1e3 * point.window_s, 1),
+            round(1e3 * point.wire_s, 2),
+            round(1e3 * point.arithmetic_s, 3),
+            round(1e3 * point.seconds, 1),
+            round(100 * point.result.accuracy, 2),
+            round(100 * low, 1),
+            round(100 * high, 1),
+            "yes" if point in best[point.task] else "",
+            "yes" if paper_point(point) else "",
+        )
+        every.rows.append(row)
+        if row[-1] or row[-2]:
+            few.rows.append(row)
+    return Section(
+        "Every setting, and the best deals",
+        [
+            "A pooled skin's larger taxels carry the sum of their parts' forces; a wire that "
+            "carries fewer frames a second than were recorded gets every second, third, ... of "
+            "them, and its accuracy is that of those frames.",
+            f"Arithmetic on {board.name} takes at most {100 * arithmetic:.2g} % of a point's time, "
+            f"the wire at most {100 * wire:.2g} %: what is paid for accuracy is waiting.",
+        ],
+        [few, every],
+        [Figure("tradeoff", f"Accuracy against time to decision: {main}", picture)],
+    )
+
+
+def paper_point(point: Point) -> bool:
+    """The paper's setting, on the wire that carries its 100 frames a second."""
+    return (
+        point.whole
+        and (point.scaling, point.window_s) == PAPER
+        and point.features == FEATURES
+        and point.wire.startswith("AD7147, 3")
+    )
+
+
+def _stopping(both: dict[str, early.Beside], floors: dict[str, float], main: str) -> Section:
+    table = Table(
+        "early",
+        "As soon as it is sure",
+        (
+            "task",
+            "asked error %",
+            "true label lost %",
+            "sure and wrong %",
+            "wrong %",
+            "unsure %",
+            "unknown %",
+            "mean time ms",
+            "as accurate fixed window ms",
+            "time saved %",
+        ),
+    )
+    fixed = Table("fixed", "Fixed windows on the same trials", ("task", "window ms", "wrong %"))
+    text = []
+    for task, found in both.items():
+        gains = []
+        for one in found.early:
+            window, gain = early.fixed_time(found, one.wrong), early.saved(found, one)
+            if gain is not None:
+                gains.append((gain, one))
+            table.rows.append(
+                (
+                    task,
+                    round(100 * one.asked, 1),
+                    *(
+                        round(100 * share, 1)
+                        for share in (
+                            one.struck,
+                            one.sure_wrong,
+                            one.wrong,
+                            one.unsure,
+                            one.unknown,
+                        )
+                    ),
+                    round(1e3 * one.mean_s),
+                    "" if window is None else round(1e3 * window),
+                    "" if gain is None else round(100 * gain, 1),
+                )
+            )
+        fixed.rows += [
+            (task, round(1e3 * s), round(100 * wrong, 1))
+            for s, wrong in zip(found.looks_s, found.fixed.tolist(), strict=True)
+        ]
+        if gains:
+            gain, one = max(gains, key=lambda pair: pair[0])
+            text.append(
+                f"{task}: at best {100 * gain:.0f} % of the time is saved at equal accuracy, at an "
+                f"asked error of {100 * one.asked:g} %: {1e3 * one.mean_s:.0f} ms on average with "
+                f"{100 * one.wrong:.1f} % wrong."
+            )
+        else:
+            text.append(f"{task}: no asked error reached a fixed window's accuracy.")
+    if floors:
+        slow = sorted(floors.items(), key=lambda item: item[1])
+        text.append(
+            "The floor, mu_s m g / (k v), before which an object that can move does not: "
+            + ", ".join(f"{name} {1e3 * s:.0f} ms" for name, s in slow)
+            + "."
+        )
+    figures = [
+        Figure(
+            f"early_{task}",
+            f"Mean time to decision against error: {task}",
+            plots.stopping(found, floors, task),
+        )
+        for task, found in sorted(both.items(), key=lambda item: item[0] != main)
+    ]
+    return Section("As soon as it is sure", text, [table, fixed], figures)
+
+
+def fronts(best: dict[str, list[Point]], main: str, board: str) -> dict[str, Any]:
+    """front.json: the front's points that a model of these recordings can be exported for."""
+    return {
+        "format": 1,
+        "task": main,
+        "board": board,
+        "points": [
+            {
+                "window_s": point.window_s,
+                "features": list(point.features),
+                "scaling": point.scaling,
+                "components": point.components,
+                "k": point.k,
+                "wire": point.wire,
+                "milliseconds": round(1e3 * point.seconds, 2),
+                "accuracy": round(point.result.accuracy, 4),
+            }
+            for point in front([p for p in best[main] if p.whole])
+        ],
+    }

@@ -1,0 +1,88 @@
+"""Ways to wire a skin, and what a frame costs on each, counted from the drivers' transactions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from edge import skinfile
+from edge.chips import ad7147
+from edge.fake.player import frame_bits
+from edge.layout import SkinLayout
+from edge.skinfile import UNUSED, BusSpec, ChipSpec, SkinFile, frame_rate
+
+FRAMES = 100
+"""Counted together, so that what is sent only now and then counts by its share."""
+STAGES = 12
+CHANNELS, CHIPS = 8, 4
+MUX = 0x70
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A wiring.
+
+    Attributes:
+        name: what it is.
+        bits: of a frame on all buses together.
+        frame_s: seconds that a frame takes on the slowest bus.
+    """
+
+    name: str
+    bits: float
+    frame_s: float
+
+    def every(self, rate_hz: float) -> int:
+        """Each so-manieth of frames that come at a rate is what this wire can carry."""
+        return max(1, math.ceil(self.frame_s * rate_hz - 1e-9))
+
+
+def count(name: str, file: SkinFile) -> Wire:
+    """The wire of a skin file."""
+    bits = [total / FRAMES for total in frame_bits(file, FRAMES)]
+    rate = frame_rate(bits, [bus.clock_hz for bus in file.buses])
+    return Wire(name, sum(bits), 1.0 / rate)
+
+
+def spread(layout: SkinLayout, buses: int, clock_hz: int = 400_000) -> SkinFile:
+    """A skin on AD7147 chips, dealt out over so many buses with a TCA9548A each."""
+    taxels = layout.rows * layout.cols
+    groups = [tuple(range(a, min(a + STAGES, taxels))) for a in range(0, taxels, STAGES)]
+    specs = []
+    for bus in range(buses):
+        chips = []
+        for i, group in enumerate(groups[bus::buses]):
+            group += (UNUSED,) * (STAGES - len(group))
+            channel, chip = divmod(i, CHIPS)
+            if channel >= CHANNELS:
+                raise ValueError(f"{taxels} taxels need more than {buses} buses")
+            chips.append(
+                ChipSpec("ad7147", ad7147.ADDRESSES[chip], group, mux=MUX, channel=channel)
+            )
+        specs.append(BusSpec(f"fake-{bus}", tuple(chips), clock_hz=clock_hz))
+    return SkinFile("spread", layout, tuple(specs))
+
+
+def wires(layout: SkinLayout) -> list[Wire]:
+    """The wirings worth showing for a skin, the fastest chips last.
+
+    AD7147 on one bus to three, where more than one has something to carry; MPR121 as shipped
+    where the skin is Cody's; a microcontroller that serves 16-bit frames at 1 MHz.
+    """
+    taxels = layout.rows * layout.cols
+    chips = -(-taxels // STAGES)
+    found = []
+    for buses in (1, 2, 3):
+        if buses <= chips and chips <= buses * CHANNELS * CHIPS:
+            name = f"AD7147, {buses} bus{'es' if buses > 1 else ''} at 400 kHz"
+            found.append(count(name, spread(layout, buses)))
+    shipped = skinfile.load(skinfile.shipped("mpr121"))
+    if shipped.layout.shape == layout.shape:
+        clock = shipped.buses[0].clock_hz // 1000
+        many = len(shipped.buses)
+        name = f"MPR121, {many} bus{'es' if many > 1 else ''} at {clock} kHz"
+        found.append(count(name, replace(shipped, layout=layout)))
+    block = ChipSpec("block", 0x08, tuple(range(taxels)))
+    served = SkinFile("block", layout, (BusSpec("fake", (block,), clock_hz=1_000_000),))
+    found.append(count("microcontroller, 1 bus at 1 MHz", served))
+    return found
