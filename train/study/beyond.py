@@ -37,7 +37,7 @@ FEW = 20
 STEPS = 6
 SCALING = "IV"
 TREES = 300
-TIMED = 6
+TIMED = 2
 """Recordings whose frames are timed."""
 
 
@@ -312,7 +312,7 @@ def _rivals(context: Context, task: str) -> list[tuple[Any, ...]]:
     head = ("all taxels, PCA(50), 1-NN", "none", X.shape[1], "leave-one-out")
     rows.append((*head, *score(Result(right, len(y), 50, 1)), ""))
     folds = shuffled_folds(y, FOLDS)
-    coarse = X.reshape(len(X), SAMPLES, -1)[:, ::4].reshape(len(X), -1)
+    coarse = X.reshape(len(X), SAMPLES, -1)[:, ::8].reshape(len(X), -1)
     told = context.map("extra trees", _trees, [(coarse, y, fold) for fold in folds])
     said = np.empty_like(y)
     for fold, (labels, _) in zip(folds, told, strict=True):

@@ -105,9 +105,10 @@ def test_folds_cover_every_trial_once_and_spread_the_classes():
 def test_a_transfer_is_tested_on_the_other_set_alone():
     X, y = overlapping(30, spread=0.2)
     other, labels = overlapping(9, seed=5, spread=0.2)
-    assert transfer(X, {"t": y}, other, {"t": labels}, "none", ONE)["t"].total == 9
-    wrong = transfer(X, {"t": y}, other, {"t": np.roll(labels, 1)}, "none", ONE)["t"]
-    right = transfer(X, {"t": y}, other, {"t": labels}, "none", ONE)["t"]
+    trained = X, {"t": y}, evaluate(X, {"t": y}, "none", ONE)
+    wrong = transfer(*trained, other, {"t": np.roll(labels, 1)}, "none", ONE)["t"]
+    right = transfer(*trained, other, {"t": labels}, "none", ONE)["t"]
+    assert right.total == 9
     assert right.accuracy > 0.8 > 0.2 > wrong.accuracy
 
 
