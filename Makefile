@@ -3,9 +3,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
+# Matrices this small only lose by several threads, which also fight with the processes beside.
+export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help venv test lint types export demo demo-data study golden wheel wheel-test board-test \
-  hard-cases tradeoff bench faults soak clean
+.PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
+  board-test hard-cases hard-cases-versions mutants bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types, tests"
@@ -21,6 +23,9 @@ help:
 	@echo "              then make export FRONT=fast|balanced|accurate|milliseconds|accuracy"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
+	@echo "make hard-cases   what each hard case costs us and the usual stack, as a table"
+	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
+	@echo "make mutants  each guard taken out in turn: does a test notice?"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
@@ -91,6 +96,11 @@ $(BENCHVENV): $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .[bench]
 	@touch $@
 
+bench: $(BENCHVENV)
+	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
+	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
+	  --benchmark-columns=median,iqr,rounds
+
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
 STUDIED := --scene $(SCENE)
@@ -111,13 +121,58 @@ endif
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
 	  --out $(OUT)/tradeoff $(TRADEOFF)
 
-bench: $(BENCHVENV)
-	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
-	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
-	  --benchmark-columns=median,iqr,rounds
+faults: $(READY)
+	$(BIN)/python -m bench.faults
 
-.PHONY: help venv test lint types export demo demo-data wheel wheel-test board-test bench faults \
-  soak clean
+soak: $(READY)
+	$(BIN)/python -m bench.soak
+
+# Stale copies of modules would go into the wheel.
+wheel: $(READY)
+	rm -rf build/lib build/bdist.* dist
+	PIP_CONSTRAINT=$(CURDIR)/constraints.txt SOURCE_DATE_EPOCH=1577836800 \
+	  $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w dist .
+
+wheel-test: wheel
+	$(BIN)/python -m pytest board/test_wheel.py
+
+board-test: wheel
+	$(BIN)/python -m pytest board/test_aarch64.py -rs --capture=tee-sys
+
+DEMODATA := $(OUT)/demo-data
+
+demo-data: $(READY)
+	rm -rf $(DEMODATA)
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
+	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
+	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA)
+	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
+
+HARD := $(OUT)/hard-cases
+
+hard-cases: $(READY)
+	$(BIN)/python -m tests.hard_cases --out $(HARD)
+
+# Golden files of hard cases, then asked again with another ONNX Runtime.
+OTHER_RUNTIME ?= 1.22.1
+OTHER := $(HARD)/onnxruntime-$(OTHER_RUNTIME)
+
+$(OTHER)/.ready: constraints.txt
+	$(PYTHON) -m venv $(OTHER)
+	$(OTHER)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  $$(grep -E '^(numpy|smbus2)==' constraints.txt) onnxruntime==$(OTHER_RUNTIME)
+	@touch $@
+
+hard-cases-versions: $(READY) $(OTHER)/.ready
+	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
+	for golden in $(HARD)/golden/*; do \
+	  $(OTHER)/bin/python -m edge.cli verify --model $$golden/model.onnx \
+	    --golden $$golden/golden.npz > $$golden/checks.jsonl || exit 1; \
+	done
+	$(OTHER)/bin/python -c "import onnxruntime as r; print('the same from', r.__version__)"
+
+mutants: $(READY)
+	$(BIN)/python -m tests.hard_cases.mutants
 
 clean:
 	rm -rf build dist

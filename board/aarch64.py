@@ -63,7 +63,7 @@ WRAPPER = """\
 exec '{loader}' --library-path '{libraries}' '{emulator}' \\
   ${{QEMU_COUNT:+-plugin "{folder}/count.so,out=$QEMU_COUNT"}} \\
   -cpu {cpu} -0 '{folder}/python' -L '{folder}/root' \\
-  -E PYTHONPATH='{folder}/wheel:{folder}/site' -E PYTHONNOUSERSITE=1 \\
+  -E PYTHONPATH="{folder}/wheel:{folder}/site${{PYTHONPATH:+:$PYTHONPATH}}" -E PYTHONNOUSERSITE=1 \\
   -E PYTHONDONTWRITEBYTECODE=1 '{python}' "$@"
 """
 

@@ -95,7 +95,11 @@ class Joints:
             if pose[0] <= theirs:
                 if after is not None and after[0] - pose[0] <= 2.0 * self._oldest:
                     part = (theirs - pose[0]) / (after[0] - pose[0])
-                    return pose[1] + part * (after[1] - pose[1])
+                    # A sender may wrap its angles at +-pi: no joint turns half round between two
+                    # lines, so it went the shorter way.
+                    turned = after[1] - pose[1]
+                    turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
+                    return pose[1] + part * turned
                 if theirs - pose[0] <= self._oldest:
                     return pose[1]
                 break

@@ -49,6 +49,9 @@ class MapFile:
             InputError: it cannot be written, or is not a map.
         """
         self._path = os.fspath(path)
+        self._tasks = len(info.tasks)
+        # Tasks may be decided at different times (see `Watcher`): a contact's line is its last's.
+        self._open: dict[int, dict[str, Any]] = {}
         before = Path(self._path)
         cut_short = False
         if before.is_file() and before.stat().st_size:
@@ -72,14 +75,15 @@ class MapFile:
     def write(self, events: Iterable[dict[str, Any]]) -> None:
         """Take the decisions out of a frame's events; those without a place are left out.
 
+        A contact is written once all tasks are decided, at the place where the first was.
+
         Raises:
             InputError: the file cannot be written any more.
         """
-        touches: dict[int, dict[str, Any]] = {}
         for event in events:
             if event["event"] != "decision" or event["place"] is None:
                 continue
-            touch = touches.setdefault(
+            touch = self._open.setdefault(
                 event["contact"],
                 {
                     "event": "touch",
@@ -94,8 +98,8 @@ class MapFile:
             touch["labels"][event["task"]] = event["label"]
             touch["confidence"][event["task"]] = event["confidence"]
             touch["flags"] += [flag for flag in event["flags"] if flag not in touch["flags"]]
-        for touch in touches.values():
-            self._append(touch)
+            if len(touch["labels"]) == self._tasks:
+                self._append(self._open.pop(event["contact"]))
 
     def _append(self, line: dict[str, Any]) -> None:
         try:

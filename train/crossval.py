@@ -33,8 +33,12 @@ def split_neighbours(
     max_components: int,
     max_k: int,
     features: Sequence[str] = FEATURES,
+    first: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Neighbours of some trials among others, for each number of components.
+
+    A product's rounding hangs on a row's place in the matrix, so equal trials are given the
+    coordinates of the first of them: they are then equally far, and at 0 from each other.
 
     Args:
         X: (n, features * samples).
@@ -44,6 +48,7 @@ def split_neighbours(
         max_components: components tried, from 1.
         max_k: neighbours wanted, at most m.
         features: names of the feature types, in the order of X.
+        first: (n,) `first_equal(X)`, where it is at hand.
 
     Returns:
         (t, max_components, max_k) rows of X, nearest first, equal distances in the order of the
@@ -53,10 +58,10 @@ def split_neighbours(
     _, gain = scale_of(known, scaling, features)
     columns = np.repeat(gain, X.shape[1] // len(features))
     mean = known.mean(axis=0)
-    scaled = (known - mean) * columns
-    axes = leading_axes(scaled, max_components)
-    places = scaled @ axes.T
-    queries = ((X[test] - mean) * columns) @ axes.T
+    scaled = (X - mean) * columns
+    axes = leading_axes(scaled[train], max_components)
+    z = (scaled @ axes.T)[first_equal(X) if first is None else first]
+    places, queries = z[train], z[test]
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
     used = len(axes)
     for near, query in zip(rows, queries, strict=True):
@@ -65,6 +70,13 @@ def split_neighbours(
         near[:used] = train[order]
         near[used:] = train[order[-1]] if used else train[:max_k]
     return rows
+
+
+def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) for each row of X the first row that is equal to it."""
+    seen: dict[bytes, int] = {}
+    whole = np.ascontiguousarray(X, dtype=np.float64) + 0.0  # -0 becomes 0
+    return np.array([seen.setdefault(row.tobytes(), i) for i, row in enumerate(whole)])
 
 
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
@@ -87,10 +99,11 @@ def fold_neighbours(
     max_components: int,
     max_k: int,
     features: Sequence[str] = FEATURES,
+    first: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """(max_components, max_k) `split_neighbours` of one trial among all others."""
     train = np.delete(np.arange(len(X)), test)
-    form = scaling, max_components, max_k, features
+    form = scaling, max_components, max_k, features, first
     found: NDArray[np.int64] = split_neighbours(X, train, np.array([test]), *form)[0]
     return found
 
@@ -161,10 +174,11 @@ def _chunk(
     k: int,
     features: Sequence[str],
 ) -> NDArray[np.int64]:
+    first = first_equal(X)
     # Matrices this small only lose by several threads; processes share the work instead.
     with threadpool_limits(1):
         return np.stack(
-            [fold_neighbours(X, int(i), scaling, components, k, features) for i in tests]
+            [fold_neighbours(X, int(i), scaling, components, k, features, first) for i in tests]
         )
 
 

@@ -51,6 +51,15 @@ def test_the_senders_clock_need_not_be_ours(wire, ahead):
     assert wire.at(0.087) == pytest.approx([0.085, -0.085], abs=1e-6)
 
 
+def test_an_angle_that_wraps_between_two_lines_goes_the_shorter_way(wire):
+    wire.send(5.0, [3.1, -3.0])
+    wire.send(5.01, [-3.1, 3.0])
+    wire.joints.at(0.0)
+    first, second = wire.at(-0.005)
+    assert first == pytest.approx(np.pi)
+    assert second == pytest.approx(-np.pi)
+
+
 def test_a_pose_between_two_lines_is_interpolated(wire):
     stream(wire)
     assert wire.at(0.0645) == pytest.approx([0.0625, -0.0625])

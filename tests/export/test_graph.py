@@ -152,6 +152,19 @@ def test_a_shortlist_that_may_be_too_narrow_measures_every_row(export):
     agree(fitted, model, X[::100] * (1 + 1e-10))
 
 
+def test_clusters_a_little_larger_than_the_shortlist(export):
+    """Float32 cannot order 40 near-duplicates, and the 30 it picks may lack the nearest: its
+    own rounding must be allowed for in the check."""
+    rng = np.random.default_rng(1)
+    X = np.repeat(features(35), 40, axis=0)
+    X *= 1 + 1e-5 * rng.normal(size=X.shape)
+    fitted, model = export(X, {"t": Choice("none", 5, 6)})
+    queries = X[::20] * (1 + 1e-6 * rng.normal(size=(70, 120)))
+    _, rows = fitted.neighbours("t", queries)
+    alone = [model.run(queries[i : i + 1])["t_neighbours"][0] for i in range(70)]
+    assert (np.array(alone) == rows).all()
+
+
 def test_without_its_check_the_shortlist_would_be_wrong(export, monkeypatch):
     """The guard is needed: taken away, near-duplicates get wrong neighbours."""
     base = features(8)

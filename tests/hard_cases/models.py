@@ -100,9 +100,8 @@ class Ours:
         """The graph's answers to queries one by one, as the board asks."""
         parts = [self.model.run(queries[i : i + 1]) for i in range(len(queries))]
         return {
-            name.removeprefix("t_"): np.concatenate([p[name] for p in parts])
-            for p in parts[:1]
-            for name in p
+            name.removeprefix("t_"): np.concatenate([part[name] for part in parts])
+            for name in parts[0]
         }
 
     def judged(self, queries: Array) -> tuple[int, float]:

@@ -1,4 +1,4 @@
-"""`python -m train show`: a recording as a picture."""
+"""`python -m train show`: a recording, or a map of touch, as a picture."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ def add_parser(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "show",
-        help="draw a recording",
+        help="draw a recording or a map of touch",
         description="Draw a recording: frames over time with the region found, and the three "
-        "features; with --scene, what happens, seen from the side.",
+        "features; with --scene, what happens, seen from the side. Draw a map that "
+        "`edge-classify run --map` wrote: where things were touched, and what they were.",
     )
-    parser.add_argument("recording", help="an .npz recording")
+    parser.add_argument("recording", help="an .npz recording, or a map")
     parser.add_argument("--out", metavar="PNG", help="the picture; beside the recording without it")
     parser.add_argument(
         "--scene", action="store_true", help="sketch arm, contact and its path from the side too"
     )
     parser.add_argument("--threshold", type=int, metavar="COUNTS", help="in place of the skin's")
+    parser.add_argument("--task", help="of a map: which labels to show (default: category)")
     parser.set_defaults(run=run)
 
 
@@ -30,8 +32,16 @@ def run(arguments: argparse.Namespace) -> int:
     from edge.recording import load
     from train.show import draw
 
-    recording = load(arguments.recording)
     out = Path(arguments.out or Path(arguments.recording).with_suffix(".png"))
+    if Path(arguments.recording).suffix != ".npz":
+        from edge import touchmap
+        from train import showmap
+
+        found = touchmap.load(arguments.recording)
+        showmap.draw(found, out, arguments.recording, arguments.task)
+        print(out, file=sys.stdout)
+        return 0
+    recording = load(arguments.recording)
     draw(
         recording,
         out,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.features import FEATURES
+from edge.layout import SkinLayout
 from edge.recording import Recording
 from train.study import plots
 from train.study.context import SCORE, Context, Figure, Section, Table, score
@@ -35,12 +36,17 @@ PARTS = (0.05, 0.1, 0.2)
 
 
 def nested(
-    context: Context, X: NDArray[np.float64], scaling: str, features: Sequence[str], what: str
+    context: Context,
+    X: NDArray[np.float64],
+    scaling: str,
+    features: Sequence[str],
+    what: str,
+    exact_up_to: int = EXACT_UP_TO,
 ) -> dict[str, Result]:
     """Nested cross-validation: leave-one-out inside, leave-one-out or ten folds outside."""
     y = context.labels
     n = len(X)
-    if n <= EXACT_UP_TO:
+    if n <= exact_up_to:
         first, second = np.triu_indices(n, 1)
         pairs = list(zip(first.tolist(), second.tolist(), strict=True))
         size = max(1, len(pairs) // (8 * context.jobs))
@@ -118,7 +124,8 @@ def section(context: Context) -> Section:
     if context.dataset.layout.wraps:
         text.append(
             "Wrap-around: without it a contact across the seam falls into two regions, and the "
-            "smaller one is lost."
+            "smaller one is lost. It matters only to a contact that lies there, so the skin is "
+            "also turned until its seam lies under the middle of the contacts."
         )
     return Section("What the paper did not ask", text, tables, figures)
 
@@ -138,9 +145,15 @@ def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:
         cases.append((context.recordings, with_threshold(counts)))
         names.append(f"one for all, {counts} counts")
     if layout.wraps:
-        cases.append((context.recordings, {"layout": replace(layout, wraps=False)}))
-        cases[-1] = ([_unwrapped(r) for r in context.recordings], cases[-1][1])
-        names.append("no wrap-around")
+        turned = _seam_under_contact(context)
+        for name, skin, shift in (
+            ("no wrap-around", layout, 0),
+            ("seam under the contact, wrap-around", *turned),
+            ("seam under the contact, no wrap-around", *turned),
+        ):
+            skin = replace(skin, wraps="no wrap" not in name)
+            cases.append(([_rolled(r, skin, shift) for r in context.recordings], {"layout": skin}))
+            names.append(name)
     groups = y.get(GROUP_TASK)
     members: list[list[NDArray[np.int64]]] = []
     if groups is not None:
@@ -176,6 +189,26 @@ def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:
     return [table]
 
 
-def _unwrapped(recording: Recording) -> Recording:
-    skin = {**recording.meta.get("skin", {}), "wraps": False}
-    return replace(recording, meta={**recording.meta, "skin": skin})
+def _seam_under_contact(context: Context) -> tuple[SkinLayout, int]:
+    """The same skin with its columns counted from the middle of the contacts, and by how many."""
+    layout = context.dataset.layout
+    angles = layout.column_angles_deg or tuple(360.0 * c / layout.cols for c in range(layout.cols))
+    sums = np.concatenate([trial.series.sums for trial in context.dataset.trials])
+    area = np.concatenate([trial.series.area for trial in context.dataset.trials])
+    turns = 2.0 * np.pi * sums[area > 0, 1] / area[area > 0] / layout.cols
+    middle = np.arctan2(np.sin(turns).mean(), np.cos(turns).mean()) * layout.cols / (2.0 * np.pi)
+    shift = round(float(middle)) % layout.cols
+    turned = angles[shift:] + angles[:shift]
+    given = turned if layout.radius_m is not None else layout.column_angles_deg
+    dead = np.flatnonzero(~np.roll(layout.alive, -shift, axis=1)).tolist()
+    return replace(layout, column_angles_deg=given, dead=tuple(dead)), shift
+
+
+def _rolled(recording: Recording, skin: SkinLayout, shift: int) -> Recording:
+    valid = recording.valid
+    return replace(
+        recording,
+        frames=np.roll(recording.frames, -shift, axis=2),
+        valid=None if valid is None else np.roll(valid, -shift, axis=-1),
+        meta={**recording.meta, "skin": skin.to_dict()},
+    )

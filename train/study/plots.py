@@ -193,9 +193,9 @@ def scatter(points: Sequence[Mapping[str, Any]], *, x: str, title: str, label: s
                 textcoords="offset points",
                 fontsize=8,
             )
-        axes.set_xscale("log")
+        axes.set_xlim(0, 1.45 * max(point[x] for point in points))
         axes.set_xlabel(label)
         axes.set_ylabel("accuracy, %")
         axes.set_title(title)
-        axes.margins(x=0.2, y=0.12)
+        axes.margins(y=0.12)
         return png(figure)

@@ -70,9 +70,11 @@ def section(context: Context) -> Section | None:
     X, y = context.vectors(), context.labels
     work: list[tuple[Any, ...]] = [(x, labels) for x, labels, _ in found]
     own = context.map("their accuracy", evaluate, work)
-    work = [(X, y, x, labels) for x, labels, _ in found]
+    plain = evaluate(X, y)
+    work = [(X, y, plain, x, labels) for x, labels, _ in found]
     to = context.map("trained here", transfer, work)
-    back = context.map("trained there", transfer, [(x, labels, X, y) for x, labels, _ in found])
+    work = [(x, labels, best, X, y) for (x, labels, _), best in zip(found, own, strict=True)]
+    back = context.map("trained there", transfer, work)
     table = Table(
         "robustness",
         "Another speed, arm or sensor; trained and tested on it or across",
@@ -86,7 +88,6 @@ def section(context: Context) -> Section | None:
         )
         for how, results in zip(hows, sets, strict=True):
             table.rows += [(name, task, how, *score(r), lost) for task, r in results.items()]
-    plain = evaluate(X, y)
     figures = []
     for task in y:
         png = plots.bars(

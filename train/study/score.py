@@ -85,13 +85,13 @@ def evaluate(
 def transfer(
     X: NDArray[np.float64],
     y: Labels,
+    chosen: Mapping[str, Result],
     test_X: NDArray[np.float64],
     test_y: Labels,
     scaling: str = "none",
     features: Sequence[str] = FEATURES,
 ) -> dict[str, Result]:
-    """Trained on one set, tested on another; components and k by leave-one-out on the first."""
-    chosen = evaluate(X, y, scaling, features)
+    """Trained on one set with the cells that `evaluate` chose on it, tested on another."""
     both = np.concatenate([X, test_X])
     train, test = np.arange(len(X)), np.arange(len(X), len(both))
     rows = split_neighbours(both, train, test, scaling, MAX_COMPONENTS, MAX_K, features)

@@ -1,0 +1,139 @@
+"""The paper's numbers, the tables and the page; and the command, end to end on few trials."""
+
+import csv
+import re
+from collections import Counter
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from edge.recording import save
+from train.__main__ import main
+from train.study import beyond
+from train.study.beyond import CHOSEN, columns, search
+from train.study.context import Figure, Section, Table
+from train.study.paper import entries
+from train.study.report import page, table_csv
+
+
+def test_the_papers_numbers_are_46_and_whole_trials_of_140():
+    numbers = entries()
+    assert Counter(e.table for e in numbers) == {"I": 10, "II": 18, "III": 18}
+    assert len({(e.table, e.setting, e.task) for e in numbers}) == 46
+    for entry in numbers:
+        right = entry.percent * 1.4
+        assert abs(right - round(right)) < 0.008, entry
+        low, high = entry.interval
+        assert low < entry.percent < high
+    headline = {e.task: e.percent for e in numbers if (e.table, e.setting) == ("II", "none")}
+    assert headline == {"category": 80.0, "mobility": 91.43, "object": 72.14}
+
+
+class Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.outside = []
+        self.open = []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in ("meta", "img", "br", "link"):
+            self.open.append(tag)
+        for name, value in attributes:
+            if name in ("src", "href") and not value.startswith(("data:image/png", "#")):
+                self.outside.append(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_page_needs_no_other_file_and_escapes_what_it_shows():
+    table = Table("t", "A <table>", ("what", "n"), [("a & b", 1), ("c,d", 2.5)])
+    section = Section("One & <all>", ["text < 3"], [table], [Figure("f", "plot", b"png")])
+    text = page("Title", ["lead"], [section])
+    links = Links()
+    links.feed(text)
+    assert (links.outside, links.open) == ([], [])
+    assert "a &amp; b" in text
+    assert "One &amp; &lt;all&gt;" in text
+    assert list(csv.reader(table_csv(table).splitlines()))[2] == ["c,d", "2.5"]
+
+
+def test_a_search_finds_the_feature_that_tells():
+    rng = np.random.default_rng(0)
+    y = np.repeat(["a", "b", "c"], 12)
+    X = rng.normal(size=(36, 4, 5))
+    X[:, 2] += np.repeat([0.0, 4.0, 8.0], 12)[:, None]
+    types = ("max_force", "regions", "skin_force", "left_width")
+    assert search(X.reshape(36, -1), y, types, 1) == ["skin_force"]
+    part = columns(X.reshape(36, -1), types, ("skin_force", "regions"))
+    assert (part.reshape(36, 2, 5) == X[:, [2, 1]]).all()
+
+
+@pytest.fixture(scope="module")
+def studied(make_touch, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("touches")
+    for kind in ("hard", "soft"):
+        for seed in range(12):
+            touch = make_touch(kind=kind, seed=seed, seconds=1.3, rate=25.0)
+            save(folder / f"{kind}_{seed:02d}.npz", touch)
+    out = tmp_path_factory.mktemp("study")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(beyond, "TREES", 10)
+        patch.setattr(beyond, "TIMED", 1)
+        assert main(["study", "--data", str(folder), "--out", str(out), "--jobs", "1"]) == 0
+    return out
+
+
+def test_every_number_of_the_report_is_in_a_csv(studied):
+    text = (studied / "report.html").read_text()
+    links = Links()
+    links.feed(text)
+    assert links.outside == []
+    named = set(re.findall(r"<small>(\w+\.csv)</small>", text))
+    assert named == {path.name for path in studied.glob("*.csv")}
+    assert len(list(studied.glob("*.png"))) == text.count("data:image/png")
+    for name in ("window", "scaling", "features", "resolution", "honest", "beyond_sets"):
+        assert f"{name}.csv" in named
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_equal_scalings_are_equal(studied):
+    """Methods I and II, and none and III, differ by what centring takes away."""
+    seen = {(r["scaling"], r["task"]): r["accuracy %"] for r in rows(studied / "scaling.csv")}
+    for task in ("category", "object"):
+        assert seen["I", task] == seen["II", task]
+        assert seen["none", task] == seen["III", task]
+
+
+def test_easy_touches_are_told_and_the_sets_have_their_cost(studied):
+    plain = {r["task"]: float(r["accuracy %"]) for r in rows(studied / "classification.csv")}
+    assert plain["category"] == 100.0
+    sets = rows(studied / "beyond_sets.csv")
+    six = [r for r in sets if r["features"] == "ready-made six"]
+    assert len(six) == 2
+    assert all(r["columns"] == str(20 * len(CHOSEN)) and float(r["us a frame"]) > 0 for r in six)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (["--data", "nowhere"], "nowhere"),
+        (["--jobs", "0"], "--jobs must be at least 1"),
+        (["--scene", "nowhere.toml"], "nowhere.toml"),
+        ([], "16 trials are too few to study"),
+    ],
+)
+def test_bad_input_is_one_sentence(given, sentence, recordings, tmp_path, capsys):
+    arguments = ["study", "--out", str(tmp_path / "out")]
+    if "--data" not in given:
+        arguments += ["--data", str(recordings)]
+    assert main([*arguments, *given]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error.splitlines()[-1]
+    assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,116 @@
+"""Scores of the study: nested against doing it the long way, groups, transfers, baselines."""
+
+import numpy as np
+import pytest
+
+from train.crossval import accuracies, leave_one_out, neighbours
+from train.study.score import (
+    best_cell,
+    collect,
+    evaluate,
+    group_neighbours,
+    majority,
+    nested_fold,
+    nested_from_pairs,
+    pairs_right,
+    shuffled_folds,
+    transfer,
+)
+
+ONE = ("max_force",)
+
+
+def overlapping(n=26, seed=0, spread=1.0):
+    rng = np.random.default_rng(seed)
+    y = np.array(["a", "b", "c"])[np.arange(n) % 3]
+    X = rng.normal(size=(n, 24)) * spread
+    X[:, :8] += (y == "a")[:, None] * 0.8
+    X[:, 8:16] += (y == "b")[:, None] * 0.6
+    return X, y
+
+
+def test_the_best_cell_is_reported_with_what_it_said():
+    X, y = overlapping()
+    found = evaluate(X, {"t": y}, "none", ONE)["t"]
+    table = leave_one_out(X, y, features=ONE)
+    assert found.accuracy == table.max() == table[found.components - 1, found.k - 1]
+    assert found.right == int((found.said == y).sum())
+    low, high = found.interval
+    assert low < found.accuracy < high
+
+
+@pytest.mark.parametrize("scaling", ["none", "IV"])
+def test_nested_by_pairs_is_nested_the_long_way(scaling):
+    X, y = overlapping(14)
+    first, second = np.triu_indices(14, 1)
+    pairs = list(zip(first.tolist(), second.tolist(), strict=True))
+    right = pairs_right(X, {"t": y}, pairs, scaling, ONE)
+    quick = nested_from_pairs(X, {"t": y}, right, scaling, ONE)["t"]
+    said = []
+    for i in range(14):
+        others = np.delete(np.arange(14), i)
+        inner = neighbours(X[others], scaling=scaling, features=ONE)
+        c, j = best_cell(accuracies(inner, y[others]))
+        outer = neighbours(X, scaling=scaling, features=ONE)[i, c, : j + 1]
+        votes = [str(label) for label in y[outer]]
+        most = max(votes.count(label) for label in votes)
+        said.append(next(label for label in votes if votes.count(label) == most))
+    assert quick.said.tolist() == said
+
+
+def test_a_nested_search_does_not_see_the_trial_it_tells():
+    """With labels that say nothing, the best cell flatters and the nested score does not."""
+    rng = np.random.default_rng(3)
+    flattered, honest = [], []
+    for seed in range(3):
+        X = np.random.default_rng(seed).normal(size=(24, 8))
+        y = rng.permutation(np.repeat(["a", "b"], 12))
+        folds = shuffled_folds(y, 10)
+        flattered.append(evaluate(X, {"t": y}, "none", ONE)["t"].accuracy)
+        answers = [nested_fold(X, {"t": y}, fold, "none", ONE) for fold in folds]
+        honest.append(collect({"t": y}, folds, answers)["t"].accuracy)
+    assert np.mean(flattered) > 0.6
+    assert np.mean(honest) < 0.55
+
+
+def test_groups_are_left_out_whole():
+    X, _ = overlapping(24)
+    groups = np.repeat(["p", "q", "r", "s"], 6)
+    rows = group_neighbours(X, groups, "none", ONE)
+    assert rows.shape == (24, 20, 18)
+    assert all((groups[rows[i]] != groups[i]).all() for i in range(24))
+
+
+def test_an_object_is_told_by_others_alone():
+    """Trials of one object are copies: they may only be told right by other objects."""
+    rng = np.random.default_rng(0)
+    objects = rng.normal(size=(6, 8))
+    X = np.repeat(objects, 4, axis=0)
+    groups = np.repeat(list("uvwxyz"), 4)
+    y = rng.permutation(np.repeat(["a", "b"], 3)).repeat(4)
+    assert evaluate(X, {"t": y}, "none", ONE)["t"].accuracy == 1.0
+    folds = [np.flatnonzero(groups == g) for g in np.unique(groups)]
+    answers = [nested_fold(X, {"t": y}, fold, "none", ONE, groups) for fold in folds]
+    assert collect({"t": y}, folds, answers)["t"].accuracy < 1.0
+
+
+def test_folds_cover_every_trial_once_and_spread_the_classes():
+    y = np.repeat(["a", "b", "c"], [40, 20, 10])
+    folds = shuffled_folds(y, 10)
+    assert np.sort(np.concatenate(folds)).tolist() == list(range(70))
+    assert [sorted(y[fold]).count("a") for fold in folds] == [4] * 10
+    assert all((a == b).all() for a, b in zip(folds, shuffled_folds(y, 10), strict=True))
+
+
+def test_a_transfer_is_tested_on_the_other_set_alone():
+    X, y = overlapping(30, spread=0.2)
+    other, labels = overlapping(9, seed=5, spread=0.2)
+    trained = X, {"t": y}, evaluate(X, {"t": y}, "none", ONE)
+    wrong = transfer(*trained, other, {"t": np.roll(labels, 1)}, "none", ONE)["t"]
+    right = transfer(*trained, other, {"t": labels}, "none", ONE)["t"]
+    assert right.total == 9
+    assert right.accuracy > 0.8 > 0.2 > wrong.accuracy
+
+
+def test_the_majority():
+    assert majority(np.array(["a", "b", "b"])).accuracy == pytest.approx(2 / 3)

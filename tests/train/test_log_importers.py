@@ -1,0 +1,249 @@
+"""CSV frames, bags and MCAP files, made here and imported through the command."""
+
+import json
+
+import numpy as np
+import pytest
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Bag1
+from rosbags.rosbag2 import Writer as Bag2
+from rosbags.typesys import Stores, get_typestore
+
+from edge.recording import load
+from train.__main__ import main
+
+N, ROWS, COLS, DOF = 12, 4, 6, 5
+RNG = np.random.default_rng(8)
+FRAMES = RNG.integers(0, 65536, (N, ROWS, COLS)).astype(np.uint16)
+T = 100.0 + np.arange(N) / 100
+JOINT_T = 99.99 + np.arange(8) / 50
+JOINTS = RNG.uniform(-1, 1, (8, DOF))
+BESIDE = {"labels": {"object": "cup"}, "skin": {"threshold_counts": 50, "wraps": True}}
+STORES = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
+
+
+def nanoseconds(t):
+    return round(t * 1e9)
+
+
+def header(types, t):
+    stamp = types.types["builtin_interfaces/msg/Time"](
+        sec=nanoseconds(t) // 10**9, nanosec=nanoseconds(t) % 10**9
+    )
+    more = {"seq": 0} if "seq" in types.types["std_msgs/msg/Header"].__annotations__ else {}
+    return types.types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **more)
+
+
+def image(types, t, frame, *, encoding="mono16", big=False, padding=3):
+    raw = frame.astype(">u2" if big else "<u2").view(np.uint8).reshape(ROWS, -1)
+    lines = np.pad(raw, ((0, 0), (0, padding)))
+    return types.types["sensor_msgs/msg/Image"](
+        header=header(types, t),
+        height=ROWS,
+        width=COLS,
+        encoding=encoding,
+        is_bigendian=int(big),
+        step=lines.shape[1],
+        data=lines.reshape(-1),
+    )
+
+
+def array(types, frame, *, dims=True):
+    dimension = types.types["std_msgs/msg/MultiArrayDimension"]
+    shape = [dimension(label=n, size=s, stride=0) for n, s in (("rows", ROWS), ("cols", COLS))]
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=shape if dims else [], data_offset=0)
+    return types.types["std_msgs/msg/UInt16MultiArray"](layout=layout, data=frame.reshape(-1))
+
+
+def joint_state(types, t, q):
+    none = np.zeros(0)
+    names = [f"j{i}" for i in range(DOF)]
+    return types.types["sensor_msgs/msg/JointState"](
+        header=header(types, t), name=names, position=q, velocity=none, effort=none
+    )
+
+
+def write_bag(path, version, frames, *, joints=True, topics=("/skin",)):
+    """A bag whose messages are logged 7 ms after their stamps."""
+    types = STORES[version]
+    serialize = types.serialize_ros1 if version == 1 else types.serialize_cdr
+    with Bag1(path) if version == 1 else Bag2(path, version=9) as bag:
+        for topic in topics:
+            kind = frames[0].__msgtype__
+            connection = bag.add_connection(topic, kind, typestore=types)
+            for t, message in zip(T, frames, strict=True):
+                bag.write(connection, nanoseconds(t + 0.007), serialize(message, kind))
+        if joints:
+            kind = "sensor_msgs/msg/JointState"
+            connection = bag.add_connection("/joint_states", kind, typestore=types)
+            for t, q in zip(JOINT_T, JOINTS, strict=True):
+                message = serialize(joint_state(types, t, q), kind)
+                bag.write(connection, nanoseconds(t + 0.007), message)
+    return path
+
+
+def imported(tmp_path, kind, path):
+    assert main(["import", kind, str(path), "--out", str(tmp_path / "out")]) == 0
+    (file,) = (tmp_path / "out").glob("*.npz")
+    return load(file)
+
+
+def check(recording, *, joints=True):
+    assert np.array_equal(recording.frames, FRAMES)
+    assert recording.t == pytest.approx(T - T[0], abs=1e-6)
+    if joints:
+        expected = [np.interp(T, JOINT_T, column) for column in JOINTS.T]
+        assert recording.joints == pytest.approx(np.transpose(expected), abs=1e-4)
+    else:
+        assert recording.joints is None
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("big", [False, True])
+def test_a_bag_of_images_with_joint_states(tmp_path, version, big):
+    types = STORES[version]
+    name = "grasp.bag" if version == 1 else "grasp"
+    messages = [image(types, t, f, big=big) for t, f in zip(T, FRAMES, strict=True)]
+    path = write_bag(tmp_path / name, version, messages)
+    (tmp_path / "grasp.json").write_text(json.dumps(BESIDE))
+    recording = imported(tmp_path, "rosbag", path)
+    check(recording)
+    assert recording.labels == {"object": "cup"}
+    assert (recording.layout.threshold_counts, recording.layout.wraps) == (50, True)
+
+
+@pytest.mark.parametrize("dims", [True, False])
+def test_a_bag_of_arrays_takes_the_shape_from_the_layout_or_from_beside(tmp_path, dims):
+    messages = [array(STORES[2], f, dims=dims) for f in FRAMES]
+    path = write_bag(tmp_path / "grasp", 2, messages, joints=False)
+    if not dims:
+        beside = {"skin": {"rows": ROWS, "cols": COLS}}
+        (tmp_path / "grasp.json").write_text(json.dumps(beside))
+    check(imported(tmp_path, "rosbag", path), joints=False)
+
+
+def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
+    messages = [array(STORES[2], f) for f in FRAMES]
+    path = write_bag(tmp_path / "grasp", 2, messages, topics=("/left", "/right"))
+    assert main(["import", "rosbag", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert 'frames are on /left, /right; name one as "frames_topic"' in capsys.readouterr().err
+    (tmp_path / "grasp.json").write_text('{"frames_topic": "/left"}')
+    assert np.array_equal(imported(tmp_path, "rosbag", path).frames, FRAMES)
+
+
+def write_mcap(path, *, cdr):
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start()
+        types = STORES[2]
+        if cdr:
+            skin_kind, joint_kind = "sensor_msgs/msg/Image", "sensor_msgs/msg/JointState"
+            frames = [
+                bytes(types.serialize_cdr(image(types, t, f), skin_kind))
+                for t, f in zip(T, FRAMES, strict=True)
+            ]
+            poses = [
+                bytes(types.serialize_cdr(joint_state(types, t, q), joint_kind))
+                for t, q in zip(JOINT_T, JOINTS, strict=True)
+            ]
+        else:
+            skin_kind, joint_kind = "frame", "joints"
+            frames = [json.dumps({"counts": f.tolist()}).encode() for f in FRAMES]
+            poses = [json.dumps({"q": q.tolist()}).encode() for q in JOINTS]
+        for topic, kind, times, data in (
+            ("/skin", skin_kind, T, frames),
+            ("/joints", joint_kind, JOINT_T, poses),
+        ):
+            encoding = ("ros2msg", "cdr") if cdr else ("jsonschema", "json")
+            schema = writer.register_schema(kind, encoding[0], b"{}")
+            channel = writer.register_channel(topic, encoding[1], schema)
+            for t, message in zip(times, data, strict=True):
+                writer.add_message(channel, nanoseconds(t), message, nanoseconds(t))
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("cdr", [True, False])
+def test_an_mcap_file_of_ros_or_json_messages(tmp_path, cdr):
+    check(imported(tmp_path, "mcap", write_mcap(tmp_path / "grasp.mcap", cdr=cdr)))
+
+
+def write_csv(folder, *, names=None):
+    for trial in ("one", "two"):
+        (folder / trial).mkdir(parents=True)
+        for i, (t, frame) in enumerate(zip(T, FRAMES, strict=True)):
+            name = f"{t:.3f}" if names is None else names.format(i)
+            np.savetxt(folder / trial / f"{name}.csv", frame, fmt="%d", delimiter=",")
+    (folder / "labels.csv").write_text("trial,object,mobility\none,cup,fixed\ntwo,can,\n")
+    return folder
+
+
+@pytest.mark.parametrize("names", [None, "frame-{:04}"])
+def test_a_folder_of_csv_frames(tmp_path, names):
+    folder = write_csv(tmp_path / "csv", names=names)
+    skin = {"threshold_counts": 50} | ({} if names is None else {"rate_hz": 100})
+    (folder / "skin.json").write_text(json.dumps(skin))
+    assert main(["import", "csv_frames", str(folder), "--out", str(tmp_path / "out")]) == 0
+    one, two = (load(tmp_path / "out" / f"{trial}.npz") for trial in ("one", "two"))
+    check(one, joints=False)
+    assert one.labels == {"object": "cup", "mobility": "fixed"}
+    assert two.labels == {"object": "can"}
+    assert one.layout.threshold_counts == 50
+
+
+def damage_names(tmp_path):
+    return "csv_frames", write_csv(tmp_path / "csv", names="frame-{}")
+
+
+def damage_frame(tmp_path):
+    folder = write_csv(tmp_path / "csv")
+    (folder / "one" / "100.050.csv").write_text("1,2\n3,x\n")
+    return "csv_frames", folder
+
+
+def damage_shape(tmp_path):
+    folder = write_csv(tmp_path / "csv")
+    (folder / "one" / "100.050.csv").write_text("1,2\n3,4\n")
+    return "csv_frames", folder
+
+
+def damage_mcap(tmp_path):
+    path = write_mcap(tmp_path / "grasp.mcap", cdr=False)
+    path.write_bytes(path.read_bytes()[:400])
+    return "mcap", path
+
+
+def empty_bag(tmp_path):
+    path = tmp_path / "grasp"
+    with Bag2(path, version=9) as bag:
+        bag.add_connection("/chatter", "std_msgs/msg/String", typestore=STORES[2])
+    return "rosbag", path
+
+
+def no_bag(tmp_path):
+    return "rosbag", tmp_path / "nothing"
+
+
+def not_a_bag(tmp_path):
+    (tmp_path / "a.bag").write_bytes(b"hello")
+    return "rosbag", tmp_path / "a.bag"
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (damage_names, "not named by their times in seconds; give rate_hz"),
+        (damage_frame, "not a frame of whole numbers"),
+        (damage_shape, "is (2, 2) taxels"),
+        (damage_mcap, "not a whole MCAP file"),
+        (empty_bag, "holds no frames"),
+        (no_bag, "no such bag"),
+        (not_a_bag, "not a bag that can be read"),
+    ],
+)
+def test_what_cannot_be_used_is_one_sentence(tmp_path, capsys, make, sentence):
+    kind, path = make(tmp_path)
+    assert main(["import", kind, str(path), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err.replace("\r", "\n").strip().splitlines()[-1]
+    assert error.startswith("train: ")
+    assert sentence in error

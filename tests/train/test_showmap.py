@@ -1,0 +1,61 @@
+"""A map of touch as a picture."""
+
+import json
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from train.__main__ import main
+
+HEAD = {"event": "map", "frame": "torso_lift_link", "unit": "metre", "tasks": ["category"]}
+
+
+def touch(n, place, label, confidence=1.0):
+    return {
+        "event": "touch",
+        "contact": n,
+        "onset_s": float(n),
+        "place": place,
+        "labels": {"category": label},
+        "confidence": {"category": confidence},
+        "flags": [],
+    }
+
+
+@pytest.fixture
+def path(tmp_path):
+    rng = np.random.default_rng(5)
+    labels = ["rigid-fixed", "soft-movable", "soft-fixed", None]
+    touches = [
+        touch(n, rng.normal([0.4, -0.2, -0.3], 0.05).tolist(), labels[n % 4], n % 3 / 2)
+        for n in range(20)
+    ]
+    path = tmp_path / "map.jsonl"
+    path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *touches]))
+    return path
+
+
+def test_a_map_is_drawn_beside_its_file(path, capsys):
+    assert main(["show", str(path)]) == 0
+    out = path.with_suffix(".png")
+    assert capsys.readouterr().out.strip() == str(out)
+    pixels = matplotlib.image.imread(out)[..., :3]
+    assert pixels.shape[1] > 1000
+    assert len(np.unique(pixels.reshape(-1, 3).round(1), axis=0)) > 20  # colours of labels
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "sentence"),
+    [
+        (json.dumps(HEAD), [], "no contact is on this map yet"),
+        (None, ["--task", "weight"], "has no task 'weight'; it has category"),
+        ("hello", [], "not a map"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_sentence(path, capsys, text, options, sentence):
+    if text is not None:
+        path.write_text(text + "\n")
+    assert main(["show", str(path), *options]) == 2
+    assert sentence in capsys.readouterr().err
+    assert not path.with_suffix(".png").exists()

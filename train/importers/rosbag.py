@@ -1,0 +1,37 @@
+"""A bag of ROS 1 (`.bag`) or ROS 2 (its folder): one recording; see train/topics.py.
+
+Needs the extra `ros`: pip install edge-classify[ros]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from edge.errors import InputError
+from edge.recording import Recording
+from train.topics import FRAMES, JOINTS, Log
+
+
+def trials(path: Path) -> Iterator[tuple[str, Recording]]:
+    """The bag's one trial."""
+    try:
+        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError("bags need rosbags; install it with `pip install rosbags`") from None
+    if not path.exists():
+        raise InputError(f"{path}: no such bag")
+    log = Log.of(path)
+    # A ROS 2 bag of before 2024 does not carry its types' definitions.
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    try:
+        with AnyReader([path], default_typestore=types) as reader:
+            wanted = [c for c in reader.connections if c.msgtype in (*FRAMES, *JOINTS)]
+            # AnyReader gives every message of the bag where it is asked for none.
+            for connection, logged_ns, raw in reader.messages(wanted) if wanted else ():
+                message = reader.deserialize(raw, connection.msgtype)
+                log.ros(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
+    except AnyReaderError as error:
+        raise InputError(f"{path}: not a bag that can be read: {error}") from None
+    yield path.stem, log.recording()
