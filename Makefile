@@ -3,6 +3,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
+# Matrices this small only lose by several threads, which also fight with the processes beside.
+export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study wheel wheel-test board-test \
   hard-cases hard-cases-versions mutants bench faults soak clean

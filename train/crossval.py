@@ -72,6 +72,13 @@ def split_neighbours(
     return rows
 
 
+def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) for each row of X the first row that is equal to it."""
+    seen: dict[bytes, int] = {}
+    whole = np.ascontiguousarray(X, dtype=np.float64) + 0.0  # -0 becomes 0
+    return np.array([seen.setdefault(row.tobytes(), i) for i, row in enumerate(whole)])
+
+
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
     """(components, k) places of the k smallest of each row, by value and then by place."""
     m = squares.shape[1]
@@ -99,12 +106,6 @@ def fold_neighbours(
     form = scaling, max_components, max_k, features, first
     found: NDArray[np.int64] = split_neighbours(X, train, np.array([test]), *form)[0]
     return found
-
-
-def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) for each row of X the first row that is equal to it."""
-    _, first, group = np.unique(X, axis=0, return_index=True, return_inverse=True)
-    return np.asarray(first[group.reshape(-1)])
 
 
 def votes_right(

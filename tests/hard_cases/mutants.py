@@ -46,7 +46,6 @@ class Mutant:
 
 
 PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/track.py"
-BUILD = "export/build.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/features.py", "edge/region.py"
 HARD = "tests/hard_cases/test_hard_cases.py"
 OF_PIPELINE, OF_GRAPH = "tests/train/test_pipeline.py", "tests/export/test_graph.py"
@@ -141,7 +140,7 @@ MUTANTS = (
     ),
     Mutant(
         "the graph's projection: high half",
-        BUILD,
+        "export/build.py",
         'half = build.node("Sub", [build.node("Add", [d, step]), step])',
         'half = build.node("Mul", [d, build.constant(0.5)])',
         (OF_GRAPH, "scaling_agrees or equals_a_training_row or all_at_once"),
@@ -168,7 +167,7 @@ MUTANTS = (
         "the check allows for float32's rounding",
         GRAPH,
         "slack = [2.0 * u * float(of.max()) for of in lengths]",
-        "slack, u = [0.0 for of in lengths], 0.0",
+        "slack = [0.0 for of in lengths]\n    u = 0.0",
         (OF_GRAPH, "clusters"),
     ),
     Mutant(
@@ -188,8 +187,8 @@ MUTANTS = (
     Mutant(
         "no shortlist of nearly all rows",
         GRAPH,
-        "short = len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
-        "short = len(rows[0]) >= SHORTLIST_ROWS",
+        "len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
+        "len(rows[0]) >= SHORTLIST_ROWS",
         (OF_GRAPH, "voters_as_rows"),
     ),
     Mutant(
@@ -218,6 +217,13 @@ MUTANTS = (
         CROSSVAL,
         "among = np.flatnonzero(near)",
         "among = np.argpartition(row, k - 1)[:k]",
+        (OF_CROSSVAL, "limit"),
+    ),
+    Mutant(
+        "leave-one-out: equal trials are equally far",
+        CROSSVAL,
+        "z = (scaled @ axes.T)[first_equal(X) if first is None else first]",
+        "z = scaled @ axes.T",
         (OF_CROSSVAL, "limit"),
     ),
     Mutant(

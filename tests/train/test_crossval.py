@@ -103,12 +103,15 @@ def test_equal_distances_and_duplicates_go_to_the_earlier_row():
     assert rows[4, :, :2].tolist() == [[0, 2], [0, 2]]
 
 
-def test_of_many_equal_distances_at_the_limit_the_earlier_rows_are_taken():
+@pytest.mark.parametrize(("distinct", "copies"), [(4, 30), (3, 41)])
+def test_of_many_equal_distances_at_the_limit_the_earlier_rows_are_taken(distinct, copies):
+    """With 123 rows a matrix product rounds its last rows otherwise than the others."""
+    n = distinct * copies
     rng = np.random.default_rng(3)
-    X = np.repeat(rng.normal(size=(4, 120)), 30, axis=0)[rng.permutation(120)]
+    X = np.repeat(rng.normal(size=(distinct, 120)), copies, axis=0)[rng.permutation(n)]
     rows = neighbours(X, max_components=3, max_k=5)
-    for i in range(120):
-        same = [j for j in range(120) if j != i and (X[j] == X[i]).all()]
+    for i in range(n):
+        same = [j for j in range(n) if j != i and (X[j] == X[i]).all()]
         assert (rows[i] == same[:5]).all()
 
 
