@@ -89,9 +89,14 @@ def section(context: Context) -> Section | None:
     data = context.dataset
     others = variants(scene)
     names = [trial.path.name for trial in data.trials]
-    cases = [(s, names, data.layout, data.tracking, data.chain) for s in others.values()]
-    found = context.map("speeds and effects", measured, cases)
+    cases = [(s, names, data.layout, data.tracking, data.chain) for s in (scene, *others.values())]
+    (same, _, _), *found = context.map("speeds and effects", measured, cases)
     X, y = context.vectors(), context.labels
+    if not (same == X).all():
+        raise InputError(
+            f"the scene {scene.name} gives other trials than these recordings; simulate it again, "
+            "or study them without a scene"
+        )
     work: list[tuple[Any, ...]] = [(x, labels) for x, labels, _ in found]
     own = context.map("their accuracy", evaluate, work)
     plain = evaluate(X, y)
