@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -145,7 +144,14 @@ def section(context: Context) -> Section:
 
     timed = trimmed(context)
     floor = frame_cost(timed, context, ["max_force"])
-    cost = partial(frame_cost, timed, context)
+    costs: dict[frozenset[str], float] = {}
+
+    def cost(wanted: Sequence[str]) -> float:
+        key = frozenset(wanted)
+        if key not in costs:
+            costs[key] = frame_cost(timed, context, wanted)
+        return costs[key]
+
     singles = _singles(context, every, types, task, floor, cost)
     sets = _sets(context, every, types, task, cost)
     rivals = _rivals(context, task)

@@ -106,7 +106,7 @@ def section(context: Context) -> Section:
     png = plots.lines(
         SHARES,
         {task: [r[task] for r in fewer] for task in context.labels},
-        label="one chip read in",
+        label="chips of which one is read",
         title="Reading fewer chips",
         logarithmic=True,
         ticks=[str(s) for s in SHARES],

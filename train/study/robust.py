@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arm import Chain
+from edge.errors import InputError
 from edge.features import WINDOW_S
 from edge.layout import SkinLayout
 from edge.track import TrackSettings
@@ -46,12 +47,34 @@ def variants(scene: Scene) -> dict[str, Scene]:
 
 
 def measured(
-    scene: Scene, layout: SkinLayout, tracking: TrackSettings, chain: Chain | None
+    scene: Scene,
+    wanted: list[str],
+    layout: SkinLayout,
+    tracking: TrackSettings,
+    chain: Chain | None,
 ) -> tuple[NDArray[np.float64], Labels, int]:
-    """Features and labels of a scene's trials, and how many had no contact."""
+    """Features and labels of a scene's trials, and how many had no contact.
+
+    Args:
+        scene: simulated anew.
+        wanted: file names of the trials, in the order of the result.
+        layout: the skin, with its thresholds.
+        tracking: how contacts are followed.
+        chain: the arm, or None.
+
+    Raises:
+        InputError: the scene has no trial of such a name.
+    """
     # What comes after the window is not looked at.
     shorter = replace(scene, trials={**scene.trials, "after_s": WINDOW_S + 0.2})
-    recordings = [recording for _, recording in simulate(shorter)]
+    trials = dict(simulate(shorter))
+    strange = [name for name in wanted if name not in trials]
+    if strange:
+        raise InputError(
+            f"{strange[0]}: the scene {scene.name} has no such trial; give the scene that the "
+            "recordings were simulated from, or none"
+        )
+    recordings = [trials[name] for name in wanted]
     series = follow(recordings, layout, tracking, chain)
     tasks = recordings[0].labels
     y = {task: np.array([r.labels[task] for r in recordings]) for task in sorted(tasks)}
@@ -65,15 +88,21 @@ def section(context: Context) -> Section | None:
         return None
     data = context.dataset
     others = variants(scene)
-    cases = [(s, data.layout, data.tracking, data.chain) for s in others.values()]
-    found = context.map("speeds and effects", measured, cases)
+    names = [trial.path.name for trial in data.trials]
+    cases = [(s, names, data.layout, data.tracking, data.chain) for s in (scene, *others.values())]
+    (same, _, _), *found = context.map("speeds and effects", measured, cases)
     X, y = context.vectors(), context.labels
+    if not (same == X).all():
+        raise InputError(
+            f"the scene {scene.name} gives other trials than these recordings; simulate it again, "
+            "or study them without a scene"
+        )
     work: list[tuple[Any, ...]] = [(x, labels) for x, labels, _ in found]
     own = context.map("their accuracy", evaluate, work)
     plain = evaluate(X, y)
-    work = [(X, y, plain, x, labels) for x, labels, _ in found]
+    work = [(X, y, plain, x) for x, _, _ in found]
     to = context.map("trained here", transfer, work)
-    work = [(x, labels, best, X, y) for (x, labels, _), best in zip(found, own, strict=True)]
+    work = [(x, y, best, X) for (x, _, _), best in zip(found, own, strict=True)]
     back = context.map("trained there", transfer, work)
     table = Table(
         "robustness",
@@ -108,7 +137,8 @@ def section(context: Context) -> Section | None:
             "joint stiffnesses, and each effect of the sensor at its default size, added where "
             "the scene has it not and left out where it has.",
             "The first bar learns with the change, the second meets it for the first time: the "
-            "gap between them is what a robot pays that was not trained for it.",
+            "gap between them is what a robot pays that was not trained for it. A trial's own twin "
+            "without the change is never in its training set: it would tell it by itself.",
         ],
         [table],
         figures,

@@ -86,20 +86,46 @@ def transfer(
     X: NDArray[np.float64],
     y: Labels,
     chosen: Mapping[str, Result],
-    test_X: NDArray[np.float64],
-    test_y: Labels,
+    changed: NDArray[np.float64],
     scaling: str = "none",
     features: Sequence[str] = FEATURES,
 ) -> dict[str, Result]:
-    """Trained on one set with the cells that `evaluate` chose on it, tested on another."""
-    both = np.concatenate([X, test_X])
-    train, test = np.arange(len(X)), np.arange(len(X), len(both))
-    rows = split_neighbours(both, train, test, scaling, MAX_COMPONENTS, MAX_K, features)
+    """Trained on trials as they are, tested on the same trials under some change.
+
+    A changed trial has the draws of its twin in training but for the change: the twin is left
+    out, as in leave-one-out, or a trial would be told by itself.
+
+    Args:
+        X: (n, p) training trials.
+        y: labels of both.
+        chosen: components and k of each task, as `evaluate` chose them on X.
+        changed: (n, p) the same trials, changed.
+        scaling: fitted on the training trials.
+        features: of X.
+    """
+    n = len(X)
+    both = np.concatenate([X, changed])
+    k = min(MAX_K, n - 1)
+    with threadpool_limits(1):
+        rows = np.concatenate(
+            [
+                split_neighbours(
+                    both,
+                    np.delete(np.arange(n), i),
+                    np.array([n + i]),
+                    scaling,
+                    MAX_COMPONENTS,
+                    k,
+                    features,
+                )
+                for i in range(n)
+            ]
+        )
     found: dict[str, Result] = {}
     for task, best in chosen.items():
         said = said_by(rows, y[task], best.components, best.k)
-        right = int((said == test_y[task]).sum())
-        found[task] = Result(right, len(test), best.components, best.k, said)
+        right = int((said == y[task]).sum())
+        found[task] = Result(right, n, best.components, best.k, said)
     return found
 
 

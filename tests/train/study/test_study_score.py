@@ -5,6 +5,7 @@ import pytest
 
 from train.crossval import accuracies, leave_one_out, neighbours
 from train.study.score import (
+    Result,
     best_cell,
     collect,
     evaluate,
@@ -102,14 +103,23 @@ def test_folds_cover_every_trial_once_and_spread_the_classes():
     assert all((a == b).all() for a, b in zip(folds, shuffled_folds(y, 10), strict=True))
 
 
-def test_a_transfer_is_tested_on_the_other_set_alone():
+def test_a_changed_trial_is_never_told_by_its_own_twin():
+    """Trials that tell nothing of each other are told by chance, though their twins know."""
+    rng = np.random.default_rng(4)
+    X = rng.normal(size=(40, 8))
+    y = {"t": rng.permutation(np.repeat(["a", "b"], 20))}
+    found = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X + 1e-6, "none", ONE)["t"]
+    same = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X, "none", ONE)["t"]
+    assert found.accuracy < 0.75
+    assert same.accuracy == leave_one_out(X, y["t"], features=ONE)[7, 0]
+
+
+def test_a_change_that_moves_trials_among_others_costs():
     X, y = overlapping(30, spread=0.2)
-    other, labels = overlapping(9, seed=5, spread=0.2)
-    trained = X, {"t": y}, evaluate(X, {"t": y}, "none", ONE)
-    wrong = transfer(*trained, other, {"t": np.roll(labels, 1)}, "none", ONE)["t"]
-    right = transfer(*trained, other, {"t": labels}, "none", ONE)["t"]
-    assert right.total == 9
-    assert right.accuracy > 0.8 > 0.2 > wrong.accuracy
+    best = evaluate(X, {"t": y}, "none", ONE)
+    assert transfer(X, {"t": y}, best, X + 0.01, "none", ONE)["t"].accuracy > 0.8
+    others = X[np.roll(np.arange(30), 1)]
+    assert transfer(X, {"t": y}, best, others, "none", ONE)["t"].accuracy < 0.3
 
 
 def test_the_majority():
