@@ -15,7 +15,7 @@ from edge.track import FeatureSeries
 from export.__main__ import main as export
 from train.__main__ import main as train
 from train.study.score import Result
-from train.tradeoff import board, early, pick
+from train.tradeoff import accuracy, board, early, pick
 from train.tradeoff.accuracy import Point, front, nearest, nested, thinned
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
@@ -187,7 +187,7 @@ def test_export_takes_window_features_and_scaling_of_a_point(recordings, tmp_pat
 
 class TestEarly:
     def found(self, fixed):
-        return early.Beside((0.2, 0.6, 1.0), np.array(fixed), [], 100)
+        return early.Beside((0.2, 0.6, 1.0), np.array(fixed), [], 100, 0.5)
 
     def test_the_fixed_window_that_is_as_accurate_is_interpolated(self):
         found = self.found([0.5, 0.3, 0.1])
@@ -202,6 +202,39 @@ class TestEarly:
     def test_time_saved_is_against_that_window(self):
         one = early.Early(0.1, 0.1, 0.2, 0.1, 0.1, 0.0, mean_s=0.4)
         assert early.saved(self.found([0.5, 0.3, 0.1]), one) == pytest.approx(0.5)
+
+    def test_what_beats_every_fixed_window_is_set_against_the_full_one(self):
+        one = early.Early(0.1, 0.1, 0.2, 0.1, 0.1, 0.0, mean_s=0.4)
+        assert early.saved(self.found([0.5, 0.3, 0.25]), one) == pytest.approx(0.6)
+
+    def test_the_time_saved_at_the_full_window_s_accuracy_is_of_the_quickest_that_has_it(self):
+        found = self.found([0.5, 0.1, 0.3])
+        assert early.at_full_accuracy(found) is None
+        for wrong, mean_s in ((0.25, 0.9), (0.3, 0.7), (0.31, 0.2)):
+            found.early.append(early.Early(0.1, 0.1, wrong, 0.1, 0.1, 0.0, mean_s))
+        gain, one = early.at_full_accuracy(found)
+        assert (gain, one.wrong) == (pytest.approx(0.3), 0.3)
+
+    def test_hindsight_stops_each_trial_once_its_answer_stays_as_it_ends(self):
+        right = np.array([[1, 0, 1, 0], [1, 1, 0, 1], [1, 1, 1, 0]], dtype=bool)
+        # From the first look on, the second, the last, and the last.
+        expected = np.mean([0.2, 0.6, 1.0, 1.0])
+        assert early.hindsight(right, (0.2, 0.6, 1.0)) == pytest.approx(expected)
+
+    def test_what_is_plain_from_the_second_look_on_is_decided_then(self):
+        """Before it the labels are told apart by nothing; an asked error decides there at once."""
+        rng = np.random.default_rng(6)
+        labels = np.repeat(["a", "b"], 60)
+        X = rng.normal(size=(3, 120, 12))
+        X[1:, :, 0] += 200.0 * (labels == "a")
+        found = early.beside(X, labels, (0.2, 0.6, 1.0), ("max_force",), "none")
+        assert found.fixed[0] > 0.3
+        assert found.fixed[1:].tolist() == [0.0, 0.0]
+        assert 0.2 < found.hindsight_s <= 0.6
+        one = next(e for e in found.early if e.asked == 0.1)
+        assert one.struck <= 0.1 + 1.96 * np.sqrt(0.1 * 0.9 * (1 / 96 + 1 / 120))
+        assert 0.4 < one.mean_s < 0.75
+        assert one.wrong == pytest.approx(one.sure_wrong)
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
@@ -218,14 +251,30 @@ class TestBoard:
     def test_a_file_that_is_none_is_one_sentence(self, tmp_path):
         with pytest.raises(InputError, match="cannot be read"):
             board.read(tmp_path / "none.json")
-        (tmp_path / "board.json").write_text("{}")
-        with pytest.raises(InputError, match="not a board file"):
-            board.read(tmp_path / "board.json")
+        path = board_file(tmp_path / "board.json", "0" * 64)
+        whole = path.read_text()
+        assert board.read(path).memory_mb == 61.5
+        for wrong in (
+            "",
+            "{}",
+            "[]",
+            "[" * 100_000,
+            whole[: len(whole) // 2],
+            whole.replace("decision", "something"),
+            whole.replace("cold_start_ms", "start"),
+            whole.replace('"median_us": 100.0', '"median_us": NaN'),
+            whole.replace('"median_us": 100.0', '"median_us": "soon"'),
+            whole.replace('["a", "b", "c"]', "[]"),
+        ):
+            path.write_text(wrong)
+            with pytest.raises(InputError, match="not a board file; make one with"):
+                board.read(path)
 
     def test_arithmetic_follows_the_number_of_features(self):
-        one = board.Board("b", "d", {"track": 1.0, "features": 3.0, "decision": 10.0}, 3, "m")
-        assert one.arithmetic_s(3) == 14.0
-        assert one.arithmetic_s(1) == 12.0
+        stages = {"track": (1e6, 2e6), "features": (3e6, 4e6), "decision": (10e6, 11e6)}
+        one = board.Board("b", "d", stages, 60.0, 500.0, 3, "m")
+        assert one.arithmetic_s(3) == pytest.approx(14.0)
+        assert one.arithmetic_s(1) == pytest.approx(12.0)
 
 
 def board_file(path, digest):
@@ -234,6 +283,8 @@ def board_file(path, digest):
         "machine": {"kind": "a board", "name": "here"},
         "model": {"sha256": "ab" * 32, "data_digest": digest, "features": ["a", "b", "c"]},
         "stages": dict.fromkeys(("track", "features", "decision"), stage),
+        "memory_mb": 61.5,
+        "cold_start_ms": 812.0,
     }
     path.write_text(json.dumps(board_))
     return path
@@ -256,6 +307,7 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
     for kind in ("hard", "soft"):
         for seed in range(20):
             save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
+    monkeypatch.setattr(accuracy, "LEAVE_ONE_OUT_UP_TO", 0)
     monkeypatch.setattr(whole, "WINDOWS", (1.2,))
     monkeypatch.setattr(whole, "LOOKS", (0.4, 1.2))
     digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
@@ -265,6 +317,9 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
     text = report.read_text()
     assert "http" not in text.replace("http-equiv", "")
     assert "a board (here)" in text
+    assert "62 MB of memory, 812 ms from starting Python" in text
+    again = tradeoff([str(tmp_path / "data")], tmp_path / "2", str(path), scene_path=str(SCENE))
+    assert again.read_bytes() == report.read_bytes()
     for name in ("tradeoff.png", "early_category.png", "early_object.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader((out / "points.csv").read_text().splitlines()))

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from edge.track import FeatureSeries
 from train.crossval import votes_right
-from train.pipeline import principal_axes, scale_of
+from train.pipeline import Choice, principal_axes, scale_of
 from train.study.score import Labels, Result, best_cell
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
@@ -61,24 +61,45 @@ def nested(
     with threadpool_limits(1):
         for fold in range(int(folds.max()) + 1):
             train, test = everything[folds != fold], everything[folds == fold]
-            for task, (cell, hits) in _fold(X, classes, train, test, scaling, features).items():
-                cells[task][cell] += len(test)
-                right[task] += hits
+            for task, one in told(X, classes, train, test, scaling, features).items():
+                cells[task][one.choice.components, one.choice.k] += len(test)
+                right[task] += int(one.right.sum())
     found = {}
     for task in y:
-        (c, j), _ = min(cells[task].items(), key=lambda item: (-item[1], item[0]))
-        found[task] = Result(right[task], n, COMPONENTS[c], j + 1)
+        (components, k), _ = min(cells[task].items(), key=lambda item: (-item[1], item[0]))
+        found[task] = Result(right[task], n, components, k)
     return found
 
 
-def _fold(
+@dataclass(frozen=True)
+class Told:
+    """What one split of the trials gives of a task.
+
+    Attributes:
+        choice: the cell of the highest leave-one-out accuracy among the training trials.
+        right: (test,) whether its vote told the trial.
+    """
+
+    choice: Choice
+    right: NDArray[np.bool_]
+
+
+def told(
     X: NDArray[np.float64],
     classes: Mapping[str, NDArray[np.int64]],
     train: NDArray[np.int64],
     test: NDArray[np.int64],
     scaling: str,
     features: Sequence[str],
-) -> dict[str, tuple[tuple[int, int], int]]:
+) -> dict[str, Told]:
+    """Choose each task's cell among the training trials, and tell the test trials with it.
+
+    Args:
+        X: (n, p).
+        classes: {task: (n,) class indices}.
+        train, test: rows.
+        scaling, features: as for `nested`.
+    """
     _, gain = scale_of(X[train], scaling, features)
     mean = X[train].mean(axis=0)
     columns = np.repeat(gain, X.shape[1] // len(features))
@@ -102,8 +123,8 @@ def _fold(
         here = labels[train]
         grid = votes_right(np.array(among), here, here).mean(axis=1)
         c, j = best_cell(grid)
-        told = votes_right(seen[c], here, labels[test])
-        answers[task] = (c, j), int(told[:, j].sum())
+        right = votes_right(seen[c], here, labels[test])[:, j]
+        answers[task] = Told(Choice(scaling, COMPONENTS[c], j + 1), right)
     return answers
 
 
@@ -131,7 +152,7 @@ class Point:
 
     Attributes:
         task: what is told.
-        taxels, skin: of the skin, whole or pooled.
+        taxels: of the skin, whole or pooled.
         wire: how it is wired.
         features: what is measured.
         scaling: of the features.

@@ -18,14 +18,18 @@ class Board:
     Attributes:
         name: the machine.
         digest: SHA-256 over the recordings that the model was fitted on.
-        stages_s: {stage: median seconds}.
+        stages_us: {stage: (median, 99th percentile) in microseconds}.
+        memory_mb: the largest resident size.
+        cold_start_ms: from starting Python to a model that is ready.
         features: how many the model measures.
         model: SHA-256 of the model file.
     """
 
     name: str
     digest: str
-    stages_s: dict[str, float]
+    stages_us: dict[str, tuple[float, float]]
+    memory_mb: float
+    cold_start_ms: float
     features: int
     model: str
 
@@ -35,10 +39,8 @@ class Board:
         The decision itself is the benched model's, of all its tasks: fewer components or
         neighbours move it by microseconds.
         """
-        share = features / self.features
-        return (
-            self.stages_s["track"] + self.stages_s["features"] * share + self.stages_s["decision"]
-        )
+        track, vector, decision = (self.stages_us[stage][0] / 1e6 for stage in STAGES)
+        return track + vector * features / self.features + decision
 
 
 def read(path: str | os.PathLike[str]) -> Board:
@@ -58,13 +60,18 @@ def read(path: str | os.PathLike[str]) -> Board:
         board = Board(
             name=f"{found['machine']['kind']} ({found['machine']['name']})",
             digest=str(found["model"]["data_digest"]),
-            stages_s={stage: float(found["stages"][stage]["median_us"]) / 1e6 for stage in STAGES},
+            stages_us={
+                str(name): (float(stage["median_us"]), float(stage["p99_us"]))
+                for name, stage in found["stages"].items()
+            },
+            memory_mb=float(found["memory_mb"]),
+            cold_start_ms=float(found["cold_start_ms"]),
             features=len(found["model"]["features"]),
             model=str(found["model"]["sha256"]),
         )
-        if board.features < 1 or not all(0.0 < s < 1e3 for s in board.stages_s.values()):
+        if board.features < 1 or not all(0.0 < board.stages_us[s][0] < 1e9 for s in STAGES):
             raise ValueError("a stage takes no time")
-    except (KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, RecursionError, TypeError, ValueError):
         raise InputError(
             f"{name}: not a board file; make one with `edge-classify bench --out {name}`"
         ) from None

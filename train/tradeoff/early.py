@@ -12,8 +12,8 @@ from threadpoolctl import threadpool_limits
 from edge.candidates import ALARMS, Candidates
 from train.conformal import FEWEST, SequentialClassifier
 from train.conformal import FOLDS as CALIBRATION_FOLDS
-from train.pipeline import Choice
 from train.simulate.scene import Scene
+from train.tradeoff.accuracy import told
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
 FOLDS = 5
@@ -44,38 +44,42 @@ class Early:
 
 @dataclass(frozen=True)
 class Beside:
-    """Early stopping and fixed windows on the same trials with the same neighbours.
+    """Early stopping and fixed windows on the same trials.
 
     Attributes:
         looks_s: windows.
-        fixed: (looks,) share wrong at each window.
+        fixed: (looks,) share wrong at each window, with components and k chosen for that window.
         early: an entry an asked error.
         trials: held out in turn.
+        hindsight_s: mean of the first window from which on each trial is told as right or wrong
+            as at the full one: what no rule that stops on these answers could undercut.
     """
 
     looks_s: tuple[float, ...]
     fixed: NDArray[np.float64]
     early: list[Early]
     trials: int
+    hindsight_s: float
 
 
 def beside(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
-    choice: Choice,
     looks_s: Sequence[float],
     features: Sequence[str],
+    scaling: str = "IV",
 ) -> Beside:
-    """Five folds are held out in turn; the others train and calibrate.
+    """Five folds are held out in turn; the others choose, train and calibrate.
 
     Args:
         X: (looks, n, p).
         labels: (n,).
-        choice: of the task.
         looks_s: windows in seconds.
         features: names of the types.
+        scaling: of the features.
     """
     looks, n = X.shape[:2]
+    indices = {"task": np.unique(labels, return_inverse=True)[1]}
     fold_of = np.random.default_rng(1).permutation(n) % FOLDS
     right = np.zeros((looks, n), dtype=bool)
     outcomes: dict[float, list[tuple[bool, bool, bool, bool, bool, float]]] = {
@@ -83,18 +87,20 @@ def beside(
     }
     with threadpool_limits(1):
         for fold in range(FOLDS):
-            train, test = fold_of != fold, np.flatnonzero(fold_of == fold)
-            model = SequentialClassifier({"task": choice}, looks_s, features).fit(
+            train, test = np.flatnonzero(fold_of != fold), np.flatnonzero(fold_of == fold)
+            cells = [told(x, indices, train, test, scaling, features)["task"] for x in X]
+            right[:, test] = [cell.right for cell in cells]
+            model = SequentialClassifier({"task": cells[-1].choice}, looks_s, features).fit(
                 X[:, train], {"task": labels[train]}
             )
             calibration = model.calibrations_["task"]
-            classes = model.looks_[-1].classes_["task"]
-            said = np.array([m.predict(X[i, test])["task"] for i, m in enumerate(model.looks_)])
-            right[:, test] = said == labels[test]
+            last = model.looks_[-1]
+            classes = last.classes_["task"]
+            said = last.predict(X[-1, test])["task"]
             pvalues = [calibration.pvalues(i, X[i, test]) for i in range(looks)]
             for place, trial in enumerate(test):
                 seen = [p[place] for p in pvalues]
-                favourite = int(np.searchsorted(classes, said[-1, place]))
+                favourite = int(np.searchsorted(classes, said[place]))
                 for error in ERRORS:
                     outcomes[error].append(
                         _decide(seen, error, classes, labels[trial], favourite, looks_s)
@@ -103,7 +109,14 @@ def beside(
     for error, rows in outcomes.items():
         table = np.array(rows, dtype=np.float64).mean(axis=0)
         early.append(Early(error, *table.tolist()))
-    return Beside(tuple(looks_s), 1.0 - right.mean(axis=1), early, n)
+    return Beside(tuple(looks_s), 1.0 - right.mean(axis=1), early, n, hindsight(right, looks_s))
+
+
+def hindsight(right: NDArray[np.bool_], looks_s: Sequence[float]) -> float:
+    """Mean seconds to the first look from which on `right` (looks, n) stays what it ends as."""
+    same = right == right[-1]
+    stays = np.logical_and.accumulate(same[::-1])[::-1]
+    return float(np.array(looks_s)[stays.argmax(axis=0)].mean())
 
 
 @dataclass(frozen=True)
@@ -124,32 +137,34 @@ class Strangers:
 def strangers(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
-    choice: Choice,
     looks_s: Sequence[float],
     features: Sequence[str],
+    scaling: str = "IV",
     error: float = 0.2,
     rates: Sequence[float] = (ALARMS, 0.1, 0.2),
 ) -> list[Strangers]:
     """A third of the labels is left out whole, in turn; a fifth of the others' trials is held out.
 
     Args:
-        X, labels, choice, looks_s, features: as for `beside`.
+        X, labels, looks_s, features, scaling: as for `beside`.
         error: asked for.
         rates: of false alarms asked for.
 
     Returns:
         An entry a rate; none where too few trials are left to calibrate with.
     """
-    names = np.unique(labels)
+    names, places = np.unique(labels, return_inverse=True)
+    indices = {"task": places}
     held = np.random.default_rng(2).permutation(len(labels)) % FOLDS == 0
     counts = {rate: np.zeros((2, 2), dtype=int) for rate in rates}
     with threadpool_limits(1):
         for third in range(3):
             strange = np.isin(labels, names[third::3])
-            train = ~strange & ~held
-            if len(np.unique(labels[train])) < 2 or train.sum() < FEWEST * CALIBRATION_FOLDS:
+            train = np.flatnonzero(~strange & ~held)
+            if len(np.unique(labels[train])) < 2 or len(train) < FEWEST * CALIBRATION_FOLDS:
                 continue
-            model = SequentialClassifier({"task": choice}, looks_s, features).fit(
+            cell = told(X[-1], indices, train, train[:0], scaling, features)["task"]
+            model = SequentialClassifier({"task": cell.choice}, looks_s, features).fit(
                 X[:, train], {"task": labels[train]}
             )
             calibration = model.calibrations_["task"]
@@ -208,17 +223,30 @@ def fixed_time(found: Beside, wrong: float) -> float | None:
     )
 
 
-def saved(found: Beside, early: Early) -> float | None:
-    """Share of time saved against the shortest fixed window that is as accurate; or None."""
+def saved(found: Beside, early: Early) -> float:
+    """Share of time saved against the shortest fixed window that is as accurate.
+
+    Where none is, the full window stands in: it takes longer and is less accurate, so that the
+    share is a lower bound.
+    """
     fixed = fixed_time(found, early.wrong)
-    return None if fixed is None else 1.0 - early.mean_s / fixed
+    return 1.0 - early.mean_s / (found.looks_s[-1] if fixed is None else fixed)
+
+
+def at_full_accuracy(found: Beside) -> tuple[float, Early] | None:
+    """The most time saved, against the full window, by an asked error no less accurate than it."""
+    able = [one for one in found.early if one.wrong <= found.fixed[-1]]
+    if not able:
+        return None
+    quickest = min(able, key=lambda one: one.mean_s)
+    return 1.0 - quickest.mean_s / found.looks_s[-1], quickest
 
 
 def floors(scene: Scene) -> dict[str, float]:
     """{object: seconds} before which an object that can move does not: mu_s m g / (k v).
 
     What is narrow and high tips before it slides: where its base over twice the contact's height
-    is less than mu_s, it takes mu_s's place.
+    is less than mu_s, it takes mu_s's place. Values are the middles of the scene's.
 
     k is the arm's stiffness at the contact along its motion, v the speed of its equilibrium
     point there; the spring between them is all that pushes. What is soft besides only delays.

@@ -47,7 +47,7 @@ def read(path: Path) -> tuple[str, list[Deal]]:
         task = str(found["task"])
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, RecursionError, TypeError, ValueError):
         raise InputError(f"{path}: not a front.json; make one with `make tradeoff`") from None
     if not deals or not all(deal.scaling in SCALINGS for deal in deals):
         raise InputError(f"{path}: has no point to choose from; make one with `make tradeoff`")

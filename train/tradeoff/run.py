@@ -18,14 +18,12 @@ from edge.files import write_whole
 from edge.layout import SkinLayout
 from edge.recording import load
 from edge.track import FeatureSeries
-from train.crossval import choose
 from train.dataset import DataSet, load_trials
 from train.simulate import scene as scenes
 from train.study import skins
-from train.study.context import Figure, Section, Table
 from train.study.report import write
 from train.tradeoff import board as boards
-from train.tradeoff import early, plots
+from train.tradeoff import early, sections
 from train.tradeoff.accuracy import Point, front, nested, thinned
 from train.tradeoff.wires import Wire, wires
 
@@ -75,10 +73,11 @@ def tradeoff(
     best = {task: front([p for p in points if p.task == task]) for task in dataset.tasks}
     both, finest, strange = _early(dataset, jobs)
     floors = {} if scene is None else early.floors(scene)
-    sections = [
-        _deals(points, best, main, board),
-        _stopping(both, floors, main),
-        *([_unknown(finest, strange)] if strange else []),
+    parts = [
+        sections.deals(points, best, main, board, floors, is_paper),
+        sections.stopping(both, floors, main),
+        *([sections.unknown(finest, strange)] if strange else []),
+        sections.arithmetic(board),
     ]
     lead = [
         f"{len(dataset.trials)} trials, {len(points)} points. Time runs from onset to "
@@ -89,7 +88,7 @@ def tradeoff(
         f"{board.model[:12]}. Wire times are counted from the drivers' own transactions over a "
         "counting bus.",
     ]
-    report = write(out, "What accuracy costs in time", lead, sections)
+    report = write(out, "What accuracy costs in time", lead, parts)
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(fronts(points, main, board.name), indent=1).encode() + b"\n")
     return report
@@ -170,180 +169,19 @@ def _early(
     """Early stopping of every task; the finest task, and things left out whole in it."""
     X = np.stack([dataset.features(window) for window in LOOKS])
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    chosen = {
-        task: found.choice for task, found in choose(X[-1], y, scalings=["IV"], jobs=jobs).items()
-    }
     finest = max(y, key=lambda task: len(set(y[task])))
-    work = (delayed(early.beside)(X, y[task], chosen[task], LOOKS, FEATURES) for task in y)
+    work = (delayed(early.beside)(X, y[task], LOOKS, FEATURES) for task in y)
     found = dict(zip(y, Parallel(n_jobs=jobs)(work), strict=True))
-    return found, finest, early.strangers(X, y[finest], chosen[finest], LOOKS, FEATURES)
+    return found, finest, early.strangers(X, y[finest], LOOKS, FEATURES)
 
 
-def _deals(
-    points: Sequence[Point], best: dict[str, list[Point]], main: str, board: boards.Board
-) -> Section:
-    arithmetic = max(p.arithmetic_s / p.seconds for p in points)
-    wire = max(p.wire_s / p.seconds for p in points)
-    picture = plots.deals([p for p in points if p.task == main], best[main], main, paper_point)
-    columns = (
-        "task", "taxels", "wire", "features", "scaling", "components", "k",
-        "window ms", "wire ms", "arithmetic ms", "time ms",
-        "accuracy %", "low %", "high %", "front", "paper's point",
-    )  # fmt: skip
-    every = Table("points", "Every point", columns, [])
-    few = Table("front", "The best deals: no other is faster and as accurate", columns, [])
-    for point in sorted(points, key=lambda p: (p.task != main, p.task, p.seconds)):
-        low, high = point.result.interval
-        row = (
-            point.task,
-            point.taxels,
-            point.wire,
-            " ".join(point.features),
-            point.scaling,
-            point.components,
-            point.k,
-            round(1e3 * point.window_s, 1),
-            round(1e3 * point.wire_s, 2),
-            round(1e3 * point.arithmetic_s, 3),
-            round(1e3 * point.seconds, 1),
-            round(100 * point.result.accuracy, 2),
-            round(100 * low, 1),
-            round(100 * high, 1),
-            "yes" if point in best[point.task] else "",
-            "yes" if paper_point(point) else "",
-        )
-        every.rows.append(row)
-        if row[-1] or row[-2]:
-            few.rows.append(row)
-    return Section(
-        "Every setting, and the best deals",
-        [
-            "A pooled skin's larger taxels carry the sum of their parts' forces; a wire that "
-            "carries fewer frames a second than were recorded gets every second, third, ... of "
-            "them, and its accuracy is that of those frames.",
-            f"Arithmetic on {board.name} takes at most {100 * arithmetic:.2g} % of a point's time, "
-            f"the wire at most {100 * wire:.2g} %: what is paid for accuracy is waiting.",
-        ],
-        [few, every],
-        [Figure("tradeoff", f"Accuracy against time to decision: {main}", picture)],
-    )
-
-
-def paper_point(point: Point) -> bool:
+def is_paper(point: Point) -> bool:
     """The paper's setting, on the wire that carries its 100 frames a second."""
     return (
         point.whole
         and (point.scaling, point.window_s) == PAPER
         and point.features == FEATURES
         and point.wire.startswith("AD7147, 3")
-    )
-
-
-def _stopping(both: dict[str, early.Beside], floors: dict[str, float], main: str) -> Section:
-    table = Table(
-        "early",
-        "As soon as it is sure",
-        (
-            "task",
-            "asked error %",
-            "true label lost %",
-            "sure and wrong %",
-            "wrong %",
-            "unsure %",
-            "unknown %",
-            "mean time ms",
-            "as accurate fixed window ms",
-            "time saved %",
-        ),
-    )
-    fixed = Table("fixed", "Fixed windows on the same trials", ("task", "window ms", "wrong %"))
-    text = []
-    for task, found in both.items():
-        gains = []
-        for one in found.early:
-            window, gain = early.fixed_time(found, one.wrong), early.saved(found, one)
-            if gain is not None:
-                gains.append((gain, one))
-            table.rows.append(
-                (
-                    task,
-                    round(100 * one.asked, 1),
-                    *(
-                        round(100 * share, 1)
-                        for share in (
-                            one.struck,
-                            one.sure_wrong,
-                            one.wrong,
-                            one.unsure,
-                            one.unknown,
-                        )
-                    ),
-                    round(1e3 * one.mean_s),
-                    "" if window is None else round(1e3 * window),
-                    "" if gain is None else round(100 * gain, 1),
-                )
-            )
-        fixed.rows += [
-            (task, round(1e3 * s), round(100 * wrong, 1))
-            for s, wrong in zip(found.looks_s, found.fixed.tolist(), strict=True)
-        ]
-        if gains:
-            gain, one = max(gains, key=lambda pair: pair[0])
-            text.append(
-                f"{task}: at best {100 * gain:.0f} % of the time is saved at equal accuracy, at an "
-                f"asked error of {100 * one.asked:g} %: {1e3 * one.mean_s:.0f} ms on average with "
-                f"{100 * one.wrong:.1f} % wrong."
-            )
-        else:
-            text.append(f"{task}: no asked error reached a fixed window's accuracy.")
-    if floors:
-        slow = sorted(floors.items(), key=lambda item: item[1])
-        text.append(
-            "The floor, mu_s m g / (k v), before which an object that can move does not: "
-            + ", ".join(f"{name} {1e3 * s:.0f} ms" for name, s in slow)
-            + "."
-        )
-    figures = [
-        Figure(
-            f"early_{task}",
-            f"Mean time to decision against error: {task}",
-            plots.stopping(found, floors, task),
-        )
-        for task, found in sorted(both.items(), key=lambda item: item[0] != main)
-    ]
-    return Section("As soon as it is sure", text, [table, fixed], figures)
-
-
-def _unknown(task: str, found: list[early.Strangers]) -> Section:
-    table = Table(
-        "unknown",
-        f"Called unknown, of {task}",
-        (
-            "false alarms asked for %",
-            "known trials",
-            "of them unknown %",
-            "strange trials",
-            "of them unknown %",
-        ),
-        [
-            (
-                round(100 * one.alarms, 1),
-                one.known[0],
-                round(100 * one.known[1] / one.known[0], 1),
-                one.strange[0],
-                round(100 * one.strange[1] / one.strange[0], 1),
-            )
-            for one in found
-        ],
-    )
-    return Section(
-        "Unlike anything trained",
-        [
-            f"A third of the labels of {task} is left out whole, in turn. At an asked error of "
-            "20 %, a contact is unknown where no label is left, or where it lies farther from all "
-            "training trials than the false alarms asked for allow."
-        ],
-        [table],
     )
 
 

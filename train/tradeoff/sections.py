@@ -1,0 +1,216 @@
+"""The report's sections: every setting, early stopping, the unknown, and the board."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from train.study.context import Figure, Section, Table
+from train.tradeoff import early, plots
+from train.tradeoff.accuracy import Point
+from train.tradeoff.board import Board
+
+
+def deals(
+    points: Sequence[Point],
+    best: Mapping[str, list[Point]],
+    main: str,
+    board: Board,
+    floors: Mapping[str, float],
+    is_paper: Callable[[Point], bool],
+) -> Section:
+    """Every point, and of each task those that no other beats.
+
+    Args:
+        points: of all tasks.
+        best: {task: its front}.
+        main: the task of the picture.
+        board: whose arithmetic it is.
+        floors: {object: seconds} of static friction, for the picture.
+        is_paper: whether a point is the paper's.
+    """
+    arithmetic = max(p.arithmetic_s / p.seconds for p in points)
+    wire = max(p.wire_s / p.seconds for p in points)
+    picture = plots.deals(
+        [p for p in points if p.task == main], best[main], main, is_paper, floors, board.name
+    )
+    columns = (
+        "task", "taxels", "wire", "features", "scaling", "components", "k",
+        "window ms", "wire ms", "arithmetic ms", "time ms",
+        "accuracy %", "low %", "high %", "front", "paper's point",
+    )  # fmt: skip
+    every = Table("points", "Every point", columns, [])
+    few = Table("front", "The best deals, and the paper's point", columns, [])
+    for point in sorted(points, key=lambda p: (p.task != main, p.task, p.seconds)):
+        low, high = point.result.interval
+        row = (
+            point.task,
+            point.taxels,
+            point.wire,
+            " ".join(point.features),
+            point.scaling,
+            point.components,
+            point.k,
+            round(1e3 * point.window_s, 1),
+            round(1e3 * point.wire_s, 2),
+            round(1e3 * point.arithmetic_s, 3),
+            round(1e3 * point.seconds, 1),
+            round(100 * point.result.accuracy, 2),
+            round(100 * low, 1),
+            round(100 * high, 1),
+            "yes" if point in best[point.task] else "",
+            "yes" if is_paper(point) else "",
+        )
+        every.rows.append(row)
+        if row[-1] or row[-2]:
+            few.rows.append(row)
+    return Section(
+        "Every setting, and the best deals",
+        [
+            "A best deal is a point than which no other is both as fast and as accurate. The best "
+            "of many settings flatters: where intervals overlap, the cheaper one may be as good.",
+            "A pooled skin's larger taxels carry the sum of their parts' forces; a wire that "
+            "carries fewer frames a second than were recorded gets every second, third, ... of "
+            "them, and its accuracy is that of those frames.",
+            f"Arithmetic on {board.name} takes at most {100 * arithmetic:.2g} % of a point's time, "
+            f"the wire at most {100 * wire:.2g} %: what is paid for accuracy is waiting.",
+        ],
+        [few, every],
+        [Figure("tradeoff", f"Accuracy against time to decision: {main}", picture)],
+    )
+
+
+def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main: str) -> Section:
+    """Early stopping of every task beside its fixed windows."""
+    table = Table(
+        "early",
+        "As soon as it is sure",
+        (
+            "task",
+            "asked error %",
+            "true label lost %",
+            "sure and wrong %",
+            "wrong %",
+            "unsure %",
+            "unknown %",
+            "mean time ms",
+            "fixed window as accurate ms",
+            "time saved %",
+        ),
+    )
+    fixed = Table("fixed", "Fixed windows on the same trials", ("task", "window ms", "wrong %"))
+    for task, found in both.items():
+        for one in found.early:
+            window = early.fixed_time(found, one.wrong)
+            shares = one.struck, one.sure_wrong, one.wrong, one.unsure, one.unknown
+            table.rows.append(
+                (
+                    task,
+                    round(100 * one.asked, 1),
+                    *(round(100 * share, 1) for share in shares),
+                    round(1e3 * one.mean_s),
+                    "none" if window is None else round(1e3 * window),
+                    round(100 * early.saved(found, one), 1),
+                )
+            )
+        fixed.rows += [
+            (task, round(1e3 * s), round(100 * wrong, 1))
+            for s, wrong in zip(found.looks_s, found.fixed.tolist(), strict=True)
+        ]
+    text = [
+        "Five folds are held out in turn; the others choose components and k, train and "
+        "calibrate. A fixed window's components and k are chosen for that window. An unknown "
+        "contact counts as wrong; an unsure one by its best label. Where no fixed window is as "
+        "accurate, time saved is against the full one: at least so much.",
+        *(_headline(task, found) for task, found in both.items()),
+    ]
+    if floors:
+        text.append(
+            "The floor, mu_s m g / (k v) at the middle of each object's friction and mass: before "
+            "it, an object that can move stands still, and looks like one that cannot."
+        )
+    figures = [
+        Figure(
+            f"early_{task}",
+            f"Mean time to decision against error: {task}",
+            plots.stopping(found, floors, task),
+        )
+        for task, found in sorted(both.items(), key=lambda item: item[0] != main)
+    ]
+    return Section("As soon as it is sure", text, [table, fixed], figures)
+
+
+def _headline(task: str, found: early.Beside) -> str:
+    full = found.looks_s[-1]
+    most = max(found.early, key=lambda one: early.saved(found, one))
+    parts = [
+        f"{task}: at most {100 * early.saved(found, most):.0f} % of the time is saved at equal "
+        f"accuracy, at an asked error of {100 * most.asked:g} %: {1e3 * most.mean_s:.0f} ms on "
+        f"average, {100 * most.wrong:.1f} % wrong."
+    ]
+    at_full = early.at_full_accuracy(found)
+    if at_full is None:
+        parts.append(
+            f"No asked error is as accurate as the full window, {100 * found.fixed[-1]:.1f} % "
+            "wrong."
+        )
+    else:
+        gain, one = at_full
+        parts.append(
+            f"No less accurate than the full window, {100 * found.fixed[-1]:.1f} % wrong, "
+            f"{100 * gain:.0f} % is saved at an asked error of {100 * one.asked:g} %."
+        )
+    parts.append(
+        "In hindsight, stopping each trial once its answer stays as right or wrong as it ends, "
+        f"{100 * (1 - found.hindsight_s / full):.0f} % of the full window could be saved."
+    )
+    return " ".join(parts)
+
+
+def unknown(task: str, found: Sequence[early.Strangers]) -> Section:
+    """How often contacts with known and with strange things are called unknown."""
+    table = Table(
+        "unknown",
+        f"Called unknown, of {task}",
+        (
+            "false alarms asked for %",
+            "known trials",
+            "false alarms measured %",
+            "strange trials",
+            "detected %",
+        ),
+        [
+            (
+                round(100 * one.alarms, 1),
+                one.known[0],
+                round(100 * one.known[1] / one.known[0], 1),
+                one.strange[0],
+                round(100 * one.strange[1] / one.strange[0], 1),
+            )
+            for one in found
+        ],
+    )
+    return Section(
+        "Unlike anything trained",
+        [
+            f"A third of the labels of {task} is left out whole, in turn: those trials are "
+            "strange. Known ones are held out, but their label is trained. At an asked error of "
+            "20 %, a contact is unknown where no label is left, or where it lies farther from all "
+            "training trials than the false alarms asked for allow."
+        ],
+        [table],
+    )
+
+
+def arithmetic(board: Board) -> Section:
+    """What the board file says."""
+    rows = [(name, median, p99) for name, (median, p99) in board.stages_us.items()]
+    return Section(
+        "The board",
+        [
+            f"{board.name}, by edge-classify bench with the model {board.model[:12]}: "
+            f"{board.memory_mb:.0f} MB of memory, {board.cold_start_ms:.0f} ms from starting "
+            "Python to a model that is ready. A point's arithmetic is the medians of track, "
+            "features and decision."
+        ],
+        [Table("board", "Stages", ("stage", "median us", "99th percentile us"), rows)],
+    )
