@@ -18,16 +18,17 @@ from train.simulate import scene as scenes
 from train.study import beyond, classify, honest, paper, report, resolution, robust
 from train.study.context import Context, Section
 
-SECTIONS: tuple[Callable[[Context], Section | None], ...] = (
+SECTIONS: tuple[Callable[[Context], Section], ...] = (
     classify.confusion,
     resolution.section,
     classify.window,
     classify.scaling,
     classify.features,
     honest.section,
-    robust.section,
     beyond.section,
 )
+PAPER = 5
+"""Where the paper's numbers are shown: after all that they are set beside."""
 LONGEST_S = 2.0
 FEWEST = 20
 """Trials below which a grid of 20 components makes no sense."""
@@ -66,9 +67,13 @@ def study(
     context = Context(dataset, recordings, source, jobs)
     with _cluster(address) as backend:
         context.cluster = backend
-        sections = [found for part in SECTIONS if (found := part(context)) is not None]
+        # First, as it is what finds out whether the scene is that of the recordings.
+        others = robust.section(context)
+        sections = [part(context) for part in SECTIONS]
     if source is not None:
-        sections.insert(5, paper.section(context))
+        sections.insert(PAPER, paper.section(context))
+    if others is not None:
+        sections.insert(PAPER + 2, others)
     took = time.perf_counter() - began
     layout = dataset.layout
     lead = [
