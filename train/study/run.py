@@ -65,6 +65,12 @@ def study(
         )
     recordings = [load(trial.path) for trial in dataset.trials]
     context = Context(dataset, recordings, source, jobs)
+    alike = [task for task in dataset.tasks if task not in context.labels]
+    if not context.labels:
+        raise InputError(
+            f"every trial has the same {' and the same '.join(alike)}: there is nothing to tell "
+            "apart; give recordings of two classes or more"
+        )
     with _cluster(address) as backend:
         context.cluster = backend
         # First, as it is what finds out whether the scene is that of the recordings.
@@ -87,8 +93,10 @@ def study(
             else "Recorded, or simulated elsewhere."
         ),
         "Accuracies are of leave-one-out cross-validation unless said otherwise, with 95 % "
-        "binomial (Wilson) intervals. Nothing was tuned to the paper's tables here.",
+        "binomial (Wilson) intervals.",
     ]
+    if alike:
+        lead.append(f"Left out, as every trial has the same: {', '.join(alike)}.")
     if dataset.untouched:
         lead.append(f"{len(dataset.untouched)} recordings without a contact are left out.")
     title = "What a touch tells: " + (source.name if source is not None else Path(data[0]).name)
