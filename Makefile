@@ -86,6 +86,9 @@ golden: $(READY)
 	$(BIN)/python -m tests.golden.make
 
 # The README's picture.
+docs/tradeoff.png: tradeoff
+	cp $(OUT)/tradeoff/tradeoff.png $@
+
 docs/touch.png: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
 	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --scene --out $@

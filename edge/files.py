@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,6 +27,8 @@ def write_whole(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iter
     temporary: str | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        import tempfile  # most commands write nothing
+
         handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         with os.fdopen(handle, "wb") as file:
             yield file

@@ -195,7 +195,7 @@ class Watcher:
             if raised
         ]
         try:
-            decisions = self.model.decide(vector, look)
+            decisions = self.model.decide(vector, None if self.error is None else look)
         except InputError:
             answers = {
                 task: {"label": None, "confidence": 0.0, "flags": [*flags, "out_of_range"]}

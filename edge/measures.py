@@ -10,7 +10,6 @@ pads of a hand, the two sides of a forearm). What is weighted is weighted by for
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -115,6 +114,8 @@ def feature(name: str) -> Feature:
     place, _, quantity = base.partition("_")
     if place in PLACES and quantity in QUANTITIES and base != "contact_max_force":
         return Feature(name, place, quantity, rate=base != name)
+    import difflib  # a slow board starts sooner without it
+
     near = difflib.get_close_matches(base, names(), 3) or names()[:3]
     raise InputError(f"there is no feature {name!r}; the nearest are {', '.join(near)}")
 

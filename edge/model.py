@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,8 @@ from edge.track import TrackSettings
 METADATA_KEY = "edge-classify"
 FORMAT = 1
 LARGEST_BYTES = 1 << 30
+NO_LOOK = -1
+"""Asks the graph for the full window, and not for p-values."""
 
 
 @dataclass(frozen=True)
@@ -167,8 +169,7 @@ class ModelInfo:
             raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
 
 
-@dataclass(frozen=True)
-class Decision:
+class Decision(NamedTuple):
     """The answer to one task.
 
     Attributes:
@@ -178,7 +179,7 @@ class Decision:
         distances: (k,) of the neighbours, nearest first, in PCA space.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
-        pvalues: (folds, labels + 1) of a model with looks, at this one; see `edge.candidates`.
+        pvalues: (folds, labels + 1) at the look that was asked for; see `edge.candidates`.
     """
 
     label: str
@@ -200,8 +201,7 @@ class Model:
     def __init__(self, path: str | os.PathLike[str], *, threads: int = 1) -> None:
         """Load the file; one thread is fastest for models of this size."""
         name = os.fspath(path)
-        data = _read(name)
-        contents = onnxfile.check(data, name)
+        contents, checked = _contents(name)
         text = contents.metadata.get(METADATA_KEY)
         if text is None:
             raise InputError(
@@ -214,20 +214,28 @@ class Model:
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
+        # The exported graph has nothing left to optimise, and the board's memory is dear.
+        options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_DISABLE_ALL
+        options.enable_cpu_mem_arena = False
         try:
+            # By its name: from bytes, it would hold the file in memory twice, and keep one.
             self._session = runtime.InferenceSession(
-                data, options, providers=["CPUExecutionProvider"]
+                name, options, providers=["CPUExecutionProvider"]
             )
         except Exception as error:  # onnxruntime's own exceptions share no base but this
             raise InputError(
                 f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
             ) from None
+        if not _is(name, checked):
+            raise InputError(f"{name}: was changed while it was read; start again")
         self._check(name)
         self._names = [output.name for output in self._session.get_outputs()]
         # Input and outputs are arrays of ours that ONNX Runtime reads and writes in place: a
         # decision then allocates next to nothing.
-        self._input = np.zeros((1, self.info.width))
-        self._outputs = {
+        self._shape = (self.info.width,)
+        self._input = np.zeros((1, *self._shape))
+        self._look = np.full(1, NO_LOOK, dtype=np.int64)
+        outputs: dict[str, NDArray[Any]] = {
             output.name: np.zeros(
                 [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
             )
@@ -236,11 +244,22 @@ class Model:
         self._binding = self._session.io_binding()
         value = runtime.OrtValue.ortvalue_from_numpy
         self._binding.bind_ortvalue_input("features", value(self._input))
-        self._look = np.full(1, max(len(self.info.looks_s) - 1, 0), dtype=np.int64)
         if self.info.looks_s:
             self._binding.bind_ortvalue_input("look", value(self._look))
-        for output, array in self._outputs.items():
+        for output, array in outputs.items():
             self._binding.bind_ortvalue_output(output, value(array))
+        self._answers = [
+            _Answer(
+                task,
+                entry.labels,
+                outputs[f"{task}_label"],
+                outputs[f"{task}_scores"][0],
+                outputs[f"{task}_distances"][0],
+                outputs[f"{task}_neighbours"][0],
+                outputs[f"{task}_pvalues"][0] if self.info.looks_s else None,
+            )
+            for task, entry in self.info.tasks.items()
+        ]
 
     def _check(self, name: str) -> None:
         inputs = self._session.get_inputs()
@@ -305,37 +324,35 @@ class Model:
 
         Args:
             vector: (width,) measured over the window of the look.
-            look: place in `looks_s`; the last, the full window, where None.
+            look: place in `looks_s`, to know the p-values there; the full window without them
+                where None.
 
         Raises:
             InputError: the vector has another length, or a value that is not finite (or is so
                 large that no distance to the training rows is); the model has no such look.
         """
         x = np.asarray(vector, dtype=np.float64)
-        if x.shape != (self.info.width,):
+        if x.shape != self._shape:
             raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
         self._input[0] = x
-        self._look[0] = self._place(look)
+        self._look[0] = NO_LOOK if look is None else self._place(look)
         self._session.run_with_iobinding(self._binding)
-        return {name: self._decision(name, task, x) for name, task in self.info.tasks.items()}
-
-    def _decision(self, name: str, task: Task, x: NDArray[np.float64]) -> Decision:
-        outputs = self._outputs
-        index = int(outputs[f"{name}_label"][0])
-        if index < 0:
-            raise self._refusal(x)
-        scores = outputs[f"{name}_scores"][0].copy()
-        shares = scores.tolist()
-        confidence = shares[index]
-        return Decision(
-            label=task.labels[index],
-            confidence=confidence,
-            scores=scores,
-            distances=outputs[f"{name}_distances"][0].copy(),
-            neighbours=outputs[f"{name}_neighbours"][0].copy(),
-            tie=shares.count(confidence) > 1,
-            pvalues=outputs[f"{name}_pvalues"][0].copy() if self.info.looks_s else None,
-        )
+        decisions: dict[str, Decision] = {}
+        for name, labels, label, scores, distances, neighbours, pvalues in self._answers:
+            index = int(label[0])
+            if index < 0:
+                raise self._refusal(x)
+            shares = scores.tolist()
+            decisions[name] = Decision(
+                labels[index],
+                shares[index],
+                scores.copy(),
+                distances.copy(),
+                neighbours.copy(),
+                shares.count(shares[index]) > 1,
+                None if look is None or pvalues is None else pvalues.copy(),
+            )
+        return decisions
 
     def _refusal(self, x: NDArray[np.float64]) -> InputError:
         """Why the graph answered -1: it does so for every vector it cannot measure."""
@@ -348,9 +365,23 @@ class Model:
         return InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
 
 
-def _read(name: str) -> bytes:
+class _Answer(NamedTuple):
+    """A task, and the arrays that ONNX Runtime writes its answer to."""
+
+    task: str
+    labels: tuple[str, ...]
+    label: NDArray[np.int64]
+    scores: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    neighbours: NDArray[np.int64]
+    pvalues: NDArray[np.float64] | None
+
+
+def _contents(name: str) -> tuple[onnxfile.Contents, os.stat_result]:
+    """What the file holds, checked, and which file that was."""
     try:
         with open(name, "rb") as file:
+            stat = os.fstat(file.fileno())
             data = file.read(LARGEST_BYTES + 1)
     except FileNotFoundError:
         raise InputError(f"{name}: no such model; make one with `make export`") from None
@@ -358,7 +389,19 @@ def _read(name: str) -> bytes:
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
     if len(data) > LARGEST_BYTES:
         raise InputError(f"{name}: is larger than any model; copy or export it again")
-    return data
+    return onnxfile.check(data, name), stat
+
+
+def _is(name: str, stat: os.stat_result) -> bool:
+    """The file is still the one that was checked, unchanged."""
+    try:
+        now = os.stat(name)
+    except OSError:
+        return False
+    return all(
+        getattr(now, part) == getattr(stat, part)
+        for part in ("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
+    )
 
 
 def _onnxruntime() -> Any:

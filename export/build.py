@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import onnx
 from numpy.typing import NDArray
-from onnx import helper, numpy_helper
+from onnx import TensorProto, helper, numpy_helper
 
 OPSET = 18
 
@@ -37,12 +37,22 @@ class Builder:
             self._constants[key] = name
         return self._constants[key]
 
+    def ints(self, *values: int) -> str:
+        """Name of a constant (n,) of axes, places or counts."""
+        return self.constant(values, np.int64)
+
     def by_look(self, values: Sequence[Any], dtype: Any = np.float64) -> str:
         """Name of the value of the look that is asked for: one of the stacked constants."""
         if len(values) == 1:
             return self.constant(values[0], dtype)
         stack = self.constant(np.stack(values), dtype)
         return self.node("Gather", [stack, self.look], axis=0)
+
+    def by_look_small(self, values: Sequence[Any]) -> str:
+        """As `by_look` in float64, of numbers that float32 holds exactly: half the memory."""
+        small = [np.asarray(value).astype(np.float32) for value in values]
+        assert all((a == b).all() for a, b in zip(small, values, strict=True))
+        return self.node("Cast", [self.by_look(small, np.float32)], to=TensorProto.DOUBLE)
 
     def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
         """Add an operator of one output and return its name."""
@@ -62,21 +72,22 @@ class Builder:
             )
         return names
 
-    def branch(self, name: str, outputs: dict[str, Any], make: Any) -> onnx.GraphProto:
+    def branch(self, name: str, outputs: dict[str, tuple[Any, int]], make: Any) -> onnx.GraphProto:
         """The graph of what `make()` adds; it returns the outputs' names in order.
 
         Args:
             name: of the graph.
-            outputs: {name: tensor type}, each (rows, columns).
+            outputs: {name: (tensor type, number of axes)}.
             make: adds nodes to this builder.
         """
         self._branch = []
         made = make()
+        inside = {output for node in self._branch for output in node.output}
         infos = []
-        for seen, (wanted, kind) in zip(made, outputs.items(), strict=True):
-            unique = self._scope.get_unique_variable_name(wanted)
-            self.node("Identity", [seen], unique)
-            infos.append(helper.make_tensor_value_info(unique, kind, [None, None]))
+        for seen, (wanted, (kind, axes)) in zip(made, outputs.items(), strict=True):
+            if seen not in inside:
+                seen = self.node("Identity", [seen], self._scope.get_unique_variable_name(wanted))
+            infos.append(helper.make_tensor_value_info(seen, kind, [None] * axes))
         nodes, self._branch = self._branch, None
         return helper.make_graph(nodes, name, [], infos)
 
@@ -103,8 +114,10 @@ def project(build: Builder, x: str, looks: Sequence[Affine]) -> str:
         halves.append(half)
         if step == grids[0]:
             d = build.node("Sub", [d, half])
-    weights = build.by_look(widened([p.weights for p in looks]))
-    high, low = (build.node("MatMul", [half, weights]) for half in halves)
+    weights = widened([p.weights for p in looks])
+    # Components are multiples of 2^-WEIGHT_BITS, which float32 holds.
+    weighing = build.by_look(weights) if len(weights) == 1 else build.by_look_small(weights)
+    high, low = (build.node("MatMul", [half, weighing]) for half in halves)
     return build.node("Add", [high, low])
 
 

@@ -35,15 +35,16 @@ FLOAT32_FIT = (2.0**-16, 2.0**16)
 """Lengths of rows whose float32 squares and products need no scaling."""
 
 
-def _measured(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k: int) -> list[str]:
-    """Squared distances and rows (n, k) of the nearest, every row measured directly."""
+def _gaps(build: Builder, z: str, rows: Sequence[NDArray[np.float64]]) -> str:
+    """Differences (n, c, rows) of the training rows (rows, c) from points (n, c)."""
     columns = build.by_look([r.T for r in rows])  # (c, rows): sums over c then run along memory
-    point = build.node("Unsqueeze", [z, build.constant([2], np.int64)])
-    gaps = build.node("Sub", [columns, point])
-    squares = build.node("ReduceSumSquare", [gaps, build.constant([1], np.int64)], keepdims=0)
-    return build.nodes(
-        "TopK", [squares, build.constant([k], np.int64)], ["", ""], largest=0, sorted=1
-    )
+    return build.node("Sub", [columns, build.node("Unsqueeze", [z, build.ints(2)])])
+
+
+def _nearest(build: Builder, gaps: str, k: int, outputs: tuple[str, str] = ("", "")) -> list[str]:
+    """Squared distances and rows (n, k) of the nearest, every row measured directly."""
+    squares = build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)
+    return build.nodes("TopK", [squares, build.ints(k)], list(outputs), largest=0, sorted=1)
 
 
 def _unit(rows: NDArray[np.float64]) -> float:
@@ -57,8 +58,14 @@ def _unit(rows: NDArray[np.float64]) -> float:
     return math.ldexp(1.0, 1 - math.frexp(longest)[1])
 
 
-def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k: int) -> list[str]:
-    """As `_measured`, where a float32 product first picks the rows worth measuring.
+def _shortlisted(
+    build: Builder,
+    z: str,
+    rows: Sequence[NDArray[np.float64]],
+    k: int,
+    outputs: tuple[str, str] = ("", ""),
+) -> list[str]:
+    """As `_nearest`, where a float32 product first picks the rows worth measuring.
 
     With b a training row and q the query, |b - q|^2 - |q|^2 = |b|^2 - 2 b.q is computed in
     float32 with an error of at most e = u (2 B^2 + |q|^2), where B is the longest row and
@@ -80,9 +87,7 @@ def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k:
     slack = [2.0 * u * float(of.max()) for of in lengths]
     count = k + SHORTLIST
 
-    def ints(*values: int) -> str:
-        return build.constant(values, np.int64)
-
+    ints = build.ints
     single = build.node("Cast", [z], to=TensorProto.FLOAT)
     product = build.node("MatMul", [single, build.by_look([-2.0 * r.T for r in rows], np.float32)])
     rough = build.node("Add", [product, build.by_look(lengths, np.float32)])
@@ -107,13 +112,13 @@ def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k:
     sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])
     flags = build.node("Cast", [sure], to=TensorProto.FLOAT)
     all_sure = build.node("ReduceMin", [flags, ints(0, 1)], keepdims=0)
-    outputs = {"squares": TensorProto.DOUBLE, "rows": TensorProto.INT64}
-    then = build.branch("shortlisted", outputs, lambda: [short, found])
-    other = build.branch("measured", outputs, lambda: _measured(build, z, rows, k))
+    kinds = {"squares": (TensorProto.DOUBLE, 2), "rows": (TensorProto.INT64, 2)}
+    then = build.branch("shortlisted", kinds, lambda: [short, found])
+    other = build.branch("measured", kinds, lambda: _nearest(build, _gaps(build, z, rows), k))
     near_squares, near_rows = build.nodes(
         "If",
         [build.node("Cast", [all_sure], to=TensorProto.BOOL)],
-        ["", ""],
+        list(outputs),
         then_branch=then,
         else_branch=other,
     )
@@ -122,12 +127,12 @@ def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k:
     return [near_squares, near_rows]
 
 
-def _first(build: Builder, values: str, have: int, want: int) -> str:
-    """The first `want` of `have` columns."""
+def _first(build: Builder, values: str, have: int, want: int, output: str = "") -> str:
+    """The first `want` of `have` columns; those of a task's output are named `output`."""
     if have == want:
-        return values
-    ints = [build.constant([i], np.int64) for i in (0, want, 1)]
-    return build.node("Slice", [values, *ints])
+        return build.node("Identity", [values], output) if output else values
+    ints = [build.ints(i) for i in (0, want, 1)]
+    return build.node("Slice", [values, *ints], output)
 
 
 def _decide(
@@ -136,7 +141,6 @@ def _decide(
     """Squared distances and rows of the neighbours to the four outputs of a task."""
     squares, rows = near
     build.node("Sqrt", [squares], f"{task}_distances")
-    build.node("Identity", [rows], f"{task}_neighbours")
     said = build.node("Gather", [build.constant(labels, np.int64), rows])
     # A distance that is no number, or none that float64 holds, votes for nothing: class -1,
     # whose row of the votes (the last one) is empty.
@@ -146,7 +150,7 @@ def _decide(
     share = 1.0 / k if k & (k - 1) == 0 else 1.0
     ballots = build.constant(np.vstack([share * np.eye(classes), np.zeros((1, classes))]))
     cast = build.node("Gather", [ballots, said])
-    axis = build.constant([1], np.int64)
+    axis = build.ints(1)
     if share == 1.0 and k > 1:
         votes = build.node("ReduceSum", [cast, axis], keepdims=0)
         build.node("Div", [votes, build.constant(float(k))], f"{task}_scores")
@@ -177,32 +181,40 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     if len(operator.inputs) > 1:
         build.look = build.node("Squeeze", [operator.inputs[1].full_name])
     kept = {task: max(look.components_[task] for look in looks) for task in model.choices}
-    groups: dict[tuple[str, int], int] = {}
+    groups: dict[tuple[str, int], str] = {}
     for task, choice in model.choices.items():
         key = (choice.scaling, kept[task])
-        groups[key] = max(groups.get(key, 0), choice.k)
+        if key not in groups or choice.k > model.choices[groups[key]].k:
+            groups[key] = task
     points = {s: project(build, x, [m.projections_[s] for m in looks]) for s in last.projections_}
+    tasks = {task: names[f"{task}_label"].removesuffix("_label") for task in model.choices}
     near: dict[tuple[str, int], list[str]] = {}
-    for (scaling, components), k in groups.items():
+    gaps: dict[str, str] = {}
+    for (scaling, components), most in groups.items():
         rows = widened([m.rows_[scaling] for m in looks])
-        z = _first(build, points[scaling], rows[0].shape[1], components)
+        have, k = rows[0].shape[1], model.choices[most].k
+        # The rows of the task that asks for most neighbours are its output as they are.
+        outputs = ("", f"{tasks[most]}_neighbours")
         # A shortlist of most rows saves nothing.
-        short = len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])
-        find = _shortlisted if short else _measured
-        near[scaling, components] = find(build, z, [r[:, :components] for r in rows], k)
+        if len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0]):
+            z = _first(build, points[scaling], have, components)
+            found = _shortlisted(build, z, [r[:, :components] for r in rows], k, outputs)
+        else:
+            if scaling not in gaps:
+                gaps[scaling] = _gaps(build, points[scaling], rows)
+            found = _nearest(build, _first(build, gaps[scaling], have, components), k, outputs)
+        near[scaling, components] = found
     for task, choice in model.choices.items():
         key = (choice.scaling, kept[task])
-        found = [_first(build, name, groups[key], choice.k) for name in near[key]]
-        _decide(
-            build,
-            names[f"{task}_label"].removesuffix("_label"),
-            last.labels_[task],
-            len(last.classes_[task]),
-            choice.k,
-            found,
-        )
+        have = model.choices[groups[key]].k
+        squares, rows_of = near[key]
+        if groups[key] != task:
+            rows_of = _first(build, rows_of, have, choice.k, f"{tasks[task]}_neighbours")
+        squares = _first(build, squares, have, choice.k)
+        classes = len(last.classes_[task])
+        _decide(build, tasks[task], last.labels_[task], classes, choice.k, [squares, rows_of])
     if isinstance(model, SequentialClassifier):
-        pvalues(build, x, model, names)
+        pvalues(build, x, operator.inputs[1].full_name, model, names)
 
 
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:

@@ -36,47 +36,84 @@ class Folds:
         )
 
 
-def pvalues(build: Builder, x: str, model: SequentialClassifier, names: dict[str, str]) -> None:
+def pvalues(
+    build: Builder,
+    x: str,
+    asked: str,
+    model: SequentialClassifier,
+    names: dict[str, str],
+) -> None:
     """Features (n, p) to the outputs `<task>_pvalues` (n, folds, labels + 1).
+
+    They cost more than the decision, so they are computed where a look is asked for (0 or more);
+    all are 1, which strikes out no label, where it is -1.
 
     Args:
         build: of the graph, which knows the look.
         x: name of the features.
+        asked: name of the look (1,).
         model: fitted.
         names: of the outputs in the graph.
     """
-    wide = build.node("Unsqueeze", [x, build.constant([1, 2], np.int64)])
-    points: dict[str, tuple[str, int]] = {}
+    outputs = {f"{task}_pvalues": (TensorProto.DOUBLE, 3) for task in model.choices}
+    build.nodes(
+        "If",
+        [build.node("LessOrEqual", [build.constant([0], np.int64), asked])],
+        [names[output] for output in outputs],
+        then_branch=build.branch("asked", outputs, lambda: _asked(build, x, model)),
+        else_branch=build.branch("unasked", outputs, lambda: _unasked(build, model, names)),
+    )
+
+
+def _unasked(build: Builder, model: SequentialClassifier, names: dict[str, str]) -> list[str]:
+    label = names[f"{next(iter(model.choices))}_label"]
+    rows = build.node("Unsqueeze", [label, build.ints(1, 2)])
+    true = build.node("LessOrEqual", [rows, rows])
+    one = build.constant(1.0)
+    shapes = [(1, model.folds, model.calibrations_[task].classes + 1) for task in model.choices]
+    return [build.node("Where", [true, build.constant(np.ones(s)), one]) for s in shapes]
+
+
+def _asked(build: Builder, x: str, model: SequentialClassifier) -> list[str]:
+    wide = build.node("Unsqueeze", [x, build.ints(1, 2)])
+    gaps: dict[str, tuple[str, int]] = {}
     squares: dict[tuple[str, int], str] = {}
+    found: list[str] = []
     for task, choice in model.choices.items():
         calibration = model.calibrations_[task]
-        if choice.scaling not in points:
-            looks = [Folds.of(folds) for folds in calibration.projections]
-            z = project(build, wide, looks)
-            # (n, folds, c, 1), against rows (folds, c, rows): sums then run along memory.
-            axes = [build.constant([axis], np.int64) for axis in (2, 3)]
-            z = build.node("Unsqueeze", [build.node("Squeeze", [z, axes[0]]), axes[1]])
-            points[choice.scaling] = z, max(look.weights.shape[-1] for look in looks)
-        z, have = points[choice.scaling]
+        if choice.scaling not in gaps:
+            gaps[choice.scaling] = _gaps(build, wide, model, choice.scaling)
+        apart, have = gaps[choice.scaling]
         c = calibration.rows.shape[-1]
         if (choice.scaling, c) not in squares:
             if c < have:
-                ints = [build.constant([i], np.int64) for i in (0, c, 2)]
-                z = build.node("Slice", [z, *ints])
-            rows = build.by_look([look.transpose(0, 2, 1) for look in calibration.rows])
-            gaps = build.node("Sub", [rows, z])
+                apart = build.node("Slice", [apart, *(build.ints(i) for i in (0, c, 2))])
             squares[choice.scaling, c] = build.node(
-                "ReduceSumSquare", [gaps, build.constant([2], np.int64)], keepdims=0
+                "ReduceSumSquare", [apart, build.ints(2)], keepdims=0
             )
-        _task(build, squares[choice.scaling, c], calibration, names[f"{task}_pvalues"])
+        found.append(_task(build, squares[choice.scaling, c], calibration))
+    return found
 
 
-def _task(build: Builder, squares: str, calibration: Calibration, output: str) -> None:
+def _gaps(build: Builder, wide: str, model: SequentialClassifier, scaling: str) -> tuple[str, int]:
+    """Differences (n, folds, c, rows) from the rows of the task with most components; that c."""
+    tasks = [task for task, choice in model.choices.items() if choice.scaling == scaling]
+    widest = max((model.calibrations_[task] for task in tasks), key=lambda one: one.rows.shape[-1])
+    c = widest.rows.shape[-1]
+    z = project(build, wide, [Folds.of(folds) for folds in widest.projections])
+    have = max(p.weights.shape[-1] for folds in widest.projections for p in folds)
+    if c < have:
+        z = build.node("Slice", [z, *(build.ints(i) for i in (0, c, 3))])
+    # (n, folds, c, 1), against rows (folds, c, rows): sums then run along memory.
+    z = build.node("Unsqueeze", [build.node("Squeeze", [z, build.ints(2)]), build.ints(3)])
+    rows = build.by_look_small([look.transpose(0, 2, 1) for look in widest.rows])
+    return build.node("Sub", [rows, z]), c
+
+
+def _task(build: Builder, squares: str, calibration: Calibration) -> str:
     """Squared distances (n, folds, rows) to the p-values of one task."""
     classes = calibration.classes
-
-    def ints(*values: int) -> str:
-        return build.constant(values, np.int64)
+    ints = build.ints
 
     # (folds, labels, rows): which rows have the label.
     own = calibration.labels[:, None, :] == np.arange(classes)[:, None]
@@ -105,7 +142,7 @@ def _task(build: Builder, squares: str, calibration: Calibration, output: str) -
         )
         for which, score in enumerate((ratio, first))
     ]
-    build.node("Concat", parts, output, axis=2)
+    return build.node("Concat", parts, axis=2)
 
 
 def _pvalues(
@@ -116,7 +153,7 @@ def _pvalues(
     sizes: NDArray[np.int64],
 ) -> str:
     """Scores (n, folds, labels) to their p-values."""
-    last = build.constant([3], np.int64)
+    last = build.ints(3)
     limits = build.by_look([np.stack([r.limits for r in look])[:, None] for look in rankings])
     scale = build.by_look([np.array([[r.scale] for r in look]) for look in rankings])
 

@@ -49,8 +49,8 @@ RANKS = 64
 SLACK = 1e-9
 """Stored ranks and scores are this much larger, in parts: a new trial that repeats a calibration
 trial then compares alike on every machine, and p-values err upwards."""
-FAR = 1e150
-"""Coordinate of rows that fill up a fold; its square is still a number."""
+FAR = 1e30
+"""Coordinate of rows that fill up a fold."""
 FEWEST = 4
 """Trials a fold needs at least."""
 
@@ -117,7 +117,8 @@ class Calibration:
 
     Attributes:
         projections: [look][fold], fitted on the other folds.
-        rows: (L, K, R, c) projected trials of the other folds, `FAR` beyond their number.
+        rows: (L, K, R, c) projected trials of the other folds, rounded to float32 (a board's
+            memory is small), `FAR` beyond their number.
         labels: (K, R) their classes, -1 beyond their number.
         rankings: [look][fold] of the ratio, and of the distance to the nearest.
         maxima: (2, K, M) largest rank over the looks of each of the fold's own trials, by ratio
@@ -127,7 +128,7 @@ class Calibration:
     """
 
     projections: list[list[Projection]]
-    rows: NDArray[np.float64]
+    rows: NDArray[np.float32]
     labels: NDArray[np.int64]
     rankings: list[list[tuple[Ranking, Ranking]]]
     maxima: NDArray[np.float64]
@@ -140,7 +141,7 @@ class Calibration:
         for k, size in enumerate(self.sizes):
             c = self.rows.shape[-1]
             points = _padded(self.projections[look][k](X), c)
-            squares = squares_between(points, self.rows[look, k])
+            squares = squares_between(points, self.rows[look, k].astype(np.float64))
             nearest = nearest_by_label(squares, self.labels[k], self.classes)
             ratio, far = self.rankings[look][k]
             ranks = np.column_stack([ratio(ratios(nearest)), far(nearest.min(axis=1))])
@@ -187,7 +188,7 @@ def calibrate(
     folds = int(fold_of.max()) + 1
     sizes = np.bincount(fold_of, minlength=folds)
     c = min(choice.components, max(p.weights.shape[1] for row in projections for p in row))
-    rows = np.full((looks, folds, n - int(sizes.min()), c), FAR)
+    rows = np.full((looks, folds, n - int(sizes.min()), c), FAR, dtype=np.float32)
     row_labels = np.full(rows.shape[1:3], -1, dtype=np.int64)
     maxima = np.full((2, folds, int(sizes.max())), -1.0)
     rankings: list[list[tuple[Ranking, Ranking]]] = [[] for _ in range(looks)]
@@ -199,15 +200,14 @@ def calibrate(
         for look in range(looks):
             points = _padded(projections[look][k](X[look]), c)
             rows[look, k, :count] = points[others]
-            among = squares_between(points[others], points[others])
+            known = rows[look, k, :count].astype(np.float64)
+            among = squares_between(known, known)
             np.fill_diagonal(among, np.inf)
             seen = nearest_by_label(among, labels[others], classes)
             ratio = Ranking.of(ratios(seen)[np.arange(count), labels[others]])
             far = Ranking.of(seen.min(axis=1))
             rankings[look].append((ratio, far))
-            new = nearest_by_label(
-                squares_between(points[own], points[others]), labels[others], classes
-            )
+            new = nearest_by_label(squares_between(points[own], known), labels[others], classes)
             best[0] = np.maximum(best[0], ratio(ratios(new)[np.arange(size), labels[own]]))
             best[1] = np.maximum(best[1], far(new.min(axis=1)))
         maxima[:, k, :size] = best * (1.0 + SLACK)

@@ -1,6 +1,7 @@
 """A model file: what is refused, and what a decision says."""
 
 import json
+import os
 import shutil
 
 import numpy as np
@@ -250,3 +251,21 @@ def test_what_the_walk_reads_is_what_onnx_reads(exported):
     assert contents.metadata == {p.key: p.value for p in proto.metadata_props}
     assert contents.opsets == {o.domain: o.version for o in proto.opset_import} == {"": 18}
     assert contents.operators == {(n.domain, n.op_type) for n in proto.graph.node}
+
+
+def test_a_file_that_changes_between_its_check_and_its_use_is_refused(
+    exported, tmp_path, monkeypatch
+):
+    path = tmp_path / "model.onnx"
+    shutil.copy(exported / "model.onnx", path)
+    check = onnxfile.check
+
+    def check_then_change(data, name):
+        contents = check(data, name)
+        path.write_bytes(data + b"")
+        os.utime(path, ns=(1, 1))
+        return contents
+
+    monkeypatch.setattr(onnxfile, "check", check_then_change)
+    with pytest.raises(InputError, match="was changed while it was read"):
+        Model(path)

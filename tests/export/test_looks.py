@@ -8,7 +8,7 @@ import pytest
 from edge.cli import main as edge_classify
 from edge.errors import InputError
 from edge.live import Watcher
-from edge.model import Model
+from edge.model import NO_LOOK, Model
 from edge.recording import load, save
 from export.__main__ import main, parse_looks
 from train.conformal import SequentialClassifier
@@ -240,3 +240,20 @@ def test_looks_are_read_as_a_range_or_a_list_and_end_with_the_window():
 def test_a_look_that_the_model_has_not_is_refused(model):
     with pytest.raises(InputError, match="has the looks 0 to 3, not 4"):
         model.decide(np.zeros(120), 4)
+
+
+def test_without_a_look_the_graph_strikes_out_nothing_and_answers_as_at_the_full_window(
+    model, at_looks
+):
+    queries = at_looks[1][-1][:9] * 1.03
+    full = model.run(queries)
+    given = {"features": queries, "look": np.array([NO_LOOK])}
+    plain = dict(zip(full, model._session.run(list(full), given), strict=True))
+    for name, values in full.items():
+        if name.endswith("_pvalues"):
+            assert values.shape == plain[name].shape
+            assert (plain[name] == 1.0).all()
+            assert (values < 1.0).any()
+        else:
+            assert values.tobytes() == plain[name].tobytes()
+    assert all(d.pvalues is None for d in model.decide(queries[0]).values())

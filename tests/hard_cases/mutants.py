@@ -148,12 +148,10 @@ MUTANTS = (
     Mutant(
         "the graph measures distances directly",
         GRAPH,
-        '    squares = build.node("ReduceSumSquare", [gaps, build.constant([1], np.int64)], '
-        "keepdims=0)\n",
+        '    squares = build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)\n',
         '    gaps = build.node("Cast", [build.node("Cast", [gaps], to=TensorProto.FLOAT)], '
         "to=TensorProto.DOUBLE)\n"
-        '    squares = build.node("ReduceSumSquare", [gaps, build.constant([1], np.int64)], '
-        "keepdims=0)\n",
+        '    squares = build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)\n',
         (HARD, "distances or near-duplicate"),
     ),
     Mutant(

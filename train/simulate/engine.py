@@ -143,6 +143,25 @@ def begin(
     return state
 
 
+@dataclass(frozen=True)
+class Shot:
+    """The physics of a batch: what its skin bears, before any sensor reads it.
+
+    Attributes:
+        film: the load on the taxels, frame by frame.
+        joints: (n, frames, dof) radians.
+        force: (n, frames) newtons.
+        slide: (n, frames) metres, or None.
+        state: what the plan left behind.
+    """
+
+    film: Film
+    joints: Array
+    force: Array
+    slide: Array | None
+    state: State
+
+
 def run_batch(
     scene: Scene,
     trials: tuple[Trial, ...],
@@ -161,8 +180,20 @@ def run_batch(
         images: False for the physics alone (forces, joints); `counts` are then empty.
     """
     first = trials[0]
-    kind = kind_of(scene, first.thing, first.condition)
-    plan = plan or make_plan(scene, kind.effects)
+    plan = plan or make_plan(scene, kind_of(scene, first.thing, first.condition).effects)
+    return read_out(shoot(scene, trials, step_s, plan=plan, values=values, images=images), plan)
+
+
+def shoot(
+    scene: Scene,
+    trials: tuple[Trial, ...],
+    step_s: float,
+    *,
+    plan: Plan,
+    values: dict[str, Array] | None = None,
+    images: bool = True,
+) -> Shot:
+    """The physics of `run_batch`, with the same arguments."""
     values = values_of(scene, trials) if values is None else values
     frames = frame_count(scene)
     rate_hz = scene.trials["rate_hz"]
@@ -192,17 +223,32 @@ def run_batch(
         if images:
             film.expose(k, state)
     state["frame_t"] = np.arange(frames) / rate_hz
-    state["joints"] = np.ascontiguousarray(joints.transpose(2, 0, 1))
-    counts, times, kept, valid = film.develop(state, plan)
+    return Shot(
+        film=film,
+        joints=np.ascontiguousarray(joints.transpose(2, 0, 1)),
+        force=np.ascontiguousarray(force.T),
+        slide=None if slide is None else np.ascontiguousarray(slide.T),
+        state=state,
+    )
+
+
+def read_out(shot: Shot, plan: Plan) -> Batch:
+    """The batch as a plan's sensor and clock show it.
+
+    One shot serves any plan that differs in these alone, as long as each of them has some: the
+    film is taken in whole counts where no sensor's effect is called for.
+    """
+    state = {**shot.state, "joints": shot.joints.copy()}
+    counts, times, kept, valid = shot.film.develop(state, plan)
     return Batch(
-        trials=trials,
+        trials=state["trials"],
         t=state["frame_t"],
         counts=counts,
         joints=state["joints"],
-        force=np.ascontiguousarray(force.T),
+        force=shot.force,
         times=times,
         kept=kept,
         valid=valid,
-        slide=None if slide is None else np.ascontiguousarray(slide.T),
+        slide=shot.slide,
         state=state,
     )

@@ -72,8 +72,9 @@ class Context:
 
     @property
     def labels(self) -> Labels:
-        """{task: (n,) labels}."""
-        return {task: self.dataset.labels(task) for task in self.dataset.tasks}
+        """{task: (n,) labels} of the tasks that have more than one class."""
+        every = {task: self.dataset.labels(task) for task in self.dataset.tasks}
+        return {task: labels for task, labels in every.items() if len(set(labels)) > 1}
 
     @property
     def series(self) -> list[FeatureSeries | None]:

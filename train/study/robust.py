@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.arm import Chain
 from edge.errors import InputError
-from edge.features import WINDOW_S
 from edge.layout import SkinLayout
-from edge.track import TrackSettings
+from edge.track import FeatureSeries, TrackSettings
+from train.simulate.engine import Trial, kind_of, read_out, shoot
 from train.simulate.fields import EFFECTS
-from train.simulate.run import simulate
+from train.simulate.plan import make_plan
+from train.simulate.run import parts, recordings
 from train.simulate.scene import Scene
 from train.study import plots
 from train.study.context import SCORE, Context, Figure, Section, Table, score
-from train.study.score import Labels, evaluate, transfer
+from train.study.score import evaluate, transfer
 from train.study.skins import follow, vectors
 
 FACTORS = (0.5, 2.0)
+SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
+"""Effects that change what is read, never what happens."""
+
+
+UNCHANGED = "as recorded"
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -36,9 +41,7 @@ def variants(scene: Scene) -> dict[str, Scene]:
         found[f"arm stiffness x {factor:g}"] = replace(
             scene, stiffness=tuple(k * factor for k in scene.stiffness)
         )
-    for name, info in EFFECTS.items():
-        if info.stage not in ("sensor", "clock"):
-            continue
+    for name in SENSOR:
         if name in scene.add:
             found[f"without {name}"] = replace(scene, add=tuple(e for e in scene.add if e != name))
         else:
@@ -46,39 +49,93 @@ def variants(scene: Scene) -> dict[str, Scene]:
     return found
 
 
+def physics(scene: Scene) -> Scene:
+    """The scene without its sensor's effects: scenes that share it share their physics."""
+    return replace(scene, add=tuple(name for name in scene.add if name not in SENSOR))
+
+
+def groups(scenes: Mapping[str, Scene]) -> list[list[str]]:
+    """Names of scenes that differ in their sensor alone, a list for each physics.
+
+    A sensor without any effect is no part of a group: its film is taken in whole counts.
+    """
+    found: list[tuple[Scene, bool, list[str]]] = []
+    for name, scene in scenes.items():
+        bare = physics(scene)
+        sensed = any(e in SENSOR and e not in scene.leave_out for e in scene.add)
+        for other, alike, names in found:
+            if alike and sensed and other == bare:
+                names.append(name)
+                break
+        else:
+            found.append((bare, sensed, [name]))
+    return [names for _, _, names in found]
+
+
 def measured(
-    scene: Scene,
-    wanted: list[str],
+    scenes: Mapping[str, Scene],
+    trials: tuple[Trial, ...],
+    step_s: float,
+    wanted: Collection[str],
     layout: SkinLayout,
     tracking: TrackSettings,
     chain: Chain | None,
-) -> tuple[NDArray[np.float64], Labels, int]:
-    """Features and labels of a scene's trials, and how many had no contact.
+) -> dict[str, dict[str, FeatureSeries | None]]:
+    """The contacts of a batch's trials, as each of some scenes' sensors shows them.
 
     Args:
-        scene: simulated anew.
-        wanted: file names of the trials, in the order of the result.
+        scenes: {name: scene} that differ in their sensor alone.
+        trials: of one kind.
+        step_s: of the physics.
+        wanted: file names of the trials to follow.
         layout: the skin, with its thresholds.
         tracking: how contacts are followed.
         chain: the arm, or None.
 
-    Raises:
-        InputError: the scene has no trial of such a name.
+    Returns:
+        {name: {file name: contact, or None where there is none}}.
     """
-    # What comes after the window is not looked at.
-    shorter = replace(scene, trials={**scene.trials, "after_s": WINDOW_S + 0.2})
-    trials = dict(simulate(shorter))
-    strange = [name for name in wanted if name not in trials]
+    first = trials[0]
+    plans = {
+        name: make_plan(scene, kind_of(scene, first.thing, first.condition).effects)
+        for name, scene in scenes.items()
+    }
+    shown = next(iter(scenes))
+    shot = shoot(scenes[shown], trials, step_s, plan=plans[shown])
+    found: dict[str, dict[str, FeatureSeries | None]] = {}
+    for name, scene in scenes.items():
+        batch = recordings(read_out(shot, plans[name]), scene, step_s)
+        kept = {file: recording for file, recording in batch if file in wanted}
+        contacts = follow(list(kept.values()), layout, tracking, chain)
+        found[name] = dict(zip(kept, contacts, strict=True))
+    return found
+
+
+def anew(context: Context, scenes: Mapping[str, Scene]) -> dict[str, list[FeatureSeries | None]]:
+    """{name: the data set's trials, in its order, as simulated anew from each scene}.
+
+    Raises:
+        InputError: a scene has no trial of a recording's name.
+    """
+    data = context.dataset
+    wanted = [trial.path.name for trial in data.trials]
+    alike = [{name: scenes[name] for name in names} for names in groups(scenes)]
+    cases = [
+        (group, trials, step_s, set(wanted), data.layout, data.tracking, data.chain)
+        for group in alike
+        for trials, step_s in parts(next(iter(group.values())))
+    ]
+    merged: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
+    for answer in context.map("simulated anew", measured, cases):
+        for name, contacts in answer.items():
+            merged[name] |= contacts
+    strange = [file for file in wanted if any(file not in contacts for contacts in merged.values())]
     if strange:
         raise InputError(
-            f"{strange[0]}: the scene {scene.name} has no such trial; give the scene that the "
-            "recordings were simulated from, or none"
+            f"{strange[0]}: the scene has no such trial; give the scene that the recordings were "
+            "simulated from, or none"
         )
-    recordings = [trials[name] for name in wanted]
-    series = follow(recordings, layout, tracking, chain)
-    tasks = recordings[0].labels
-    y = {task: np.array([r.labels[task] for r in recordings]) for task in sorted(tasks)}
-    return vectors(series), y, sum(s is None for s in series)
+    return {name: [contacts[file] for file in wanted] for name, contacts in merged.items()}
 
 
 def section(context: Context) -> Section | None:
@@ -86,30 +143,27 @@ def section(context: Context) -> Section | None:
     scene = context.scene
     if scene is None:
         return None
-    data = context.dataset
     others = variants(scene)
-    names = [trial.path.name for trial in data.trials]
-    cases = [(s, names, data.layout, data.tracking, data.chain) for s in (scene, *others.values())]
-    (same, _, _), *found = context.map("speeds and effects", measured, cases)
+    series = anew(context, {UNCHANGED: scene, **others})
     X, y = context.vectors(), context.labels
-    if not (same == X).all():
+    if not np.array_equal(vectors(series.pop(UNCHANGED)), X):
         raise InputError(
             f"the scene {scene.name} gives other trials than these recordings; simulate it again, "
             "or study them without a scene"
         )
-    work: list[tuple[Any, ...]] = [(x, labels) for x, labels, _ in found]
-    own = context.map("their accuracy", evaluate, work)
+    changed = {name: vectors(contacts) for name, contacts in series.items()}
+    own = context.map("their accuracy", evaluate, [(x, y) for x in changed.values()])
     plain = evaluate(X, y)
-    work = [(X, y, plain, x) for x, _, _ in found]
-    to = context.map("trained here", transfer, work)
-    work = [(x, y, best, X) for (x, _, _), best in zip(found, own, strict=True)]
+    to = context.map("trained here", transfer, [(X, y, plain, x) for x in changed.values()])
+    work = [(x, y, best, X) for x, best in zip(changed.values(), own, strict=True)]
     back = context.map("trained there", transfer, work)
     table = Table(
         "robustness",
         "Another speed, arm or sensor; trained and tested on it or across",
         ("change", "task", "trained and tested", *SCORE, "without contact"),
     )
-    for name, (_, _, lost), *sets in zip(others, found, own, to, back, strict=True):
+    for name, *sets in zip(others, own, to, back, strict=True):
+        lost = sum(contact is None for contact in series[name])
         hows = (
             "leave-one-out with the change",
             "trained without it, tested with it",

@@ -18,16 +18,17 @@ from train.simulate import scene as scenes
 from train.study import beyond, classify, honest, paper, report, resolution, robust
 from train.study.context import Context, Section
 
-SECTIONS: tuple[Callable[[Context], Section | None], ...] = (
+SECTIONS: tuple[Callable[[Context], Section], ...] = (
     classify.confusion,
     resolution.section,
     classify.window,
     classify.scaling,
     classify.features,
     honest.section,
-    robust.section,
     beyond.section,
 )
+PAPER = 5
+"""Where the paper's numbers are shown: after all that they are set beside."""
 LONGEST_S = 2.0
 FEWEST = 20
 """Trials below which a grid of 20 components makes no sense."""
@@ -64,11 +65,21 @@ def study(
         )
     recordings = [load(trial.path) for trial in dataset.trials]
     context = Context(dataset, recordings, source, jobs)
+    alike = [task for task in dataset.tasks if task not in context.labels]
+    if not context.labels:
+        raise InputError(
+            f"every trial has the same {' and the same '.join(alike)}: there is nothing to tell "
+            "apart; give recordings of two classes or more"
+        )
     with _cluster(address) as backend:
         context.cluster = backend
-        sections = [found for part in SECTIONS if (found := part(context)) is not None]
+        # First, as it is what finds out whether the scene is that of the recordings.
+        others = robust.section(context)
+        sections = [part(context) for part in SECTIONS]
     if source is not None:
-        sections.insert(5, paper.section(context))
+        sections.insert(PAPER, paper.section(context))
+    if others is not None:
+        sections.insert(PAPER + 2, others)
     took = time.perf_counter() - began
     layout = dataset.layout
     lead = [
@@ -82,8 +93,10 @@ def study(
             else "Recorded, or simulated elsewhere."
         ),
         "Accuracies are of leave-one-out cross-validation unless said otherwise, with 95 % "
-        "binomial (Wilson) intervals. Nothing was tuned to the paper's tables here.",
+        "binomial (Wilson) intervals.",
     ]
+    if alike:
+        lead.append(f"Left out, as every trial has the same: {', '.join(alike)}.")
     if dataset.untouched:
         lead.append(f"{len(dataset.untouched)} recordings without a contact are left out.")
     title = "What a touch tells: " + (source.name if source is not None else Path(data[0]).name)

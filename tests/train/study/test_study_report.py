@@ -3,7 +3,9 @@
 import csv
 import re
 from collections import Counter
+from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from train.__main__ import main
 from train.study import beyond
 from train.study.beyond import CHOSEN, columns, search
 from train.study.context import Figure, Section, Table
-from train.study.paper import entries
+from train.study.paper import entries, section
 from train.study.report import page, table_csv
 
 
@@ -28,6 +30,20 @@ def test_the_papers_numbers_are_46_and_whole_trials_of_140():
         assert low < entry.percent < high
     headline = {e.task: e.percent for e in numbers if (e.table, e.setting) == ("II", "none")}
     assert headline == {"category": 80.0, "mobility": 91.43, "object": 72.14}
+
+
+def test_numbers_that_a_scene_was_held_to_are_told_apart_from_predictions():
+    """The headlines of section IV-A stand in the tables eight times."""
+    headlines = [e for e in entries() if e.headline]
+    assert Counter(e.task for e in headlines) == {"category": 3, "mobility": 2, "object": 3}
+    assert {e.percent for e in headlines} == {80.0, 91.43, 72.14}
+    ours = {(e.table, e.setting, e.task): 100.0 for e in entries()}
+    ours |= {(e.table, e.setting, e.task): e.percent for e in headlines}
+    found = section(SimpleNamespace(ours=ours))
+    assert found.text[0].startswith("8 of 46 numbers lie within")
+    assert "Of the other 38, 0 lie within" in found.text[0]
+    side = found.tables[0]
+    assert sum(row[side.columns.index("headline")] == "yes" for row in side.rows) == 8
 
 
 class Links(HTMLParser):
@@ -136,4 +152,15 @@ def test_bad_input_is_one_sentence(given, sentence, recordings, tmp_path, capsys
     error = capsys.readouterr().err
     assert sentence in error.splitlines()[-1]
     assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_trials_of_one_class_are_nothing_to_study(make_touch, tmp_path, capsys):
+    for seed in range(20):
+        touch = make_touch(kind="hard", seed=seed, seconds=0.3, rate=25.0)
+        alone = replace(touch, meta={**touch.meta, "labels": {"mobility": "fixed"}})
+        save(tmp_path / f"{seed:02d}.npz", alone)
+    assert main(["study", "--data", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert "every trial has the same mobility: there is nothing to tell apart" in last
     assert not (tmp_path / "out").exists()

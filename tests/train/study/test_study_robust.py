@@ -7,18 +7,35 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.track import TrackSettings
+from edge.recording import load
+from train.dataset import load_trials
 from train.simulate import scene as scenes
-from train.simulate.run import simulate
-from train.study.robust import measured, variants
+from train.simulate.run import simulate, write
+from train.study import robust
+from train.study.context import Context
+from train.study.robust import UNCHANGED, anew, groups, variants
+from train.study.skins import follow, vectors
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
+THINGS = ("plastic bin", "bed pillow")
 
 
 @pytest.fixture(scope="module")
 def scene():
     whole = scenes.load(SCENE, count=2)
-    return replace(whole, objects=tuple(o for o in whole.objects if o.family == "rigid")[:2])
+    return replace(
+        whole,
+        objects=tuple(o for o in whole.objects if o.name in THINGS),
+        trials={**whole.trials, "after_s": 1.7},
+    )
+
+
+@pytest.fixture(scope="module")
+def context(scene, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("trials")
+    write(scene, folder)
+    data = load_trials([folder])
+    return Context(data, [load(trial.path) for trial in data.trials], scene, jobs=1)
 
 
 def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
@@ -35,14 +52,36 @@ def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
     )
 
 
-def test_the_same_trials_are_measured_in_the_order_asked_for(scene):
-    names = sorted(name for name, _ in simulate(scene))[::-3]
-    chain = scene.arm
-    X, y, lost = measured(scene, names, scene.skin, TrackSettings(), chain)
-    again, _, _ = measured(scene, names[::-1], scene.skin, TrackSettings(), chain)
-    assert X.shape == (len(names), 120)
-    assert lost == 0
-    assert (again[::-1] == X).all()
-    assert y["object"][0].replace(" ", "-") in names[0]
-    with pytest.raises(InputError, match="nothing.npz: the scene cody18 has no such trial"):
-        measured(scene, ["nothing.npz"], scene.skin, TrackSettings(), chain)
+def test_what_differs_in_the_sensor_alone_shares_its_physics(scene):
+    found = groups({UNCHANGED: scene, **variants(scene)})
+    assert [len(names) for names in found] == [11, 1, 1, 1, 1]
+    bare = replace(scene, add=("tilt",))
+    assert groups({"bare": bare, "noise": scene}) == [["bare"], ["noise"]]
+
+
+def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene):
+    """A light pillow gives way: it is felt a quarter of a second after the arm has met it."""
+    (series,) = anew(context, {UNCHANGED: scene}).values()
+    assert (vectors(series) == context.vectors()).all()
+    assert max(trial.onset_s for trial in context.dataset.trials) > 0.5
+
+
+def test_shared_physics_changes_no_bit(context, scene):
+    names = ("with crosstalk", "with jitter", "with dropped_frames", "without noise")
+    changed = {name: variants(scene)[name] for name in names}
+    data = context.dataset
+    for name, series in anew(context, changed).items():
+        trials = dict(simulate(changed[name]))
+        asked = [trials[trial.path.name] for trial in data.trials]
+        alone = follow(asked, data.layout, data.tracking, data.chain)
+        assert (vectors(series) == vectors(alone)).all()
+        assert (vectors(series) != context.vectors()).any()
+
+
+def test_recordings_of_another_scene_are_refused(context, scene, monkeypatch):
+    monkeypatch.setattr(robust, "variants", lambda scene: {})
+    with pytest.raises(InputError, match="movable-01.npz: the scene has no such trial"):
+        anew(context, {"few": replace(scene, trials={**scene.trials, "count": 1})})
+    other = replace(context, scene=replace(scene, seed=scene.seed + 1))
+    with pytest.raises(InputError, match="cody18 gives other trials than these recordings"):
+        robust.section(other)
