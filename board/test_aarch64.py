@@ -20,9 +20,13 @@ sys.path.insert(0, str(HERE))
 
 import aarch64  # noqa: E402
 
+from tests.hard_cases import elsewhere  # noqa: E402
+from tests.hard_cases import golden as hard_golden  # noqa: E402
+
 GOLDEN = CHECKOUT / "tests" / "golden" / "demo.npz"
 MODEL = CHECKOUT / "edge" / "demo" / "model.onnx"
 TOUCH = CHECKOUT / "edge" / "demo" / "cardboard-box-movable.npz"
+HARD = CHECKOUT / "build" / "hard-cases" / "golden"
 TABLE = aarch64.FOLDER / "instructions.csv"
 
 NOT_EMULATED = {
@@ -82,6 +86,17 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
     assert {check["name"] for check in checks} >= {"series counts", "object_label"}
     for check in checks:
         print(f"{check['name']:>24} {check['rows']:6} rows, {check['share_of_bound']:.2g} of bound")
+
+
+def test_the_hard_cases_have_the_same_answers(python):
+    """They join the table of `make hard-cases`."""
+    assert hard_golden.main(["--out", str(HARD)]) == 0
+    machine, shares = elsewhere.answers(elsewhere.ask(HARD, [str(python)]))
+    assert machine["machine"] == "aarch64"
+    assert {of for of, _ in shares} == {folder.name for folder in elsewhere.sets(HARD)}
+    print(f"{len(shares)} quantities of hard sets, at most {max(shares.values()):.2g} of bound")
+    beyond = {key: share for key, share in shares.items() if share > 1.0}
+    assert not beyond
 
 
 def test_the_emulated_machine_is_not_this_one(run):

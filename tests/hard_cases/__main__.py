@@ -8,18 +8,43 @@ import io
 import sys
 import textwrap
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from edge.files import write_whole
+from tests.hard_cases import elsewhere
 from tests.hard_cases.registry import CASES
 
-COLUMNS = ("case", "oracle", "what is measured", "bound", "worst seen", "the usual stack")
+COLUMNS = (
+    "case",
+    "oracle",
+    "what is measured",
+    "bound",
+    "worst seen",
+    "where",
+    "the usual stack",
+    "what float64 costs",
+)
 
 
 def number(value: float) -> str:
     """Short, and whole where it is whole."""
     return str(int(value)) if value == int(value) and abs(value) < 1e6 else f"{value:.1e}"
+
+
+def place(at: Mapping[str, Any]) -> str:
+    """Parameters, as a person writes them."""
+    return ", ".join(
+        f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in at.items()
+    )
+
+
+def say(text: str) -> None:
+    """Print a paragraph under a case."""
+    if text:
+        print(textwrap.fill(text, 96, initial_indent="     ", subsequent_indent=" " * 7))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -30,24 +55,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     rows: list[tuple[str, ...]] = []
     beyond = 0
-    for case in CASES:
+    for case in (*CASES, *elsewhere.found(arguments.out / "golden")):
         if arguments.only not in case.key:
             continue
         began = time.perf_counter()
-        worst, at = case.worst()
-        usual = "" if case.usual is None else case.usual()
-        beyond += worst > case.bound
-        row = (case.key, case.oracle, case.unit, number(case.bound), number(worst), usual)
-        rows.append(row)
+        worst = case.worst()
+        within = worst.error <= case.bound
+        beyond += not within
+        error, bound, tried = number(worst.error), number(case.bound), f"{worst.tried} tried"
+        where = f"{place(worst.at)} ({tried})" if worst.error else f"none of {tried}"
+        usual, cost = case.theirs(), case.cost()
+        rows.append((case.key, case.oracle, case.unit, bound, error, where, usual, cost))
         took = time.perf_counter() - began
-        mark = "ok  " if worst <= case.bound else "FAIL"
-        print(f"{mark} {case.key}  [{took:.1f} s]")
-        print(f"     {case.unit}: worst {row[4]}, bound {row[3]}; oracle: {case.oracle}")
-        if worst > 0.0:
-            print(textwrap.fill(f"at {at}", 96, initial_indent="     ", subsequent_indent=" " * 7))
-        if usual:
-            text = f"usual stack: {usual}"
-            print(textwrap.fill(text, 96, initial_indent="     ", subsequent_indent=" " * 7))
+        print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
+        say(f"{case.unit}: worst {error}, bound {bound}; oracle: {case.oracle}")
+        say(f"worst at {where}" if worst.error else f"{tried}")
+        say(f"usual stack: {usual}")
+        say(cost and f"what float64 costs: {cost}")
+    for missing in elsewhere.missing(arguments.out / "golden"):
+        print(f"--   {missing}")
     table = io.StringIO()
     csv.writer(table, lineterminator="\n").writerows([COLUMNS, *rows])
     lines = [COLUMNS, tuple("---" for _ in COLUMNS), *rows]

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from hypothesis import HealthCheck, Phase, given, settings, target
 from threadpoolctl import threadpool_limits
 
 EXAMPLES = 12
 """Examples that a search tries around a case; the same ones in every run."""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The largest error that was found.
+
+    Attributes:
+        error: the error.
+        at: the parameters it was at; the first tried where all are equal.
+        tried: how many were tried.
+    """
+
+    error: float
+    at: Mapping[str, Any]
+    tried: int
 
 
 @dataclass(frozen=True)
@@ -26,7 +43,8 @@ class Case:
         error: the error at given parameters.
         hazard: the parameters that the case is known by.
         around: strategies of parameters near them, which the search draws from.
-        usual: what the usual stack gives on the same hazard.
+        usual: measures what the usual stack gives on the same hazard, or says why it has none.
+        price: measures what float64 costs where float32 would not hold.
         examples: how many the search draws.
     """
 
@@ -38,7 +56,8 @@ class Case:
     error: Callable[..., float]
     hazard: Sequence[Mapping[str, Any]] = ({},)
     around: Mapping[str, Any] = field(default_factory=dict)
-    usual: Callable[[], str] | None = None
+    usual: Callable[[], str] | str = ""
+    price: Callable[[], str] | None = None
     examples: int = EXAMPLES
 
     @property
@@ -46,13 +65,13 @@ class Case:
         """Group and name, for people."""
         return f"{self.group}: {self.name}"
 
-    def worst(self) -> tuple[float, Mapping[str, Any]]:
-        """The largest error at the hazard and in the search around it, and where it was."""
+    def worst(self) -> Worst:
+        """The largest error at the hazard and in the search around it."""
         # Decompositions of this size only lose by a second thread, most of all beside others.
         with threadpool_limits(1):
             return self._worst()
 
-    def _worst(self) -> tuple[float, Mapping[str, Any]]:
+    def _worst(self) -> Worst:
         seen: list[tuple[float, Mapping[str, Any]]] = [
             (float(self.error(**at)), dict(at)) for at in self.hazard
         ]
@@ -74,4 +93,22 @@ class Case:
                     target(error)
 
             search()
-        return max(seen, key=lambda pair: pair[0])
+        error, at = max(seen, key=lambda pair: pair[0])
+        return Worst(error, at, len(seen))
+
+    def theirs(self) -> str:
+        """What the usual stack gives, in words."""
+        if isinstance(self.usual, str):
+            return self.usual
+        # It warns of some hazards; what counts is what it then answers.
+        with threadpool_limits(1), warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return self.usual()
+
+    def cost(self) -> str:
+        """What float64 costs here, in words; nothing where float32 would do."""
+        if self.price is None:
+            return ""
+        with threadpool_limits(1), warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return self.price()

@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import scipy.ndimage
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from edge.arm import Chain, Joint
 from edge.features import feature_vector
@@ -44,6 +45,69 @@ def random_region_error(density: float, peak: int, seed: int) -> float:
     except AssertionError:
         return 1.0
     return 0.0
+
+
+def single_error(wraps: bool) -> float:
+    """Of the 384 frames with one taxel, those whose region is another."""
+    wrong = 0
+    for place in np.ndindex(16, 24):
+        region = largest_region(taxels(place, value=65535), 50, wraps=wraps)
+        wrong += region is None or (region.area, region.peak, *region.centroid) != (
+            1,
+            65535,
+            *map(float, place),
+        )
+    return float(wrong)
+
+
+def single_usual() -> str:
+    """The same through scipy.ndimage."""
+    wrong = 0
+    for place in np.ndindex(16, 24):
+        labels, n = scipy.ndimage.label(taxels(place, value=65535) > 50)
+        wrong += n != 1 or scipy.ndimage.center_of_mass(labels) != tuple(map(float, place))
+    return f"scipy.ndimage: {wrong} of 384 differ"
+
+
+def random_usual() -> str:
+    """Frames with dead taxels and a seam, by labels alone."""
+    wrong = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        counts = rng.integers(51, 65536, (16, 24)) * (rng.random((16, 24)) < 0.6)
+        valid = rng.random((16, 24)) < 0.95
+        region = largest_region(counts.astype(np.uint16), 50, valid=valid, wraps=True)
+        labels, n = scipy.ndimage.label(counts > 50)
+        assert region is not None
+        wrong += max((labels == i + 1).sum() for i in range(n)) != region.area
+    return f"scipy.ndimage.label, seam and dead taxels unknown: another area in {wrong} of 60"
+
+
+def split_usual() -> str:
+    counts = taxels(*((8, c) for c in range(12)))
+    counts[8, 5] = 65535
+    labels, _ = scipy.ndimage.label(counts > 50)
+    peak = scipy.ndimage.maximum(counts, labels, 1)
+    return (
+        f"scipy.ndimage with the dead taxel at full scale: area {(labels == 1).sum()} instead of "
+        f"6, peak {peak} instead of 100"
+    )
+
+
+def onset_usual() -> str:
+    never, late = np.zeros(20), np.array([0.0] * 3 + [100.0] * 9)
+    found = [int(np.argmax(peaks > 50)) for peaks in (never, late)]
+    return (
+        f"numpy's argmax over a threshold: never in contact begins at frame {found[0]}, "
+        f"as does one from the first frame on; one from frame 3 at {found[1]}"
+    )
+
+
+def limits_usual() -> str:
+    angle = np.array([1.0, 1.0 + 1000 * 2.0 * math.pi])
+    turns = Rotation.from_rotvec(angle[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
+    off = np.abs(turns[0] - turns[1]).max() / 1000
+    return f"scipy's Rotation, 1000 turns further: off by {off:.1e} a turn"
 
 
 def seam_usual() -> str:
@@ -315,6 +379,16 @@ CASES = [
     ),
     Case(
         "features",
+        "single-taxel frames, all 384 at full scale",
+        "the taxel's own row and column",
+        "frames that differ",
+        0,
+        single_error,
+        [{"wraps": w} for w in (False, True)],
+        usual=single_usual,
+    ),
+    Case(
+        "features",
         "random frames with dead taxels, to full scale",
         "scipy.ndimage.label with the seam joined; plain integers",
         "frames that differ",
@@ -322,6 +396,7 @@ CASES = [
         random_region_error,
         [{"density": 0.6, "peak": 65535, "seed": 0}],
         {"density": st.floats(0.003, 1.0), "peak": st.integers(51, 65535), "seed": SEEDS},
+        usual=random_usual,
         examples=60,
     ),
     Case(
@@ -355,7 +430,7 @@ CASES = [
         split_error,
         [{"dead": 5, "length": 12}],
         {"dead": st.integers(0, 11), "length": st.just(12)},
-        lambda: "a dead taxel that reads full scale joins the parts and is the peak",
+        split_usual,
     ),
     Case(
         "features",
@@ -371,6 +446,7 @@ CASES = [
             {"lead": 3, "length": 1, "settings": 2},
         ],
         {"lead": st.integers(0, 9), "length": st.integers(0, 30), "settings": st.integers(1, 3)},
+        onset_usual,
     ),
     Case(
         "features",
@@ -416,6 +492,7 @@ CASES = [
         wrapped_error,
         [{"turns": 1, "seed": s} for s in range(5)],
         {"turns": st.integers(-1000, 1000), "seed": SEEDS},
+        limits_usual,
     ),
     Case(
         "kinematics",
@@ -437,5 +514,6 @@ CASES = [
         moved_error,
         [{"seed": 0}],
         {"seed": SEEDS},
+        "does not apply: it follows no region",
     ),
 ]

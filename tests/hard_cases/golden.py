@@ -21,6 +21,7 @@ from edge.model import Model
 from edge.recording import Recording, save
 from export import golden
 from export.__main__ import describe
+from export.__main__ import main as export
 from export.graph import to_onnx
 from tests.conftest import FOREARM, touch
 from tests.hard_cases.models import Array, features, labels_for
@@ -75,10 +76,11 @@ def short(recording: Recording) -> Recording:
 def hard_trials(folder: Path) -> DataSet:
     """Contacts with everything that frames and times can do to them, stored in a folder."""
     changes = (seam, saturated, jittered, split, wrapped, short)
-    for seed, change in enumerate(changes):
+    for seed in range(2 * len(changes)):
+        change = changes[seed % len(changes)]
         for kind in ("hard", "soft"):
             trial = change(touch(kind=kind, seed=seed))
-            save(folder / f"{change.__name__}-{kind}.npz", trial)
+            save(folder / f"{change.__name__}-{kind}-{seed}.npz", trial)
     return load_trials([folder])
 
 
@@ -113,7 +115,9 @@ def main(argv: Sequence[str] | None = None) -> int:
                 file.write(to_onnx(fitted, info))
             golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
             print(folder)
-    return 0
+        # Decisions before the full window, with their p-values.
+        looks = ["--looks", "0.6:1.2:0.3", "--jobs", "1"]
+        return export(["--data", trials, "--out", str(arguments.out / "looks"), *looks])
 
 
 if __name__ == "__main__":

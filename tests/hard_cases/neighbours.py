@@ -12,10 +12,15 @@ from tests.hard_cases.cases import Case
 from tests.hard_cases.models import (
     Array,
     Ours,
+    by_number,
+    converted,
     features,
     labels_for,
+    plain_graph,
+    price,
     session,
     usual_neighbours,
+    usual_pipeline,
 )
 from train.pipeline import Projection
 
@@ -63,6 +68,22 @@ def refused_error(scale: float) -> float:
     except InputError as error:
         return float("other units" not in str(error))
     return 1.0
+
+
+def refused_usual() -> str:
+    """Powers of two: the neighbours are those of the vectors before they were scaled."""
+    X, queries = features(60), features(24, 1)
+    truth = by_number(X, 6)[0].oracle_nearest(queries)
+    said = []
+    for exponent in (-133, 349):  # 1e-40, 1e105
+        scaled, asked = np.ldexp(X, exponent), np.ldexp(queries, exponent)
+        pipe = usual_pipeline(scaled, 6, 1, np.arange(60))
+        single = np.ravel(converted(pipe, scaled).run(None, {"X": asked.astype(np.float32)})[0])
+        shares = [np.mean(v != truth) for v in (pipe.predict(asked), single)]
+        said.append(
+            f"at {2.0**exponent:.0e} scikit-learn {shares[0]:.0%}, skl2onnx {shares[1]:.0%}"
+        )
+    return f"fitted and converted without a word; wrong nearest: {'; '.join(said)}"
 
 
 def duplicates_error(n: int, seed: int) -> float:
@@ -130,12 +151,38 @@ def equal_usual() -> str:
         squares = ((X[:, None] - queries) ** 2).sum(axis=2)
         lowest = squares.argmin(axis=0)
         out.append(f"scikit-learn {name} {np.mean(model.predict(queries) != lowest):.0%}")
+    X32, queries32 = X.astype(np.float32), queries.astype(np.float32)
+    brute = KNeighborsClassifier(1, algorithm="brute").fit(X32, y)
+    theirs = session(convert(brute, X32[:1], options={"zipmap": False}).SerializeToString())
+    said = np.ravel(theirs.run(None, {"X": queries32})[0])
+    out.append(f"skl2onnx {np.mean(said != lowest):.0%}")
     return "not the lower row: " + ", ".join(out)
 
 
 def all_rows_error(n: int) -> float:
     X = features(n)
     return Ours(X, k=n, y=labels_for(X, 7)).judged(features(3, 1))[0]
+
+
+def all_rows_usual() -> str:
+    """Every query has the same votes; the tied labels are told apart by the nearest alone."""
+    wrong = 0
+    for n in range(2, 62):
+        ours = Ours(features(n), k=n, y=labels_for(features(n), 7))
+        z = ours.fitted.rows_["none"]
+        query = features(1, 1)
+        theirs = KNeighborsClassifier(n, algorithm="brute").fit(z, np.array(ours.y))
+        wrong += int(theirs.predict(ours.projection(query))[0] != ours.alone(query)["label"][0])
+    return f"scikit-learn: another label in {wrong} of 60 sets of 2 to 61 rows, the lowest number's"
+
+
+def few_usual() -> str:
+    """scikit-learn's PCA and k-NN on one row, and the share of NaN in its projection."""
+    pipe = usual_pipeline(features(1), 6, 1, np.array([0]))
+    ratio = pipe[0].explained_variance_ratio_
+    narrow = {"X": features(1, 1).astype(np.float32)}
+    seen = converted(pipe, features(1)).run(None, narrow)[0].ravel().tolist()
+    return f"PCA of one row: explained variance ratio {ratio.tolist()}; skl2onnx answers {seen}"
 
 
 def few_error(n: int, classes: int, same: bool) -> float:
@@ -154,6 +201,27 @@ def distance_error(scale: float, seed: int) -> float:
     ]
 
 
+def distance_usual() -> str:
+    """Distances of our coordinates by scikit-learn's expanded form and by a float32 graph."""
+    out = []
+    for scale in (1.0, 1e-24, 1e20):
+        X, queries = features(160) * scale, features(12, 1) * scale
+        ours = Ours(X, components=20)
+        z, points = ours.fitted.rows_["none"], ours.projection(queries)
+        truth = np.sqrt(((points[:, None] - z) ** 2).sum(axis=2))
+        brute = KNeighborsClassifier(5, algorithm="brute").fit(z, np.arange(160))
+        far, rows = brute.kneighbors(points)
+        single = session(plain_graph(ours))
+        near, found = single.run(["near", "rows"], {"x": queries.astype(np.float32)})
+
+        def off(seen: Array, rows: Array, truth: Array = truth) -> float:
+            return float(np.abs(seen / np.take_along_axis(truth, rows, axis=1) - 1.0).max())
+
+        float32 = off(np.sqrt(near.astype(np.float64)), found)
+        out.append(f"at {scale:g} scikit-learn {off(far, rows):.0e}, float32 {float32:.0e}")
+    return f"relative error: {'; '.join(out)}"
+
+
 CASES = [
     Case(
         "neighbours",
@@ -169,6 +237,7 @@ CASES = [
             "seed": SEEDS,
         },
         lambda: usual_neighbours(*near_duplicates(160, 1e-7, 0)),
+        lambda: "; ".join(price(*near_duplicates(n, 1e-7, 0)) for n in (160, SHORT)),
         examples=4,
     ),
     Case(
@@ -185,6 +254,7 @@ CASES = [
             "seed": SEEDS,
         },
         lambda: usual_neighbours(*offset_data(1e6, 0.01, 0)),
+        lambda: price(*offset_data(1e6, 0.01, 0)),
         examples=4,
     ),
     Case(
@@ -201,6 +271,7 @@ CASES = [
             "seed": SEEDS,
         },
         lambda: usual_neighbours(features(160) * 1e-24, features(24, 1) * 1e-24),
+        lambda: price(features(160) * 1e-24, features(24, 1) * 1e-24),
         examples=4,
     ),
     Case(
@@ -217,6 +288,7 @@ CASES = [
             "seed": SEEDS,
         },
         lambda: usual_neighbours(features(160) * 1e20, features(24, 1) * 1e20),
+        lambda: price(features(160) * 1e20, features(24, 1) * 1e20),
         examples=4,
     ),
     Case(
@@ -230,7 +302,7 @@ CASES = [
         {
             "scale": st.one_of(st.floats(-300, -34), st.floats(102, 300)).map(lambda e: 10.0**e),
         },
-        lambda: "scikit-learn and skl2onnx: fitted and converted without a word",
+        refused_usual,
     ),
     Case(
         "neighbours",
@@ -277,6 +349,7 @@ CASES = [
         all_rows_error,
         [{"n": 60}, {"n": SHORT}],
         {"n": st.integers(2, 90)},
+        all_rows_usual,
         examples=5,
     ),
     Case(
@@ -292,6 +365,7 @@ CASES = [
             {"n": 12, "classes": 3, "same": True},
         ],
         {"n": st.integers(1, 8), "classes": st.integers(1, 4), "same": st.booleans()},
+        few_usual,
         examples=4,
     ),
     Case(
@@ -303,6 +377,8 @@ CASES = [
         far_error,
         [{"n": SHORT, "factor": 1e6, "seed": 0}],
         {"n": st.just(160), "factor": st.floats(0, 6).map(lambda e: 10.0**e), "seed": SEEDS},
+        lambda: usual_neighbours(features(160), features(24, 1) * 1e6),
+        lambda: price(features(SHORT), features(8, 0) * 1e6),
         examples=3,
     ),
     Case(
@@ -314,6 +390,7 @@ CASES = [
         distance_error,
         [{"scale": 1.0, "seed": 0}, {"scale": 1e-24, "seed": 0}, {"scale": 1e20, "seed": 0}],
         {"scale": st.floats(-24, 20).map(lambda e: 10.0**e), "seed": SEEDS},
+        distance_usual,
         examples=4,
     ),
 ]

@@ -165,6 +165,18 @@ def usual() -> str:
     return f"skl2onnx answers NaN, inf and -inf with rows {said}; scikit-learn {raises}"
 
 
+def beyond_usual() -> str:
+    X = features(30)
+    pipe = usual_pipeline(X, 5, 1, np.arange(30))
+    queries = np.stack([np.full(120, size) for size in (1e200, -1e300, 1.7e308)])
+    single = np.ravel(converted(pipe, X).run(None, {"X": queries.astype(np.float32)})[0]).tolist()
+    try:
+        said = f"answers {pipe.predict(queries).tolist()}"
+    except ValueError as error:
+        said = f"raises {type(error).__name__}"
+    return f"skl2onnx answers rows {single}; scikit-learn {said}"
+
+
 CASES = [
     Case(
         "refusals",
@@ -184,6 +196,6 @@ CASES = [
         0,
         beyond_error,
         [{"size": s} for s in (1e200, -1e300, 1.7e308)],
-        usual=lambda: "float32 input: infinity from 3.4e38 on, then row 0's label",
+        usual=beyond_usual,
     ),
 ]

@@ -64,6 +64,11 @@ def grid_usual() -> str:
     return f"usable of 16 cases at 10 ms: {shares}; explicit LuGre grows to {grown:.0e}"
 
 
+def between_usual() -> str:
+    usable = [s for s in ("explicit", "semi-implicit", "rk4") if naive_push(s, 1e15, 1e-9, h=0.2)]
+    return f"usable at 1e15 N/m, 1e-9 kg, 0.2 s: {', '.join(usable) or 'none'} of three schemes"
+
+
 def tilt_worst(seed: int, count: int) -> float:
     state, free, c = tilt_cases(count, seed)
     return float(tilt_error(state, free, c, tilt.solve(state, free, c)).max())
@@ -133,6 +138,7 @@ CASES = [
             "h": st.floats(-3, -0.7),
             "mu": st.floats(0.05, 1.0),
         },
+        between_usual,
     ),
     Case(
         "simulator",
