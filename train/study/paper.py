@@ -129,8 +129,8 @@ def section(context: Context) -> Section:
             "searched until it met these, as the head of cody18 says of itself, predicts nothing "
             f"there. Of the other {free}, {free_inside} lie within. The paper's accuracies and "
             "ours are of different trials of different objects: the interval alone says what "
-            "chance explains. What the simulation was held to, and what it predicts, stands at the head of its scene's file; nothing "
-            "was moved to meet the other numbers.",
+            "chance explains. What the simulation was held to, and what it predicts, stands at "
+            "the head of its scene's file; nothing was moved to meet the other numbers.",
             *_disagreements(side, ranks),
         ],
         [side, ranks],
