@@ -85,9 +85,10 @@ demo: $(READY)
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make
 
-# The README's picture.
+# The README's pictures, and the settings of `make export FRONT=` where no trade-off was made here.
 docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
+	cp $(OUT)/tradeoff/front.json train/tradeoff/front.json
 
 docs/touch.png: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1

@@ -15,7 +15,7 @@ from train.conformal import FOLDS as CALIBRATION_FOLDS
 from train.simulate.scene import Scene
 from train.tradeoff.accuracy import told
 
-ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
+ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 FOLDS = 5
 G = 9.80665
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from train.study.plots import COLOURS, STYLE, png
 from train.tradeoff.accuracy import Point
-from train.tradeoff.early import Beside
+from train.tradeoff.early import Beside, Early
 
 
 def deals(
@@ -60,15 +60,15 @@ def deals(
             )  # fmt: skip
         if floors:
             top.plot(
-                [1e3 * s for s in floors.values()], np.zeros(len(floors)), "|", ms=14, mew=1.4,
-                color="#444444", transform=top.get_xaxis_transform(), clip_on=False,
+                [1e3 * s for s in floors.values()], [0.022] * len(floors), "|", ms=11, mew=1.3,
+                color="#444444", transform=top.get_xaxis_transform(),
                 label="static friction breaks, an object each",
             )  # fmt: skip
         top.set_xlim(0, 1.04e3 * max(p.seconds for p in points))
         top.set_xlabel("milliseconds from onset to decision")
         top.set_ylabel("nested accuracy, %")
         top.set_title(f"What accuracy costs in time: {task}")
-        top.legend(loc="lower right", fontsize=8)
+        top.legend(loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=5, fontsize=8)
         rows = np.arange(len(listed))
         left = np.zeros(len(listed))
         for name, colour, part in (
@@ -93,7 +93,7 @@ def deals(
         ]
         bottom.set_yticks(rows, names)
         bottom.grid(visible=False, axis="y")
-        bottom.set_xlim(0, max(left.max() * 1.3, 100))
+        bottom.set_xlim(0, max(left.max() * 1.4, 100))
         bottom.set_xlabel(
             f"milliseconds: waiting + wire + arithmetic of the best deals; arithmetic on {board}"
         )
@@ -124,7 +124,7 @@ def stopping(found: Beside, floors: Mapping[str, float], task: str) -> bytes:
             [1e3 * e.mean_s for e in found.early], [100 * e.wrong for e in found.early], "-o",
             ms=5, color=COLOURS[1], label="as soon as it is sure, by asked error",
         )  # fmt: skip
-        for one in found.early:
+        for one in _apart(found.early, 0.04 * found.looks_s[-1], 0.06 * found.fixed.max()):
             axes.annotate(
                 f"{100 * one.asked:g} %",
                 (1e3 * one.mean_s, 100 * one.wrong),
@@ -133,6 +133,7 @@ def stopping(found: Beside, floors: Mapping[str, float], task: str) -> bytes:
                 ha="center",
                 fontsize=8,
                 color=COLOURS[1],
+                bbox={"facecolor": "white", "alpha": 0.8, "pad": 0.4, "linewidth": 0},
             )
         axes.axvline(
             1e3 * found.hindsight_s, color=COLOURS[2], lw=1.0, ls="--",
@@ -143,8 +144,19 @@ def stopping(found: Beside, floors: Mapping[str, float], task: str) -> bytes:
         (floor if slow else axes).set_xlabel("mean milliseconds from onset to decision")
         axes.set_ylabel(f"wrong of {found.trials} held-out trials, %")
         axes.set_title(f"Deciding as soon as it is sure: {task}")
-        axes.legend(fontsize=8, loc="lower left")
+        axes.legend(fontsize=8, loc="lower left", framealpha=1.0)
         return png(figure)
+
+
+def _apart(early: Sequence[Early], seconds: float, wrong: float) -> list[Early]:
+    """Those whose labels do not cover each other, the largest asked errors first."""
+    kept: list[Early] = []
+    for one in sorted(early, key=lambda e: -e.asked):
+        if all(
+            abs(one.mean_s - e.mean_s) > seconds or abs(one.wrong - e.wrong) > wrong for e in kept
+        ):
+            kept.append(one)
+    return kept
 
 
 def _floor(axes: Any, slow: Sequence[tuple[str, float]], full_ms: float) -> None:

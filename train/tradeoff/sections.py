@@ -128,6 +128,10 @@ def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main
             "The floor, mu_s m g / (k v) at the middle of each object's friction and mass: before "
             "it, an object that can move stands still, and looks like one that cannot."
         )
+    else:
+        text.append(
+            "The floor of static friction needs masses and friction, which a scene has (--scene)."
+        )
     figures = [
         Figure(
             f"early_{task}",
@@ -143,7 +147,7 @@ def _headline(task: str, found: early.Beside) -> str:
     full = found.looks_s[-1]
     most = max(found.early, key=lambda one: early.saved(found, one))
     parts = [
-        f"{task}: at most {100 * early.saved(found, most):.0f} % of the time is saved at equal "
+        f"{task}: up to {100 * early.saved(found, most):.0f} % of the time is saved at equal "
         f"accuracy, at an asked error of {100 * most.asked:g} %: {1e3 * most.mean_s:.0f} ms on "
         f"average, {100 * most.wrong:.1f} % wrong."
     ]
