@@ -1,13 +1,14 @@
 """Trials a second of the simulator, beside MuJoCo on the same three scenes in the same run.
 
-`pytest bench/bench_simulate.py`. Each row is a run of several trials of 2 s with full frames of
-384 taxels at 100 Hz; `extra_info` holds trials a second, and the ratio to MuJoCo where it is
-installed. Writing and each effect's cost have rows of their own.
+A trial is 2 s with full frames of 384 taxels at 100 Hz, a batch has 256. Writing and each effect's
+cost have rows of their own.
 """
 
 from __future__ import annotations
 
 import math
+import statistics
+import time
 
 import pytest
 
@@ -25,8 +26,6 @@ SCENES = {
     "movable box": ("rigid", "movable"),
     "soft block": ("foam", "fixed"),
 }
-RATE = {}
-"""{scene: trials a second of MuJoCo}, for the ratio."""
 
 
 def make(family, condition, *add, count=BATCH):
@@ -73,9 +72,12 @@ def peer_model(family, condition):
       <sensor>{"".join(sensors)}</sensor></mujoco>"""
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_bench_mujoco(benchmark, name):
-    mujoco = pytest.importorskip("mujoco")
+def mujoco_trial(name):
+    """A trial in MuJoCo, as a function; None where it is not installed."""
+    try:
+        import mujoco
+    except ImportError:
+        return None
     model = mujoco.MjModel.from_xml_string(peer_model(*SCENES[name]))
 
     def trial():
@@ -88,48 +90,66 @@ def test_bench_mujoco(benchmark, name):
         assert max(f.max() for f in frames) > 0.1
         return frames
 
-    benchmark.pedantic(trial, rounds=3, iterations=1)
-    RATE[name] = 1.0 / benchmark.stats.stats.min
-    benchmark.extra_info["trials_per_s"] = round(RATE[name], 1)
+    return trial
 
 
 @pytest.mark.parametrize("tilt", [(), ("tilt",)], ids=["plain", "tilt"])
 @pytest.mark.parametrize("name", SCENES)
-def test_bench_simulate(benchmark, name, tilt):
+def bench_simulate(benchmark, note, name, tilt):
     family, condition = SCENES[name]
     scene = make(family, condition, *tilt)
     trials = tuple(next(iter(kinds(scene).values())))
-    batch = benchmark.pedantic(
-        run_batch, (scene, trials, step_of(condition)), rounds=5, iterations=1, warmup_rounds=1
-    )
-    assert batch.counts.shape == (BATCH, 201, 16, 24)
-    rate = BATCH / benchmark.stats.stats.min
-    benchmark.extra_info["trials_per_s"] = round(rate)
-    if name in RATE:
-        benchmark.extra_info["times_mujoco"] = round(rate / RATE[name], 1)
+    peer = mujoco_trial(name)
+    peers = []
+
+    def peer_first():
+        if peer is not None:
+            began = time.perf_counter()
+            peer()
+            peers.append(time.perf_counter() - began)
+
+    def ours():
+        batch = run_batch(scene, trials, step_of(condition))
+        assert batch.counts.shape == (BATCH, 201, 16, 24)
+
+    ours()
+    benchmark.pedantic(ours, setup=peer_first, rounds=5, iterations=1)
+    rate = BATCH / benchmark.stats.stats.median
+    note("trials a second", rate, "-" if tilt else "at least 1000")
+    if peers:
+        note("MuJoCo's trials a second", rate * statistics.median(peers), "at least 10")
 
 
-def test_bench_write(benchmark, tmp_path):
-    """Recordings of one batch to files; beside `test_bench_simulate[fixed box-plain]`."""
+def bench_write(benchmark, note, tmp_path):
+    """Recordings of one batch to files, beside simulating them."""
     scene = make("rigid", "fixed")
     trials = tuple(next(iter(kinds(scene).values())))
-    batch = run_batch(scene, trials, 0.01)
+    simulated = []
+    batches = []
+
+    def simulate():
+        began = time.perf_counter()
+        batches[:] = [run_batch(scene, trials, 0.01)]
+        simulated.append(time.perf_counter() - began)
+
     runs = iter(range(100))
 
     def write():
         folder = tmp_path / str(next(runs))
-        for name, trial in recordings(batch, scene, 0.01):
+        for name, trial in recordings(batches[0], scene, 0.01):
             recording.save(folder / name, trial)
 
-    benchmark.pedantic(write, rounds=3, iterations=1)
-    benchmark.extra_info["us_a_trial"] = round(benchmark.stats.stats.min / BATCH * 1e6)
+    benchmark.pedantic(write, setup=simulate, rounds=3, iterations=1)
+    mine = benchmark.stats.stats.median
+    note("us a trial", mine / BATCH * 1e6, "-")
+    note("simulating the same", mine / statistics.median(simulated), "at most 1")
 
 
 FULL = {"cover_n_m": 2600.0, "stribeck_m_s": 0.05, "base_m": 0.1, "height_m": 0.3}
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_bench_effect(benchmark, effect):
+def bench_effect(benchmark, note, effect):
     """Microseconds a trial of each effect, in a movable trial of a family that supports it."""
     info = EFFECTS[effect]
     family = info.families[0] if info.families else "rigid"
@@ -144,4 +164,4 @@ def test_bench_effect(benchmark, effect):
     scene = from_dict(table)
     trial = Trial(scene.objects[0], "movable", 0)
     found = benchmark.pedantic(costs, (scene, (trial,), 0.01), rounds=1, iterations=1)
-    benchmark.extra_info["us_a_trial"] = round(found[effect], 1)
+    note("us a trial", found[effect], "-")

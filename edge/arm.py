@@ -188,6 +188,26 @@ class Chain:
         return cls.from_toml(Path(__file__).parent / "arms" / "cody.toml")
 
     @classmethod
+    def from_file(
+        cls, path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
+    ) -> Chain:
+        """Read a chain from a TOML file, or from a URDF file between two of its links.
+
+        Raises:
+            InputError: as `from_toml` and `from_urdf`; a URDF needs both links, a TOML file none.
+        """
+        if Path(path).suffix.lower() in (".urdf", ".xml"):
+            if base is None or tip is None:
+                raise InputError(
+                    f"{path}: a URDF needs --base and --tip, the arm's first link and the link "
+                    "that carries the skin"
+                )
+            return cls.from_urdf(path, base, tip)
+        if base is not None or tip is not None:
+            raise InputError(f"{path}: --base and --tip are for a .urdf file")
+        return cls.from_toml(path)
+
+    @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Chain:
         """Read the joints between two links of a URDF file.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -56,7 +57,7 @@ def feature_vector(
         InputError: the window or the number of samples makes no sense, the series is empty, or
             a feature does not exist or was not measured.
     """
-    if not (np.isfinite(window_s) and window_s > 0.0):
+    if not (math.isfinite(window_s) and window_s > 0.0):
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
     if samples < 2:
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
@@ -66,7 +67,7 @@ def feature_vector(
     step = window_s / (samples - 1)
     times = np.arange(samples, dtype=np.float64) * step
     places: dict[str, _Place] = {}
-    values = np.stack([_measured(series, feature, places) for feature in wanted])
+    values = np.array([_measured(series, feature, places) for feature in wanted])
     known = np.isfinite(values)
     if known.all():
         vector = _resample(times, series.t, values)
@@ -193,10 +194,18 @@ def _resample(
     The fraction of a step is divided out before it meets the values, where a slope over a very
     short step could overflow.
     """
-    after = np.clip(np.searchsorted(t, times, side="right"), 1, max(t.size - 1, 1))
+    after = t.searchsorted(times, side="right")
+    np.maximum(after, 1, out=after)
+    np.minimum(after, max(t.size - 1, 1), out=after)
     before = after - 1
-    after = np.minimum(after, t.size - 1)
-    step = t[after] - t[before]
-    fraction = np.clip((times - t[before]) / np.where(step > 0.0, step, 1.0), 0.0, 1.0)
-    low, high = values[..., before], values[..., after]
+    if t.size == 1:
+        after = before
+    start = t[before]
+    step = t[after] - start
+    step[step == 0.0] = 1.0
+    fraction = times - start
+    fraction /= step
+    np.maximum(fraction, 0.0, out=fraction)
+    np.minimum(fraction, 1.0, out=fraction)
+    low, high = values.take(before, axis=-1), values.take(after, axis=-1)
     return np.asarray(np.where(fraction == 1.0, high, low + fraction * (high - low)))
