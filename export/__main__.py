@@ -13,6 +13,7 @@ import numpy as np
 
 from edge import __version__, measures
 from edge.cli import dispatch
+from edge.commands.arm_option import add_arm, open_arm
 from edge.errors import InputError
 from edge.features import FEATURES, SAMPLES, WINDOW_S
 from edge.files import write_whole
@@ -82,6 +83,7 @@ def parser() -> argparse.ArgumentParser:
         help="where the points are (build/tradeoff/front.json; where there is none, those of the "
         "simulated set)",
     )
+    add_arm(top, "of recordings with joint angles that name none (Cody's)")
     top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (all cores)")
     top.set_defaults(run=run)
     return top
@@ -98,6 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
         onset=arguments.onset,
         horizon_s=arguments.window,
         features=arguments.features,
+        arm=open_arm(arguments),
         progress=True,
     )
     tasks = _tasks(dataset, arguments.tasks)

@@ -86,20 +86,23 @@ class DataSet:
         return {name: measures.feature(name).unit(self.layout) for name in self.names}
 
 
-def arm_of(recording: Recording, where: str) -> Chain | None:
-    """The recording's arm: its `meta.arm`, Cody's where five angles name none, or None."""
+def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Chain | None:
+    """The recording's arm: its `meta.arm`, else `unnamed`, else Cody's where it has five angles.
+
+    None without joint angles.
+    """
     if recording.joints is None:
         return None
     dof = recording.joints.shape[1]
     arm = recording.meta.get("arm")
     if arm is not None:
         chain = Chain.from_dict(arm, where=f"{where}: meta.arm")
+    elif unnamed is not None:
+        chain = unnamed
     else:
         chain = Chain.cody()
         if dof != chain.dof:
-            raise InputError(
-                f"{where}: has {dof} joint angles and names no arm; store the chain as meta.arm"
-            )
+            raise InputError(f"{where}: has {dof} joint angles and names no arm; give --arm")
     if dof != chain.dof:
         raise InputError(f"{where}: has {dof} joint angles, its arm takes {chain.dof}")
     return chain
@@ -129,6 +132,7 @@ def load_trials(
     tracking: TrackSettings | None = None,
     horizon_s: float = 2.0,
     features: Sequence[str] = FEATURES,
+    arm: Chain | None = None,
     progress: bool = False,
 ) -> DataSet:
     """Read recordings and follow the first contact of each.
@@ -141,6 +145,7 @@ def load_trials(
         tracking: how contacts begin and end.
         horizon_s: seconds from onset that are kept of each contact.
         features: what is measured on each contact (see `edge.measures`).
+        arm: of recordings with joint angles that name none.
         progress: show progress bars on stderr.
 
     Raises:
@@ -164,11 +169,11 @@ def load_trials(
     elif onset is not None:
         reference = replace(reference, onset_counts=onset)
     reference = replace(reference, dead=_dead(recordings))
-    arms = [arm_of(r, str(p)) for r, p in zip(recordings, paths, strict=True)]
+    arms = [arm_of(r, str(p), arm) for r, p in zip(recordings, paths, strict=True)]
     chain = arms[0] if moving and None not in arms else None
     if chain is not None:
-        for arm, path in zip(arms, paths, strict=True):
-            if arm is not None and arm.to_dict() != chain.to_dict():
+        for other, path in zip(arms, paths, strict=True):
+            if other is not None and other.to_dict() != chain.to_dict():
                 raise InputError(f"{path}: its arm is not that of {paths[0]}; train on one arm")
     settings = tracking or TrackSettings()
     trials: list[Trial] = []

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from edge.arm import Chain
+from edge.commands.arm_option import add_arm, open_arm
 from edge.commands.source import Opened, add_skin, open_joints, open_skin
 from edge.errors import InputError
 from edge.frame import Frame
@@ -60,6 +62,7 @@ def add_parser(commands: Any) -> None:
         help="seconds after onset at most (default: %(default)s)",
     )
     parser.add_argument("--dof", type=int, default=None, help="joint angles a line, with --joints")
+    add_arm(parser, "kept with each trial (Cody's is taken where none is named)")
     parser.set_defaults(run=run)
 
 
@@ -158,13 +161,24 @@ def run(arguments: argparse.Namespace) -> int:
     single = Path(arguments.out).suffix == ".npz"
     wanted = 1 if single else arguments.trials
     trial_path(arguments.out, labels)
-    if arguments.joints is not None and arguments.dof is None:
-        raise InputError("--joints needs --dof, how many angles a line has")
+    arm = open_arm(arguments)
+    dof = arguments.dof if arm is None else arm.dof
+    if arguments.dof not in (None, dof):
+        raise InputError(f"--dof {arguments.dof}: {arguments.arm} has {dof} joints")
+    if arguments.joints is not None and dof is None:
+        raise InputError("--joints needs --arm, or --dof: how many angles a line has")
     with (
         stop_on(signal.SIGINT) as stop,
         open_skin(arguments) as opened,
-        open_joints(arguments, opened, arguments.dof) as joints,
+        open_joints(arguments, opened, dof) as joints,
     ):
+        if arm is not None and arguments.joints is None:
+            have = opened.playback.dof if opened.playback is not None else None
+            if have != dof:
+                raise InputError(
+                    f"{opened.source}: gives {have or 'no'} joint angles, the arm of "
+                    f"{arguments.arm} has {dof}; name their source with --joints"
+                )
         skin = opened.skin
         tracker = Tracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead = round(arguments.lead / skin.period_s)
@@ -175,14 +189,14 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames = trials.push(frame)
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, complete=True)
+                _save(frames, arguments.out, labels, opened, arm, complete=True)
                 done += 1
                 if done == wanted:
                     break
         else:
             frames = trials.rest()
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, complete=False)
+                _save(frames, arguments.out, labels, opened, arm, complete=False)
                 done += 1
     if done == 0:
         print("edge-classify: no contact, nothing saved", file=sys.stderr)
@@ -191,7 +205,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _save(
-    frames: list[Frame], out: str, labels: dict[str, str], opened: Opened, *, complete: bool
+    frames: list[Frame],
+    out: str,
+    labels: dict[str, str],
+    opened: Opened,
+    arm: Chain | None,
+    *,
+    complete: bool,
 ) -> None:
     path = trial_path(out, labels)
     meta = {
@@ -203,6 +223,8 @@ def _save(
         "rate_hz": opened.skin.file.reading.rate_hz,
         "complete": complete,
     }
+    if arm is not None:
+        meta["arm"] = arm.to_dict()
     trial = recording(frames, meta)
     save(path, trial, overwrite=False)
     event = {

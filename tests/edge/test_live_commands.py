@@ -311,7 +311,7 @@ def test_record_without_contact_saves_nothing(edge, quiet, tmp_path):
         ([], "give --label TASK=LABEL"),
         (["--label", "a=b", "--label", "a=c"], "a task is named twice"),
         (["--label", "a=b", "--length", "0"], "--length 0.1 to 600"),
-        (["--label", "a=b", "--joints", "stdin"], "--joints needs --dof"),
+        (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
     ],
 )
 def test_record_says_what_it_needs(edge, quiet, options, said):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from edge.arm import Chain, Joint
 from edge.errors import InputError
 from edge.features import feature_vector
 from edge.live import Watcher
@@ -124,3 +125,11 @@ def test_damaged_files_stop_the_fit_and_the_first_is_named(recordings, tmp_path)
 def test_a_threshold_that_no_contact_reaches_is_said(recordings):
     with pytest.raises(InputError, match="no contact in any of 16 recordings"):
         load_trials([recordings], threshold=60000)
+
+
+def test_recordings_that_name_no_arm_take_the_one_given(make_touch, tmp_path):
+    swing = Chain([Joint("swing", (0.0, 0.0, 1.0))])
+    trial = make_touch()
+    save(tmp_path / "one.npz", replace(trial, joints=trial.joints[:, :1]))
+    data = load_trials([tmp_path], arm=swing)
+    assert data.chain is swing
