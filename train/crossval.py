@@ -23,6 +23,8 @@ from train.pipeline import SCALINGS, Choice, leading_axes, scale_of
 
 MAX_COMPONENTS = 20
 MAX_K = 20
+ARGSORT_UP_TO = 400
+"""Rows up to which sorting them all is quicker than picking the nearest first."""
 
 
 def split_neighbours(
@@ -82,7 +84,7 @@ def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
     """(components, k) places of the k smallest of each row, by value and then by place."""
     m = squares.shape[1]
-    if m <= 4 * k:
+    if m <= max(4 * k, ARGSORT_UP_TO):
         return np.argsort(squares, axis=1, kind="stable")[:, :k]
     limits = np.partition(squares, k - 1, axis=1)[:, k - 1 : k]
     order = np.empty((len(squares), k), dtype=np.int64)

@@ -23,12 +23,22 @@ from train.study.score import Labels, Result
 
 @dataclass
 class Table:
-    """A table of the report; it is a CSV file too."""
+    """A table of the report; it is a CSV file too.
+
+    Attributes:
+        name: of its file.
+        title: above it.
+        columns: their headings.
+        rows: cells.
+        timed: columns that were measured with a clock, and differ from run to run; they go to a
+            CSV file of their own, beside the first column.
+    """
 
     name: str
     title: str
     columns: tuple[str, ...]
     rows: list[tuple[Any, ...]] = field(default_factory=list)
+    timed: tuple[str, ...] = ()
 
 
 @dataclass
@@ -99,23 +109,27 @@ class Context:
         return list(tqdm(run(work), total=len(cases), desc=f"{what:<22}", leave=True))
 
     def follow_again(
-        self, what: str, cases: Sequence[tuple[list[Recording], dict[str, Any]]]
+        self, what: str, views: Sequence[skins.View]
     ) -> list[list[FeatureSeries | None]]:
-        """Each case's recordings followed anew; `follow`'s other arguments where they differ."""
+        """The trials' contacts in each of several views, in the order of the trials."""
         data = self.dataset
-        base = {"layout": data.layout, "tracking": data.tracking, "chain": data.chain}
-        return self.map(
-            what, _follow, [(recordings, {**base, **given}) for recordings, given in cases]
-        )
+        # A recording travels to another process once, however many views it is seen in.
+        parts = np.array_split(np.arange(len(self.recordings)), 8 * self.jobs)
+        cases = [
+            ({i: self.recordings[i] for i in part.tolist()}, views, data.tracking, data.chain)
+            for part in parts
+            if part.size
+        ]
+        merged: list[dict[int, FeatureSeries | None]] = [{} for _ in views]
+        for answer in self.map(what, skins.follow_views, cases):
+            for all_seen, seen in zip(merged, answer, strict=True):
+                all_seen |= seen
+        return [[seen[i] for i in sorted(seen)] for seen in merged]
 
 
 def _single(function: Callable[..., Any], case: tuple[Any, ...]) -> Any:
     with threadpool_limits(1):
         return function(*case)
-
-
-def _follow(recordings: list[Recording], given: dict[str, Any]) -> list[FeatureSeries | None]:
-    return skins.follow(recordings, **given)
 
 
 def percent(value: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from train.study.score import (
     pairs_right,
     shuffled_folds,
 )
-from train.study.skins import vectors
+from train.study.skins import View, vectors
 
 EXACT_UP_TO = 200
 """Trials up to which every trial is an outer fold; beyond, ten folds."""
@@ -96,7 +97,7 @@ def section(context: Context) -> Section:
         + "."
     ]
     figures = []
-    tasks = [t for t in y if t != GROUP_TASK or len(y) == 1] or list(y)
+    others = [t for t in y if t != GROUP_TASK]
     unseen = bars.get("objects not met before")
     if unseen is not None:
         text.append(
@@ -105,13 +106,13 @@ def section(context: Context) -> Section:
             "movable trials of it together) costs "
             + ", ".join(
                 f"{task} {100 * (plain[task].accuracy - unseen[task].accuracy):.1f} points"
-                for task in tasks
+                for task in others
             )
             + "."
         )
     png = plots.bars(
         list(bars),
-        {task: [bars[how].get(task, majority(y[task])) for how in bars] for task in tasks},
+        {task: [bars[how].get(task) for how in bars] for task in y},
         title="How the score is taken",
     )
     figures.append(Figure("honest", "How the score is taken", png))
@@ -133,16 +134,16 @@ def section(context: Context) -> Section:
 def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:
     data, y = context.dataset, context.labels
     layout = data.layout
-    cases = []
+    views = []
     names = []
 
-    def with_threshold(counts: int) -> dict[str, object]:
+    def with_threshold(counts: int) -> SkinLayout:
         onset = max(round(layout.onset * counts / max(layout.threshold_counts, 1)), counts)
-        return {"layout": replace(layout, threshold_counts=counts, onset_counts=onset)}
+        return replace(layout, threshold_counts=counts, onset_counts=onset)
 
     for factor in FACTORS:
         counts = round(layout.threshold_counts * factor)
-        cases.append((context.recordings, with_threshold(counts)))
+        views.append(View(with_threshold(counts)))
         names.append(f"one for all, {counts} counts")
     if layout.wraps:
         turned = _seam_under_contact(context)
@@ -152,7 +153,7 @@ def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:
             ("seam under the contact, no wrap-around", *turned),
         ):
             skin = replace(skin, wraps="no wrap" not in name)
-            cases.append(([_rolled(r, skin, shift) for r in context.recordings], {"layout": skin}))
+            views.append(View(skin, partial(_rolled, skin=skin, shift=shift)))
             names.append(name)
     groups = y.get(GROUP_TASK)
     members: list[list[NDArray[np.int64]]] = []
@@ -163,8 +164,8 @@ def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:
         for part, sets in zip(PARTS, members, strict=True):
             for rows in sets:
                 counts = max(round(part * float(np.median(peaks[rows]))), layout.threshold_counts)
-                cases.append(([context.recordings[i] for i in rows], with_threshold(counts)))
-    series = context.follow_again("thresholds", cases)
+                views.append(View(with_threshold(counts), of=tuple(rows.tolist())))
+    series = context.follow_again("thresholds", views)
     followed = [vectors(found) for found in series[: len(names)]]
     lost = [sum(s is None for s in found) for found in series[: len(names)]]
     rest = iter(series[len(names) :])

@@ -122,7 +122,7 @@ def lines(
 
 def bars(
     names: Sequence[str],
-    groups: Mapping[str, Sequence[Result]],
+    groups: Mapping[str, Sequence[Result | None]],
     *,
     title: str,
     paper: Mapping[str, Mapping[str, float]] | None = None,
@@ -133,7 +133,7 @@ def bars(
 
     Args:
         names: along the axis.
-        groups: {group: results of the names}.
+        groups: {group: results of the names, None where there is none}.
         title: of the plot.
         paper: {group: {name: percent}}.
         reference: {text: percent} vertical lines.
@@ -146,11 +146,13 @@ def bars(
         height = 0.8 / g
         for i, (colour, (group, row)) in enumerate(zip(COLOURS, groups.items(), strict=False)):
             y = np.arange(m) + (i - (g - 1) / 2) * height
-            values = np.array([100 * r.accuracy for r in row])
-            low, high = np.array([r.interval for r in row]).T * 100
-            axes.barh(y, values, height * 0.92, color=colour, alpha=0.85, label=group)
+            there = [(place, r) for place, r in zip(y, row, strict=True) if r is not None]
+            places = np.array([place for place, _ in there])
+            values = np.array([100 * r.accuracy for _, r in there])
+            low, high = np.array([r.interval for _, r in there]).T * 100
+            axes.barh(places, values, height * 0.92, color=colour, alpha=0.85, label=group)
             spread = [np.maximum(values - low, 0), np.maximum(high - values, 0)]
-            axes.errorbar(values, y, xerr=spread, fmt="none", ecolor="0.25", lw=0.8)
+            axes.errorbar(values, places, xerr=spread, fmt="none", ecolor="0.25", lw=0.8)
             if paper and group in paper:
                 seen = [(paper[group][n], y[j]) for j, n in enumerate(names) if n in paper[group]]
                 if seen:

@@ -28,12 +28,24 @@ td.number { text-align: right; } tr.no td { background: #fdf0ec; }
 """
 
 
-def table_csv(table: Table) -> str:
-    """The table as CSV text."""
+KEYS = 4
+"""First columns that are repeated beside timings, to tell the rows apart."""
+
+
+def table_csv(table: Table) -> dict[str, str]:
+    """{file name: CSV text} of the table, what a clock measured in a file of its own."""
+    timed = {table.columns.index(column) for column in table.timed}
+    every = range(len(table.columns))
+    files = {f"{table.name}.csv": [i for i in every if i not in timed]}
+    if timed:
+        files[f"{table.name}_timings.csv"] = [i for i in every if i in timed or i < KEYS]
+    return {name: _csv(table, places) for name, places in files.items()}
+
+
+def _csv(table: Table, places: Sequence[int]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows(table.rows)
+    writer.writerows([row[i] for i in places] for row in [table.columns, *table.rows])
     return text.getvalue()
 
 
@@ -52,7 +64,7 @@ def _table(table: Table) -> str:
     return (
         f"<h3>{html.escape(table.title)}</h3>\n"
         f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>'
-        f"</div><p><small>{table.name}.csv</small></p>"
+        f"</div><p>{' '.join(f'<small>{name}</small>' for name in table_csv(table))}</p>"
     )
 
 
@@ -90,7 +102,8 @@ def write(out: Path, title: str, lead: Sequence[str], sections: Sequence[Section
     files: dict[str, bytes] = {}
     for section in sections:
         files |= {f"{figure.name}.png": figure.png for figure in section.figures}
-        files |= {f"{table.name}.csv": table_csv(table).encode() for table in section.tables}
+        for table in section.tables:
+            files |= {name: text.encode() for name, text in table_csv(table).items()}
     files["report.html"] = page(title, lead, sections).encode()
     for name, data in files.items():
         with write_whole(out / name) as file:

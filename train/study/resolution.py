@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from edge.layout import SkinLayout
-from edge.recording import Recording
 from train.study import plots
 from train.study.classify import papers
 from train.study.context import SCORE, Context, Figure, Section, Table, percent, score
 from train.study.score import evaluate
-from train.study.skins import masked, pooled, pooled_layout, thinned, vectors
+from train.study.skins import View, masked, pooled_down, pooled_layout, thinned, vectors
 
 HOW = {"sum": np.add, "maximum": np.maximum}
 SHARES = (1, 2, 4, 8)
@@ -25,18 +26,16 @@ def layouts(layout: SkinLayout) -> list[SkinLayout]:
     return [skin for skin in found if not 1 < skin.rows * skin.cols < 4]
 
 
-def coarser(
-    recordings: list[Recording], layout: SkinLayout, how: str
-) -> list[tuple[SkinLayout, list[Recording]]]:
-    """The recordings of every skin of `layouts` but the first."""
+def coarser(layout: SkinLayout, how: str) -> list[View]:
+    """The view by every skin of `layouts` but the first."""
     wanted = {skin.shape for skin in layouts(layout)[1:]}
-    found: list[tuple[SkinLayout, list[Recording]]] = []
-    skin = layout
-    while skin.rows * skin.cols > 1:
-        skin = pooled_layout(skin)
-        recordings = [pooled(recording, skin, HOW[how]) for recording in recordings]
-        if skin.shape in wanted:
-            found.append((skin, recordings))
+    found: list[View] = []
+    steps: list[SkinLayout] = []
+    while layout.rows * layout.cols > 1:
+        layout = pooled_layout(layout)
+        steps.append(layout)
+        if layout.shape in wanted:
+            found.append(View(layout, partial(pooled_down, layouts=tuple(steps), by=HOW[how])))
     return found
 
 
@@ -45,17 +44,11 @@ def section(context: Context) -> Section:
     layout = context.dataset.layout
     skins = layouts(layout)
     taxels = [skin.rows * skin.cols for skin in skins]
-    recordings = context.recordings
-    cases = [
-        (trials, {"layout": skin})
-        for how in HOW
-        for skin, trials in coarser(recordings, layout, how)
+    views = [view for how in HOW for view in coarser(layout, how)]
+    views += [
+        View(layout, partial(masked, kept=thinned(layout.shape, share))) for share in SHARES[1:]
     ]
-    cases += [
-        ([masked(r, kept) for r in recordings], {"layout": layout})
-        for kept in (thinned(layout.shape, share) for share in SHARES[1:])
-    ]
-    series = context.follow_again("taxel resolution", cases)
+    series = context.follow_again("taxel resolution", views)
     X = [context.vectors(), *(vectors(found) for found in series)]
     results = context.map("its accuracy", evaluate, [(x, context.labels) for x in X])
     levels = len(skins) - 1

@@ -11,7 +11,14 @@ from threadpoolctl import threadpool_limits
 
 from edge.features import FEATURES
 from edge.summary import wilson
-from train.crossval import MAX_COMPONENTS, MAX_K, accuracies, neighbours, split_neighbours
+from train.crossval import (
+    MAX_COMPONENTS,
+    MAX_K,
+    accuracies,
+    first_equal,
+    neighbours,
+    split_neighbours,
+)
 from train.crossval import votes_right as right_votes
 from train.pipeline import vote
 
@@ -105,6 +112,7 @@ def transfer(
     """
     n = len(X)
     both = np.concatenate([X, changed])
+    first = first_equal(both)
     k = min(MAX_K, n - 1)
     with threadpool_limits(1):
         rows = np.concatenate(
@@ -117,6 +125,7 @@ def transfer(
                     MAX_COMPONENTS,
                     k,
                     features,
+                    first,
                 )
                 for i in range(n)
             ]
@@ -141,11 +150,19 @@ def pairs_right(
     k = min(MAX_K, n - 2)
     everything = np.arange(n)
     both = np.array(pairs)
+    first = first_equal(X)
     with threadpool_limits(1):
         rows = np.stack(
             [
                 split_neighbours(
-                    X, np.delete(everything, pair), pair, scaling, MAX_COMPONENTS, k, features
+                    X,
+                    np.delete(everything, pair),
+                    pair,
+                    scaling,
+                    MAX_COMPONENTS,
+                    k,
+                    features,
+                    first,
                 )
                 for pair in both
             ]

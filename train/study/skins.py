@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,42 @@ def follow(
         tracker = Tracker(device, tracking, chain=chain, horizon_s=horizon_s, features=names)
         contact = first_contact(recording, tracker)
         found.append(None if contact is None else contact[1])
+    return found
+
+
+@dataclass(frozen=True)
+class View:
+    """Another way to see the same recordings.
+
+    Attributes:
+        layout: the skin, with its thresholds.
+        change: of each recording, or None; it goes to other processes, so it is no lambda.
+        names: of the features to measure.
+        of: the trials that are seen so; all where None.
+    """
+
+    layout: SkinLayout
+    change: Callable[[Recording], Recording] | None = None
+    names: Sequence[str] = FEATURES
+    of: tuple[int, ...] | None = None
+
+
+def follow_views(
+    recordings: Mapping[int, Recording],
+    views: Sequence[View],
+    tracking: TrackSettings,
+    chain: Chain | None,
+) -> list[dict[int, FeatureSeries | None]]:
+    """The first contact of some recordings, by their number, as each of the views shows it."""
+    found: list[dict[int, FeatureSeries | None]] = []
+    for view in views:
+        seen = {
+            i: recording if view.change is None else view.change(recording)
+            for i, recording in recordings.items()
+            if view.of is None or i in view.of
+        }
+        contacts = follow(list(seen.values()), view.layout, tracking, chain, view.names)
+        found.append(dict(zip(seen, contacts, strict=True)))
     return found
 
 
@@ -112,6 +148,13 @@ def pooled(recording: Recording, layout: SkinLayout, by: np.ufunc) -> Recording:
     counts = np.minimum(pool(frames, by), 65535).astype(np.uint16)
     meta = {**recording.meta, "skin": layout.to_dict()}
     return replace(recording, frames=counts, valid=wider, meta=meta)
+
+
+def pooled_down(recording: Recording, layouts: Sequence[SkinLayout], by: np.ufunc) -> Recording:
+    """`pooled` again and again, through skins each of which is the one before, pooled."""
+    for layout in layouts:
+        recording = pooled(recording, layout, by)
+    return recording
 
 
 def thinned(shape: tuple[int, int], keep: int) -> NDArray[np.bool_]:
