@@ -383,7 +383,10 @@ def _calibration(table: Table, layout: SkinLayout) -> Calibration:
                 f"{table.where}: {key} must be {layout.rows} rows of {layout.cols} "
                 f"{'whole ' if key == 'baseline' else ''}numbers; calibrate again"
             )
-        array = np.array(rows, dtype=np.float64)
+        try:
+            array = np.array(rows, dtype=np.float64)
+        except OverflowError:  # a whole number beyond all floats
+            array = np.array(np.inf)
         if not (np.isfinite(array).all() and (array >= 0).all() and (array <= 65535).all()):
             raise InputError(f"{table.where}: {key} has a value outside of 0 to 65535")
         arrays[key] = array

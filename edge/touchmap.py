@@ -163,7 +163,7 @@ def load(path: str | os.PathLike[str]) -> TouchMap:
                 touches.append(_touch(entry))
         except InputError:
             raise
-        except (KeyError, TypeError, ValueError, AttributeError):
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
             raise InputError(
                 f"{name}: line {number} is not of a map; give what `run --map` wrote"
             ) from None
@@ -174,12 +174,14 @@ def load(path: str | os.PathLike[str]) -> TouchMap:
 
 def _touch(entry: dict[str, Any]) -> Touch:
     x, y, z = (float(v) for v in entry["place"])
-    if not all(map(math.isfinite, (x, y, z))):
-        raise ValueError(entry["place"])
+    onset_s = float(entry["onset_s"])
+    confidence = {str(k): float(v) for k, v in entry["confidence"].items()}
+    if not all(map(math.isfinite, (x, y, z, onset_s, *confidence.values()))):
+        raise ValueError("not finite")
     return Touch(
         place=(x, y, z),
-        onset_s=float(entry["onset_s"]),
+        onset_s=onset_s,
         labels={str(k): None if v is None else str(v) for k, v in entry["labels"].items()},
-        confidence={str(k): float(v) for k, v in entry["confidence"].items()},
+        confidence=confidence,
         flags=tuple(map(str, entry.get("flags", ()))),
     )

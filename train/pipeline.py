@@ -65,6 +65,8 @@ def scale_of(
     types = len(features)
     if X.shape[1] % types:
         raise InputError(f"{X.shape[1]} columns are no whole number of samples of {types} features")
+    if method == "none":
+        return np.zeros(types), np.ones(types)
     blocks = _blocks(X, types)
     mean = blocks.mean(axis=(0, 2))
     largest = np.abs(blocks).max(axis=(0, 2))
@@ -73,8 +75,6 @@ def scale_of(
     def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
 
-    if method == "none":
-        return zeros, ones
     if method == "I":
         return mean, inverse(largest)
     if method == "II":

@@ -234,9 +234,30 @@ MUTANTS = (
     Mutant(
         "a fraction of a step, not a slope, meets the values",
         FEATURES,
-        "(times - t[before]) / np.where(step > 0.0, step, 1.0), 0.0, 1.0)",
-        "(times - t[before]) / np.where(step > 0.0, step, 1.0), 0.0, 2.0)",
+        "np.minimum(fraction, 1.0, out=fraction)",
+        "np.minimum(fraction, 2.0, out=fraction)",
         (OF_FEATURES, "overshoot or last_values"),
+    ),
+    Mutant(
+        "a step of no length divides nothing",
+        FEATURES,
+        "step[step == 0.0] = 1.0",
+        "pass",
+        (OF_FEATURES, "instant or last_values or single or one_frame"),
+    ),
+    Mutant(
+        "what rounding leaves of a line's width is not its root",
+        FEATURES,
+        "np.maximum(along * around - slant * slant, 0.0)",
+        "along * around - slant * slant",
+        (HARD, "width"),
+    ),
+    Mutant(
+        "a trial seen before is as strange as it was",
+        "train/conformal.py",
+        "SLACK = 1e-9",
+        "SLACK = 0.0",
+        (HARD, "repeats"),
     ),
     Mutant(
         "two readings of one instant are one",

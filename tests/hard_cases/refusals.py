@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from edge import skinfile, touchmap
 from edge.arm import Chain, Joint
 from edge.errors import InputError
 from edge.features import feature_vector
@@ -23,6 +24,7 @@ from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, flicker_frames, series_of, taxels
 from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline
 from train.crossval import leave_one_out
+from train.importers.csv_frames import trials
 from train.pipeline import Choice, ContactClassifier
 from train.simulate.scene import from_dict
 
@@ -103,6 +105,41 @@ def metadata(bad: float) -> None:
     ModelInfo.from_json(text.replace("nan", "NaN").replace("inf", "Infinity"), "model.onnx")
 
 
+def touch_map(bad: float, key: str) -> None:
+    head = {"event": "map", "frame": "skin", "unit": "metre", "tasks": ["t"]}
+    touch = {
+        "event": "touch",
+        "onset_s": bad if key == "onset_s" else 1.0,
+        "place": [0.0, bad if key == "place" else 0.0, 0.0],
+        "labels": {"t": "a"},
+        "confidence": {"t": bad if key == "confidence" else 1.0},
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "map.jsonl"
+        path.write_text(f"{json.dumps(head)}\n{json.dumps(touch)}\n")
+        touchmap.load(path)
+
+
+def csv_frames(bad: float, named: bool) -> None:
+    """A folder of frames, whose times are bad in their names or by their rate."""
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / "trial"
+        trial.mkdir()
+        for name in ("0.0", f"{bad}") if named else ("a", "b"):
+            (trial / f"{name}.csv").write_text("1,2\n3,4\n")
+        if not named:
+            (Path(folder) / "skin.json").write_text(json.dumps({"rate_hz": bad}))
+        list(trials(Path(folder)))
+
+
+def calibration(bad: float) -> None:
+    text = skinfile.shipped().read_text()
+    still = "\n".join("  [" + ", ".join(["0"] * 24) + "]," for _ in range(16))
+    noise = still.replace("0", str(bad), 1)
+    table = f"[calibration]\nbaseline = [\n{still}\n]\nnoise = [\n{noise}\n]\n"
+    skinfile.parse(f"{text}\n{table}", "skin.toml")
+
+
 def scene(bad: float) -> None:
     thing = {"name": "x", "family": "rigid", "conditions": ["movable"], "mass_kg": bad}
     from_dict({"object": [{**thing, "friction_static": 0.5, "friction_kinetic": 0.4}]})
@@ -130,6 +167,12 @@ ENTRIES: dict[str, Callable[[float], object]] = {
     "leave-one-out": left_out,
     "a model's metadata": metadata,
     "a scene's mass": scene,
+    "a map's place": lambda bad: touch_map(bad, "place"),
+    "a map's time": lambda bad: touch_map(bad, "onset_s"),
+    "a map's confidence": lambda bad: touch_map(bad, "confidence"),
+    "the names of CSV frames": lambda bad: csv_frames(bad, named=True),
+    "the rate of CSV frames": lambda bad: csv_frames(bad, named=False),
+    "a calibration's noise": calibration,
 }
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from tests.hard_cases import everywhere, frames, neighbours, refusals, scaling, simulator
+from tests.hard_cases import everywhere, frames, moments, neighbours, refusals, scaling, simulator
 from tests.hard_cases.cases import Case
 
 CASES: list[Case] = [
     *neighbours.CASES,
     *scaling.CASES,
     *frames.CASES,
+    *moments.CASES,
     *refusals.CASES,
     *everywhere.CASES,
     *simulator.CASES,

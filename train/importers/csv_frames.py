@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.recording import Recording
 
+FASTEST_HZ = 1_000_000
+"""Frames a second beyond which a rate is a slip of the pen."""
+
 
 def trials(path: Path) -> Iterator[tuple[str, Recording]]:
     """One recording a folder."""
@@ -80,8 +83,12 @@ def _labels(path: Path) -> dict[str, dict[str, str]]:
 
 def _times(folder: Path, files: list[Path], rate: Any) -> NDArray[np.float64]:
     if rate is not None:
-        if isinstance(rate, bool) or not isinstance(rate, int | float) or not rate > 0:
-            raise InputError(f"{folder.parent}/skin.json: rate_hz must be above 0, not {rate!r}")
+        number = not isinstance(rate, bool) and isinstance(rate, int | float)
+        if not (number and 0 < rate <= FASTEST_HZ):
+            raise InputError(
+                f"{folder.parent}/skin.json: rate_hz must be above 0 and at most "
+                f"{FASTEST_HZ}, not {rate!r}"
+            )
         return np.arange(len(files)) / float(rate)
     try:
         t = np.array([float(file.stem) for file in files])

@@ -160,23 +160,13 @@ def bars(
                     mark = "paper" if i == 0 else None
                     axes.plot(px, py, "D", color="black", mfc="gold", ms=5, label=mark)
         for text, place in (reference or {}).items():
-            axes.axvline(place, color="0.35", lw=1, ls=":")
-            axes.text(
-                place,
-                1.01,
-                text,
-                transform=axes.get_xaxis_transform(),
-                fontsize=7,
-                ha="center",
-                rotation=25,
-                va="bottom",
-            )
+            axes.axvline(place, color="0.35", lw=1, ls=":", label=text)
         axes.set_yticks(range(m), names)
         axes.invert_yaxis()
         axes.set_xlim(0, 100)
         axes.set_xlabel(label)
-        axes.set_title(title, pad=34 if reference else None)
-        if g > 1 or paper:
+        axes.set_title(title)
+        if g > 1 or paper or reference:
             axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         return png(figure)
 
