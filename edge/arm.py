@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -173,6 +172,8 @@ class Chain:
         Raises:
             InputError: the file cannot be read, or is not a chain.
         """
+        import tomllib  # a model brings its arm along: most runs read no such file
+
         try:
             with open(path, "rb") as file:
                 arm = tomllib.load(file)

@@ -28,8 +28,8 @@ MOST_COLUMNS = 1 << 12
 RANGE = 4.0
 """How far beyond the training set's range a query may lie and still be projected exactly."""
 SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
-"""Above these, squares overflow in a distance. Below, ONNX Runtime's optimiser takes the grids of
-a `Projection` for the 0 that they are in float32, and leaves their rounding out."""
+"""Above, squares overflow in a distance. Below, nothing has been asked of the graph: the hard
+cases go down to it."""
 CLOSE_EIGENVALUES = 1e-6
 WELL_CONDITIONED = 1e-8
 """Variance, as a part of the largest, down to which eigenvectors of a covariance are trusted."""
