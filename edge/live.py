@@ -14,6 +14,9 @@ from edge.layout import SkinLayout
 from edge.model import Decision, Model
 from edge.track import Contact, Tracker, Tracks, for_device
 
+TRAINED_ON = "trained_on"
+"""Flag of a decision whose touch is one of the training trials, bit for bit."""
+
 Event = dict[str, Any]
 """One JSON object; `event` says which."""
 
@@ -227,6 +230,9 @@ class Watcher:
     ) -> Event | None:
         """What a look says of a task; None where it must go on waiting."""
         candidates = waiting.candidates.get(task)
+        # No new touch repeats another to the last bit: this one was learnt from.
+        if decision.distances[0] == 0.0:
+            flags = [*flags, TRAINED_ON]
         if candidates is None:
             return {
                 "label": decision.label,

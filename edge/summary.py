@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from edge.live import TRAINED_ON
 from edge.model import Task
 
 NONE = "(none)"
@@ -20,14 +21,19 @@ class Summary:
         self._tasks = tasks
         self._pairs: dict[str, Counter[tuple[str, str]]] = {task: Counter() for task in tasks}
         self.recordings = 0
+        self.trained_on = 0
+        """Recordings that the model learnt from."""
 
     def add(self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]) -> None:
         """Take in the events of one recording and its labels."""
         self.recordings += 1
         first: dict[str, str] = {}
+        trained_on = False
         for event in events:
             if event["event"] == "decision":
                 first.setdefault(event["task"], event["label"] or NONE)
+                trained_on |= TRAINED_ON in event["flags"]
+        self.trained_on += trained_on
         for task in self._tasks:
             if task in labels:
                 self._pairs[task][labels[task], first.get(task, NONE)] += 1
@@ -40,6 +46,11 @@ class Summary:
     def text(self) -> str:
         """A table a task: rows are what was touched, columns what was said."""
         parts = [f"{self.recordings} recordings"]
+        if self.trained_on:
+            parts.append(
+                f"{self.trained_on} of them are among the trials that the model learnt from: they "
+                "say nothing of new touches (what `make export` printed, leave-one-out, does)"
+            )
         for task in self._tasks:
             right, total = self.accuracy(task)
             if total == 0:

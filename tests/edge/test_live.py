@@ -36,7 +36,12 @@ def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(model, m
     assert decision["window_s"] == 1.2
     assert decision["confidence"] == 1.0
     assert decision["latency_ms"] > 0.0
-    assert decision["flags"] == []
+    assert decision["flags"] == ["trained_on"]
+
+
+def test_a_new_touch_is_not_flagged(model, make_touch):
+    events = [e for _, e in watch(model, make_touch(kind="soft", seed=99))]
+    assert [e["flags"] for e in events if e["event"] == "decision"] == [[], []]
 
 
 def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(model, make_touch):
