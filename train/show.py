@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -154,18 +155,22 @@ def _side(
     """The arm at the onset and at the window's end, in the torso's x-z plane."""
     joints = recording.joints
     assert joints is not None
+    simulated = recording.meta.get("simulation")
+    values = simulated.get("values", {}) if isinstance(simulated, dict) else {}
     for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
         k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
         points = _links(chain, joints[k])
         axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
-        place = _contact(recording, chain, layout, k)
-        if place is not None:
+        found = _contact(recording, chain, layout, k)
+        if found is not None:
+            place, outward = found
             axis.plot(place[0], place[2], "*", color=style, markersize=13)
-    simulated = recording.meta.get("simulation")
+            if values.get("width_m"):
+                outline = _outline(place, outward, values["width_m"], values.get("radius_m"))
+                axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
     if isinstance(simulated, dict):
         family = simulated.get("family", "")
         effects = ", ".join(simulated.get("effects", []))
-        values = simulated.get("values", {})
         mass = values.get("mass_kg")
         what = f"{family}" + (f", {mass:.2g} kg" if mass is not None else "")
         axis.set_title(f"seen from the side: {what}\n{effects}", fontsize=9)
@@ -177,13 +182,36 @@ def _side(
     axis.legend(fontsize=8)
 
 
-def _contact(recording: Recording, chain: Chain, layout: SkinLayout, k: int) -> np.ndarray | None:
-    """World place of the region's centroid on frame k."""
+DEPTH_M = 0.08
+"""How much of an object is sketched behind its face."""
+
+
+def _outline(place: Any, outward: Any, width_m: float, radius_m: float | None) -> np.ndarray:
+    """(points, 2) x and z of the object's face, with what is behind it."""
+    normal = np.array([outward[0], outward[2]])
+    normal /= np.linalg.norm(normal) or 1.0
+    along = np.array([-normal[1], normal[0]])
+    radius = max(radius_m or math.inf, width_m / 2)
+    s = np.linspace(-width_m / 2, width_m / 2, 33)
+    back = 0.0 * s if radius > 1e3 else radius - np.sqrt(radius**2 - s**2)
+    depth = max(float(back.max()), DEPTH_M)
+    centre = np.array([place[0], place[2]])
+    face = centre + s[:, None] * along + back[:, None] * normal
+    ends = centre + np.array([s[-1], s[0]])[:, None] * along + depth * normal
+    return np.vstack([face, ends])
+
+
+def _contact(
+    recording: Recording, chain: Chain, layout: SkinLayout, k: int
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """World place of the region's centroid on frame k, and the way out of the skin there."""
     region = largest_region(recording.frames[k], layout.threshold_counts, wraps=layout.wraps)
     if region is None or recording.joints is None:
         return None
     pose = chain.pose(recording.joints[k])
-    return np.asarray(pose[:3, :3] @ layout.position(*region.centroid) + pose[:3, 3])
+    place = layout.position(*region.centroid)
+    out = place * [1.0, 1.0, 0.0]
+    return pose[:3, :3] @ place + pose[:3, 3], pose[:3, :3] @ out
 
 
 def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:
@@ -201,4 +229,4 @@ def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> 
         for j in range(joints.shape[1]):
             other.plot(t, np.degrees(joints[:, j] - joints[0, j]), lw=1, label=f"j{j}")
         other.set_ylabel("joint angles from their start, degrees")
-        other.legend(fontsize=8, loc="lower left")
+        other.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=5)
