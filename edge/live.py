@@ -12,7 +12,8 @@ from edge.features import feature_vector
 from edge.frame import Frame
 from edge.layout import SkinLayout
 from edge.model import Decision, Model
-from edge.track import Contact, Tracker, Tracks, for_device
+from edge.track import Contact, Tracker, for_device
+from edge.tracks import Tracks
 
 TRAINED_ON = "trained_on"
 """Flag of a decision whose touch is one of the training trials, bit for bit."""

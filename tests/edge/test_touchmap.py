@@ -15,7 +15,7 @@ from edge.layout import SkinLayout
 from edge.live import Watcher
 from edge.model import Model
 from edge.recording import load, save
-from edge.track import Tracks
+from edge.tracks import Tracks
 
 FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20)
 

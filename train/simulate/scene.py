@@ -15,6 +15,7 @@ from edge.errors import InputError
 from edge.layout import SkinLayout
 from train.simulate import fields
 from train.simulate.fields import EFFECTS, Field
+from train.simulate.reader import Reader, Value
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
@@ -38,24 +39,6 @@ CODY_SKIN: dict[str, Any] = {
     "row0_z_m": 0.18432,
     "column_angles_deg": list(COLUMN_ANGLES_DEG),
 }
-
-
-@dataclass(frozen=True)
-class Value:
-    """A number of a scene: the same in every trial, or drawn evenly between two limits."""
-
-    low: float
-    high: float
-
-    @property
-    def middle(self) -> float:
-        """The value of a trial without variation."""
-        return 0.5 * (self.low + self.high)
-
-    @property
-    def varies(self) -> bool:
-        """Whether it is drawn anew in each trial."""
-        return self.high > self.low
 
 
 @dataclass(frozen=True)
@@ -110,77 +93,6 @@ class Scene:
         return int(self.trials["count"])
 
 
-class _Reader:
-    """Checks one table of the file; each complaint names file, key and allowed values."""
-
-    def __init__(self, where: str) -> None:
-        self.where = where
-
-    def fail(self, key: str, what: str) -> InputError:
-        return InputError(f"{self.where}: {key} {what}")
-
-    def table(self, value: object, key: str) -> Mapping[str, Any]:
-        if not isinstance(value, Mapping):
-            raise self.fail(key, f"must be a table ([{key}]), not {value!r}")
-        return value
-
-    def known(self, table: Mapping[str, Any], key: str, allowed: tuple[str, ...]) -> None:
-        for name in table:
-            if name not in allowed:
-                prefix = f"{key}." if key else ""
-                raise self.fail(
-                    f"unknown key {prefix}{name};", f"allowed here: {', '.join(allowed)}"
-                )
-
-    def number(self, value: object, key: str, limits: Field) -> float:
-        between = f"{'above' if limits.open_low else 'at least'} {limits.low:g}"
-        if limits.high < math.inf:
-            between += f", at most {limits.high:g}"
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"must be a number ({between}), not {value!r}")
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        low_ok = number > limits.low if limits.open_low else number >= limits.low
-        if not (math.isfinite(number) and low_ok and number <= limits.high):
-            raise self.fail(key, f"must be {between}, not {value!r}")
-        return number
-
-    def value(self, value: object, key: str, limits: Field) -> Value:
-        if isinstance(value, list):
-            if len(value) != 2:
-                raise self.fail(key, f"must be one number or a range [low, high], not {value!r}")
-            low, high = (self.number(v, key, limits) for v in value)
-            if low > high:
-                raise self.fail(
-                    key, f"is a range turned round, [{low:g}, {high:g}]; write [{high:g}, {low:g}]"
-                )
-            return Value(low, high)
-        number = self.number(value, key, limits)
-        return Value(number, number)
-
-    def numbers(self, value: object, key: str, count: int, limits: Field) -> tuple[float, ...]:
-        if not isinstance(value, list) or len(value) != count:
-            raise self.fail(key, f"must be {count} numbers, one a joint, not {value!r}")
-        return tuple(self.number(v, key, limits) for v in value)
-
-    def text(self, value: object, key: str) -> str:
-        if not isinstance(value, str) or not value.strip():
-            raise self.fail(key, f"must be text, not {value!r}")
-        return value
-
-    def names(self, value: object, key: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
-        if not isinstance(value, list):
-            raise self.fail(key, f"must be a list of names ({', '.join(allowed)}), not {value!r}")
-        for name in value:
-            if not isinstance(name, str) or name not in allowed:
-                raise self.fail(key, f"has no {name!r}; allowed: {', '.join(allowed)}")
-        if len(set(value)) != len(value):
-            raise self.fail(key, f"names one twice: {', '.join(value)}")
-        return tuple(value)
-
-
 def load(
     path: str | os.PathLike[str], *, seed: int | None = None, count: int | None = None
 ) -> Scene:
@@ -214,7 +126,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     Raises:
         InputError: as `load`.
     """
-    read = _Reader(where)
+    read = Reader(where)
     read.known(table, "", TOP)
     seed = table.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
@@ -256,7 +168,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     return scene
 
 
-def _fields(read: _Reader, value: object, key: str, known: dict[str, Field]) -> dict[str, float]:
+def _fields(read: Reader, value: object, key: str, known: dict[str, Field]) -> dict[str, float]:
     table = read.table(value, key)
     read.known(table, key, tuple(known))
     return {
@@ -267,7 +179,7 @@ def _fields(read: _Reader, value: object, key: str, known: dict[str, Field]) -> 
     }
 
 
-def _trials(read: _Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], Value]:
+def _trials(read: Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], Value]:
     read.known(table, "trials", tuple(fields.TRIALS))
     out = {
         name: read.number(table.get(name, limits.default), f"trials.{name}", limits)
@@ -280,7 +192,7 @@ def _trials(read: _Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], 
     return out, read.value(table.get("lead_s", limits.default), "trials.lead_s", limits)
 
 
-def _steps(read: _Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, float]:
+def _steps(read: Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, float]:
     read.known(table, "step_s", ("base", *EFFECTS))
     if table and "base" not in table:
         raise read.fail("step_s.base", "is missing: the step of trials without the others named")
@@ -298,7 +210,7 @@ def _steps(read: _Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str,
 
 
 def _arm(
-    read: _Reader, table: Mapping[str, Any]
+    read: Reader, table: Mapping[str, Any]
 ) -> tuple[Chain, tuple[float, ...], tuple[float, ...]]:
     read.known(table, "arm", ("chain", "stiffness_nm_rad", "damping_nms_rad"))
     name = read.text(table.get("chain", "cody"), "arm.chain")
@@ -316,7 +228,7 @@ def _arm(
 
 
 def _motion(
-    read: _Reader, table: Mapping[str, Any], chain: Chain
+    read: Reader, table: Mapping[str, Any], chain: Chain
 ) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
     read.known(table, "motion", ("start_deg", "rate_deg_s", "travel_s", "place_m"))
     angle = Field(-720.0, 720.0, None, "")
@@ -344,7 +256,7 @@ def _motion(
     return out[0], out[1], travel, place
 
 
-def _skin(read: _Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
+def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     shape = tuple(CODY_SKIN)
     read.known(table, "skin", (*shape, *fields.SKIN))
     layout: dict[str, Any] = {**CODY_SKIN, **{k: table[k] for k in shape if k in table}}
@@ -368,7 +280,7 @@ def _skin(read: _Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     return skin, taxel
 
 
-def _objects(read: _Reader, value: object) -> tuple[SceneObject, ...]:
+def _objects(read: Reader, value: object) -> tuple[SceneObject, ...]:
     if not isinstance(value, list) or not value:
         raise read.fail("object", "is missing: give at least one [[object]]")
     objects = tuple(_object(read, entry, i) for i, entry in enumerate(value))
@@ -379,7 +291,7 @@ def _objects(read: _Reader, value: object) -> tuple[SceneObject, ...]:
     return objects
 
 
-def _object(read: _Reader, entry: object, index: int) -> SceneObject:
+def _object(read: Reader, entry: object, index: int) -> SceneObject:
     table = read.table(entry, f"object {index}")
     name = read.text(table.get("name", ""), f"object {index}: name")
     key = f"object {name!r}:"
@@ -422,7 +334,7 @@ def _object(read: _Reader, entry: object, index: int) -> SceneObject:
     return SceneObject(name, family, conditions, values, frozenset(table) & set(fields.OBJECT))
 
 
-def _check_pairs(read: _Reader, key: str, values: dict[str, Value]) -> None:
+def _check_pairs(read: Reader, key: str, values: dict[str, Value]) -> None:
     static, kinetic = values.get("friction_static"), values.get("friction_kinetic")
     if static is not None and kinetic is not None and kinetic.high > static.low:
         raise read.fail(
@@ -437,7 +349,7 @@ def _check_pairs(read: _Reader, key: str, values: dict[str, Value]) -> None:
 
 
 def _effects(
-    read: _Reader, value: object
+    read: Reader, value: object
 ) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, dict[str, float]]]:
     table = read.table(value, "effects")
     read.known(table, "effects", ("add", "leave_out", *EFFECTS))
