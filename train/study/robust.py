@@ -19,7 +19,7 @@ from train.simulate.scene import Scene
 from train.study import plots
 from train.study.context import SCORE, Context, Figure, Section, Table, score
 from train.study.score import evaluate, transfer
-from train.study.skins import follow, vectors
+from train.study.skins import Remembering, follow, vectors
 
 FACTORS = (0.5, 2.0)
 SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
@@ -103,6 +103,7 @@ def measured(
     shown = next(iter(scenes))
     shot = shoot(scenes[shown], trials, step_s, plan=plans[shown])
     found: dict[str, dict[str, FeatureSeries | None]] = {}
+    chain = None if chain is None else Remembering(chain)
     for name, scene in scenes.items():
         batch = recordings(read_out(shot, plans[name]), scene, step_s)
         kept = {file: recording for file, recording in batch if file in wanted}
