@@ -99,8 +99,10 @@ def bench_cold_start(against, built, tmp_path):
 
     def start(command, sign):
         def until_decided():
-            # Unbuffered, so that its line is here as soon as it is decided.
+            # Unbuffered, so that its line is here as soon as it is decided; compiled once and
+            # for all, as an installed package is.
             environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+            environment.pop("PYTHONDONTWRITEBYTECODE", None)
             pipe = subprocess.PIPE
             with subprocess.Popen(command, cwd=ROOT, stdout=pipe, env=environment) as process:
                 decided = any(sign in line for line in process.stdout)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,7 +79,7 @@ def _asked(build: Builder, x: str, model: SequentialClassifier) -> list[str]:
     wide = build.node("Unsqueeze", [x, build.ints(1, 2)])
     gaps: dict[str, tuple[str, int]] = {}
     squares: dict[tuple[str, int], str] = {}
-    found: list[str] = []
+    scores: list[str] = []
     for task, choice in model.choices.items():
         calibration = model.calibrations_[task]
         if choice.scaling not in gaps:
@@ -91,8 +92,14 @@ def _asked(build: Builder, x: str, model: SequentialClassifier) -> list[str]:
             squares[choice.scaling, c] = build.node(
                 "ReduceSumSquare", [apart, build.ints(2)], keepdims=0
             )
-        found.append(_task(build, squares[choice.scaling, c], calibration))
-    return found
+        scores += _scores(build, squares[choice.scaling, c], calibration)
+    calibrations = [model.calibrations_[task] for task in model.choices]
+    every = _pvalues(build, build.node("Concat", scores, axis=2), calibrations)
+    ends = np.cumsum([calibration.classes + 1 for calibration in calibrations]).tolist()
+    return [
+        build.node("Slice", [every, *(build.ints(i) for i in (first, end, 2))])
+        for first, end in zip([0, *ends], ends, strict=False)
+    ]
 
 
 def _gaps(build: Builder, wide: str, model: SequentialClassifier, scaling: str) -> tuple[str, int]:
@@ -110,8 +117,8 @@ def _gaps(build: Builder, wide: str, model: SequentialClassifier, scaling: str) 
     return build.node("Sub", [rows, z]), c
 
 
-def _task(build: Builder, squares: str, calibration: Calibration) -> str:
-    """Squared distances (n, folds, rows) to the p-values of one task."""
+def _scores(build: Builder, squares: str, calibration: Calibration) -> list[str]:
+    """Squared distances (n, folds, rows) to a task's scores: (n, folds, labels) and one more."""
     classes = calibration.classes
     ints = build.ints
 
@@ -132,40 +139,44 @@ def _task(build: Builder, squares: str, calibration: Calibration) -> str:
         other = build.node("Where", [is_first, second, first])
         same = build.node("LessOrEqual", [nearest, zero])
         ratio = build.node("Where", [same, zero, build.node("Div", [nearest, other])])
-    parts = [
-        _pvalues(
-            build,
-            score,
-            [[both[which] for both in look] for look in calibration.rankings],
-            calibration.maxima[which],
-            calibration.sizes,
-        )
-        for which, score in enumerate((ratio, first))
-    ]
-    return build.node("Concat", parts, axis=2)
+    return [ratio, first]
 
 
-def _pvalues(
-    build: Builder,
-    scores: str,
-    rankings: list[list[Ranking]],
-    maxima: NDArray[np.float64],
-    sizes: NDArray[np.int64],
-) -> str:
-    """Scores (n, folds, labels) to their p-values."""
+def _pvalues(build: Builder, scores: str, calibrations: list[Calibration]) -> str:
+    """Scores (n, folds, columns) to their p-values.
+
+    The columns are a task's labels and its distance to the nearest, task by task; all labels of
+    a task share one ranking.
+    """
     last = build.ints(3)
-    limits = build.by_look([np.stack([r.limits for r in look])[:, None] for look in rankings])
-    scale = build.by_look([np.array([[r.scale] for r in look]) for look in rankings])
+    kinds: list[int] = []
+    for i, calibration in enumerate(calibrations):
+        kinds += [2 * i] * calibration.classes + [2 * i + 1]
+    columns = build.ints(*kinds)
+    looks = range(len(calibrations[0].rankings))
+    folds = range(len(calibrations[0].sizes))
+
+    def stacked(part: Callable[[Ranking], Any]) -> list[NDArray[np.float64]]:
+        """(folds, kinds, ...) of each look."""
+        return [
+            np.array([[part(r) for c in calibrations for r in c.rankings[i][k]] for k in folds])
+            for i in looks
+        ]
 
     def counted(flags: str) -> str:
         numbers = build.node("Cast", [flags], to=TensorProto.DOUBLE)
         return build.node("ReduceSum", [numbers, last], keepdims=0)
 
+    def spread(values: list[NDArray[np.float64]]) -> str:
+        return build.node("Gather", [build.by_look(values), columns], axis=1)
+
+    limits, scale = spread(stacked(lambda r: r.limits)), spread(stacked(lambda r: r.scale))
+    maxima = np.concatenate([c.maxima for c in calibrations])[kinds].transpose(1, 0, 2)
     below = counted(build.node("Less", [limits, build.node("Unsqueeze", [scores, last])]))
     one = build.constant(1.0)
     share = build.node("Div", [scale, build.node("Add", [scale, scores])])
     ranks = build.node("Add", [below, build.node("Sub", [one, share])])
     wide = build.node("Unsqueeze", [ranks, last])
-    at_least = counted(build.node("LessOrEqual", [wide, build.constant(maxima[:, None])]))
-    total: Any = build.constant((1.0 + sizes)[:, None])
+    at_least = counted(build.node("LessOrEqual", [wide, build.constant(maxima)]))
+    total: Any = build.constant((1.0 + calibrations[0].sizes)[:, None])
     return build.node("Div", [build.node("Add", [at_least, one]), total])
