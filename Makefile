@@ -122,8 +122,9 @@ tradeoff: $(READY)
 	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 endif
+	$(BIN)/python -m export.prices --data $(RECORDINGS) --out $(OUT)/tradeoff/prices.json
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
-	  --out $(OUT)/tradeoff $(TRADEOFF)
+	  --prices $(OUT)/tradeoff/prices.json --out $(OUT)/tradeoff $(TRADEOFF)
 
 faults: $(READY)
 	$(BIN)/python -m bench.faults

@@ -25,6 +25,12 @@ def add_parser(commands: Any) -> None:
         metavar="board.json",
         help="of `edge-classify bench` with a model that was fitted on these recordings",
     )
+    parser.add_argument(
+        "--prices",
+        metavar="prices.json",
+        help="of `python -m export.prices` with these recordings: shows what components, "
+        "neighbours and training rows cost",
+    )
     parser.add_argument("--scene", help="what they were simulated from: draws the physical floor")
     parser.add_argument(
         "--task", help="of the picture and of front.json (category, else the first)"
@@ -49,6 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         scene_path=arguments.scene,
         jobs=arguments.jobs,
         main=arguments.task,
+        prices_path=arguments.prices,
     )
     print(report)
     return 0

@@ -23,7 +23,7 @@ from train.simulate import scene as scenes
 from train.study import skins
 from train.study.report import write
 from train.tradeoff import board as boards
-from train.tradeoff import early, sections
+from train.tradeoff import early, prices, sections
 from train.tradeoff.accuracy import Point, front, nested, thinned
 from train.tradeoff.wires import Wire, wires
 
@@ -45,6 +45,7 @@ def tradeoff(
     scene_path: str | None = None,
     jobs: int = 1,
     main: str | None = None,
+    prices_path: str | None = None,
 ) -> Path:
     """Measure every setting worth showing and write the report; its path.
 
@@ -55,6 +56,7 @@ def tradeoff(
         scene_path: what they were simulated from, for the physical floor.
         jobs: processes.
         main: the task of the picture and of front.json; `category` where there is one.
+        prices_path: prices.json of these recordings, for the price of a model's size.
 
     Raises:
         InputError: the data cannot be used, or the board file is none or another model's.
@@ -63,6 +65,7 @@ def tradeoff(
     scene = None if scene_path is None else scenes.load(scene_path)
     dataset = load_trials(data, horizon_s=WINDOWS[-1], progress=True)
     boards.check(board, board_path, dataset.digest)
+    sizes = None if prices_path is None else prices.read(prices_path, dataset.digest)
     if len(dataset.trials) < FEWEST:
         raise InputError(f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}")
     if main is None:
@@ -77,6 +80,7 @@ def tradeoff(
         sections.deals(points, best, main, board, floors, is_paper),
         sections.stopping(both, floors, main),
         *([sections.unknown(finest, strange)] if strange else []),
+        *([] if sizes is None else [prices.section(sizes, dataset, main)]),
         sections.arithmetic(board),
     ]
     lead = [

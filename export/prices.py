@@ -1,0 +1,159 @@
+"""`python -m export.prices`: what a decision costs in time by the size of its model."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+from skl2onnx import to_onnx as convert
+from sklearn.decomposition import PCA
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from tqdm import tqdm
+
+from edge.cli import dispatch
+from edge.commands.bench import machine
+from edge.files import write_whole
+from edge.model import Model
+from export.__main__ import describe
+from export.graph import to_onnx
+from train.crossval import Chosen
+from train.dataset import DataSet, load_trials
+from train.pipeline import Choice, ContactClassifier
+
+COMPONENTS = (1, 2, 5, 10, 20)
+NEIGHBOURS = (1, 2, 5, 20)
+ROWS = (1_000, 10_000)
+SIZE = (5, 2)
+"""Components and k where another number is varied."""
+SCALING = "IV"
+CALLS = 300
+
+
+def grown(X: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
+    """`rows` vectors like those of X: repeated with a thousandth of jitter, the same every time."""
+    stream = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0x70726963,)))
+    every = X[np.arange(rows) % len(X)]
+    return every * (1.0 + 1e-3 * stream.normal(size=every.shape) * (rows > len(X)))
+
+
+def median_us(decide: Callable[[], object], calls: int) -> float:
+    """Median microseconds of a call."""
+    decide()
+    taken = []
+    for _ in range(calls):
+        began = time.perf_counter_ns()
+        decide()
+        taken.append(time.perf_counter_ns() - began)
+    return round(statistics.median(taken) / 1e3, 1)
+
+
+def price(
+    dataset: DataSet, X: NDArray[np.float64], task: str, components: int, k: int, calls: int
+) -> dict[str, Any]:
+    """One decision of one task with a model of so many rows, components and neighbours."""
+    y = dataset.labels(task)[np.arange(len(X)) % len(dataset.trials)]
+    choice = Choice(SCALING, components, k)
+    fitted = ContactClassifier({task: choice}, dataset.names).fit(X, {task: y})
+    info = describe(dataset, fitted, {task: Chosen(choice, 0.0)}, 1.2)
+    data = to_onnx(fitted, replace(info, rows=len(X)))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.onnx"
+        path.write_bytes(data)
+        model = Model(path)
+    vector = X[0] * 1.001
+    return {
+        "rows": len(X),
+        "components": components,
+        "k": k,
+        "operators": "ours, float64",
+        "us": median_us(lambda: model.decide(vector), calls),
+        "kilobytes": round(len(data) / 1024, 1),
+    }
+
+
+def usual_price(X: NDArray[np.float64], y: NDArray[np.str_], calls: int) -> dict[str, Any]:
+    """The same by skl2onnx's own conversion of scikit-learn's pipeline."""
+    components, k = SIZE
+    pipe = make_pipeline(StandardScaler(), PCA(components), KNeighborsClassifier(k)).fit(X, y)
+    data = convert(pipe, X[:1].astype(np.float32), options={"zipmap": False}).SerializeToString()
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.log_severity_level = 3
+    session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    given = {session.get_inputs()[0].name: X[:1].astype(np.float32)}
+    return {
+        "rows": len(X),
+        "components": components,
+        "k": k,
+        "operators": "skl2onnx's own",
+        "us": median_us(lambda: session.run(None, given), calls),
+        "kilobytes": round(len(data) / 1024, 1),
+    }
+
+
+def prices(dataset: DataSet, task: str, calls: int = CALLS) -> list[dict[str, Any]]:
+    """Decisions with one number varied at a time, around `SIZE` at the data set's own rows."""
+    X = dataset.features()
+    n = len(X)
+    most = min(n - 1, X.shape[1])
+    cases = [(n, c, SIZE[1]) for c in COMPONENTS if c <= most]
+    cases += [(n, SIZE[0], k) for k in NEIGHBOURS if k < n and k != SIZE[1]]
+    cases += [(rows, *SIZE) for rows in ROWS if rows > n]
+    found = [
+        price(dataset, grown(X, rows), task, c, k, calls)
+        for rows, c, k in tqdm(cases, desc="arithmetic")
+    ]
+    return [*found, usual_price(X, dataset.labels(task), max(calls // 10, 5))]
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and write."""
+    dataset = load_trials(arguments.data, horizon_s=1.2)
+    task = "category" if "category" in dataset.tasks else dataset.tasks[0]
+    found = {
+        "machine": f"{machine()['kind']} ({machine()['name']})",
+        "data_digest": dataset.digest,
+        "task": task,
+        "decisions": prices(dataset, task, arguments.calls),
+    }
+    with write_whole(arguments.out) as file:
+        file.write(json.dumps(found, indent=1).encode() + b"\n")
+    print(os.fspath(arguments.out))
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    top = argparse.ArgumentParser(
+        prog="export.prices",
+        description="Measures on this machine what one decision costs by components, "
+        "neighbours, training rows and operators; `python -m train tradeoff --prices` shows it.",
+    )
+    top.add_argument("--data", nargs="+", required=True, metavar="REC")
+    top.add_argument("--out", type=Path, default=Path("build/tradeoff/prices.json"))
+    top.add_argument("--calls", type=int, default=CALLS, help=f"timed calls each ({CALLS})")
+    top.set_defaults(run=run)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; 0 fine, 2 bad usage or input."""
+    return dispatch(parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
