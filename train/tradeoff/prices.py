@@ -125,9 +125,9 @@ def section(prices: Prices, dataset: DataSet, task: str) -> Section:
         [
             f"One decision of {task} over 1.2 s, one number varied at a time, on "
             f"{prices.machine}. At these {n} trials all numbers of components and neighbours cost "
-            f"{least:.0f} to {most:.0f} us, at most {100 * most / 1.2e6:.2g} % of the window: choose "
-            "them for accuracy alone. Rows beyond those recorded are the recorded ones with a thousandth "
-            "of jitter, to see what a larger training set would cost.",
+            f"{least:.0f} to {most:.0f} us, at most {100 * most / 1.2e6:.2g} % of the window: "
+            "choose them for accuracy alone. Rows beyond those recorded are the recorded ones "
+            "with a thousandth of jitter, to see what a larger training set would cost.",
             "What more training trials buy stands in the second table; their price is mostly the "
             "robot's time to record them.",
         ],
