@@ -217,7 +217,10 @@ class Chain:
         """
         from edge.urdf import joints_between  # XML is loaded only where a URDF is read
 
-        return cls(joints_between(path, base, tip), base, tip)
+        joints = joints_between(path, base, tip)
+        if not joints:
+            return cls([], base, tip)
+        return cls.from_dict({"base": base, "tip": tip, "joint": joints}, where=os.fspath(path))
 
 
 def _check_joint(joint: Joint) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
+from typing import Any
 
-from edge.arm import MOVING, Joint, Vector
 from edge.errors import InputError
 
 
-def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[Joint]:
-    """The joints that lead from link `base` to link `tip`, in that order.
+def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[dict[str, Any]]:
+    """The joints that lead from link `base` to link `tip`, in that order, as an arm's TOML file
+    has them (`edge.arm.Chain.from_dict`).
 
     Raises:
         InputError: the file cannot be read, or no chain leads from `base` to `tip`.
@@ -30,13 +31,13 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[Jo
     parents: dict[str, ElementTree.Element] = {}
     for element in root.findall("joint"):
         parents[_attribute(path, element, "child", "link")] = element
-    joints: list[Joint] = []
+    joints: list[dict[str, Any]] = []
     link = tip
     while link != base:
         if link not in parents:
             raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
         element = parents.pop(link)  # popped, so that a loop of links ends
-        joints.append(_urdf_joint(path, element))
+        joints.append(_joint(path, element))
         link = _attribute(path, element, "parent", "link")
     return joints[::-1]
 
@@ -51,34 +52,31 @@ def _attribute(
     return value
 
 
-def _numbers(path: str | os.PathLike[str], text: str, what: str) -> Vector:
+def _numbers(path: str | os.PathLike[str], text: str, what: str, count: int) -> list[float]:
     try:
-        x, y, z = map(float, text.split())
+        numbers = [float(part) for part in text.split()]
     except ValueError:
-        raise InputError(f"{path}: {what} must be three numbers, not {text!r}") from None
-    return x, y, z
+        numbers = []
+    if len(numbers) != count:
+        raise InputError(f"{path}: {what} must be {count} numbers, not {text!r}")
+    return numbers
 
 
-def _urdf_joint(path: str | os.PathLike[str], element: ElementTree.Element) -> Joint:
+def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:
     name = str(element.get("name"))
     kind = str(element.get("type"))
-    if kind not in (*MOVING, "fixed"):
-        raise InputError(f"{path}: joint {name!r} of type {kind!r} cannot be part of the chain")
-    origin, axis, limit = element.find("origin"), element.find("axis"), element.find("limit")
-    xyz = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
-    rpy = "0 0 0" if origin is None else origin.get("rpy", "0 0 0")
-    limits: tuple[float, float] | None = None
+    joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}
+    for tag, keys in (
+        ("axis", {"xyz": "axis"}),
+        ("origin", {"xyz": "origin_xyz", "rpy": "origin_rpy"}),
+    ):
+        child = element.find(tag)
+        for attribute, key in keys.items():
+            text = None if child is None else child.get(attribute)
+            if text is not None:
+                joint[key] = _numbers(path, text, f"{tag} of joint {name!r}", 3)
+    limit = element.find("limit")
     if limit is not None and kind in ("revolute", "prismatic"):
-        text = f"{limit.get('lower', '0')} {limit.get('upper', '0')} 0"
-        lower, upper, _ = _numbers(path, text, f"limit of joint {name!r}")
-        limits = (lower, upper)
-    return Joint(
-        name=name,
-        axis=_numbers(
-            path, "1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"axis of joint {name!r}"
-        ),
-        kind=kind,
-        origin_xyz=_numbers(path, xyz, f"origin of joint {name!r}"),
-        origin_rpy=_numbers(path, rpy, f"origin of joint {name!r}"),
-        limits=limits,
-    )
+        text = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"
+        joint["limits"] = _numbers(path, text, f"limit of joint {name!r}", 2)
+    return joint
