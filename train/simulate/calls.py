@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from edge.errors import InputError
 from train.simulate.fields import EFFECTS, IMPLIED_BY_CONDITION, IMPLIED_BY_FAMILY
-from train.simulate.scene import Scene, SceneObject
+from train.simulate.things import Scene, SceneObject
 
 
 def callers(scene: Scene, thing: SceneObject, condition: str) -> dict[str, str]:

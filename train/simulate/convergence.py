@@ -11,7 +11,7 @@ from train.simulate.arm import Array
 from train.simulate.engine import Batch, Trial, kind_of, run_batch
 from train.simulate.fields import SPREAD
 from train.simulate.plan import make_plan
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 
 HALVINGS = 6
 

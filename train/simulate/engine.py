@@ -15,7 +15,7 @@ from train.simulate.contact import State
 from train.simulate.fields import SPREAD, STIFFNESSES
 from train.simulate.film import Film
 from train.simulate.plan import Plan, make_plan
-from train.simulate.scene import Scene, SceneObject
+from train.simulate.things import Scene, SceneObject
 
 
 @dataclass(frozen=True)

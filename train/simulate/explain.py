@@ -13,7 +13,7 @@ from train.simulate.engine import Trial, kind_of, run_batch
 from train.simulate.fields import EFFECTS
 from train.simulate.plan import STAGES, Plan, make_plan
 from train.simulate.run import kinds, steps
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 
 MEASURED = 64
 """Trials in a batch that is timed."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from train.simulate.contact import State
 from train.simulate.plan import Plan
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 
 FULL = 65535.0
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from train.simulate import base
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 
 Function = Callable[[Any], None]
 STAGES = ("setup", "frame", "step", "sample", "clock", "sensor")

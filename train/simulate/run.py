@@ -16,7 +16,7 @@ from edge.recording import Recording
 from train.simulate.convergence import choose_step
 from train.simulate.engine import Batch, Kind, Trial, kind_of, run_batch
 from train.simulate.fields import SOFT_FAMILIES
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 
 BATCH = 256
 """Trials in a batch: enough to spread numpy's cost a call, few enough to stay in the cache."""

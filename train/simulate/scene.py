@@ -6,7 +6,6 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,10 @@ from edge.arm import Chain
 from edge.errors import InputError
 from edge.layout import SkinLayout
 from train.simulate import fields
+from train.simulate.calls import check_supported
 from train.simulate.fields import EFFECTS, Field
 from train.simulate.reader import Reader, Value
+from train.simulate.things import Scene, SceneObject
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
@@ -39,58 +40,6 @@ CODY_SKIN: dict[str, Any] = {
     "row0_z_m": 0.18432,
     "column_angles_deg": list(COLUMN_ANGLES_DEG),
 }
-
-
-@dataclass(frozen=True)
-class SceneObject:
-    """A thing that the arm meets."""
-
-    name: str
-    family: str
-    conditions: tuple[str, ...]
-    values: dict[str, Value]
-    given: frozenset[str]
-    """Keys that the file gives; the others are the family's."""
-
-    @property
-    def slug(self) -> str:
-        """The name, fit for a file."""
-        return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
-
-
-@dataclass(frozen=True)
-class Scene:
-    """All that a simulation needs; `load` reads it from TOML."""
-
-    name: str
-    seed: int
-    trials: dict[str, float]
-    step_s: dict[str, float]
-    """{effect, or `base`: the largest step that its trials may take}; empty: to be measured."""
-    lead: Value
-    arm: Chain
-    stiffness: tuple[float, ...]
-    damping: tuple[float, ...]
-    start: tuple[float, ...]
-    """(dof,) radians, the equilibrium point at t = 0."""
-    rate: tuple[float, ...]
-    """(dof,) rad/s."""
-    travel_s: float
-    """How long the equilibrium point moves."""
-    skin: SkinLayout
-    taxel_n_m: Value
-    place_m: float
-    """z in the skin's link of the point that meets the object."""
-    spread: dict[str, float]
-    objects: tuple[SceneObject, ...]
-    add: tuple[str, ...]
-    leave_out: tuple[str, ...]
-    settings: dict[str, dict[str, float]] = field(default_factory=dict)
-
-    @property
-    def count(self) -> int:
-        """Trials of each object in each condition."""
-        return int(self.trials["count"])
 
 
 def load(
@@ -162,8 +111,6 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         leave_out=leave_out,
         settings=settings,
     )
-    from train.simulate.calls import check_supported
-
     check_supported(scene, where)
     return scene
 

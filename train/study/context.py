@@ -16,7 +16,7 @@ from edge.features import FEATURES, SAMPLES, WINDOW_S
 from edge.recording import Recording
 from edge.track import FeatureSeries
 from train.dataset import DataSet
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 from train.study import skins
 from train.study.score import Labels, Result
 

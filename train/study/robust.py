@@ -15,7 +15,7 @@ from train.simulate.engine import Trial, kind_of, read_out, shoot
 from train.simulate.fields import EFFECTS
 from train.simulate.plan import make_plan
 from train.simulate.run import parts, recordings
-from train.simulate.scene import Scene
+from train.simulate.things import Scene
 from train.study import plots
 from train.study.context import SCORE, Context, Figure, Section, Table, score
 from train.study.score import evaluate, transfer
