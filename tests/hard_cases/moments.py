@@ -176,7 +176,7 @@ CASES = [
         usual=moment_usual,
     ),
     Case(
-        "features",
+        "early stopping",
         "p-values of a trial that repeats one of the calibration",
         "counted by rank",
         "repetitions with a smaller p-value",
