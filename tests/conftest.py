@@ -7,10 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from edge.arm import Chain
 from edge.layout import SkinLayout
 from edge.recording import Recording, save
+
+# The same examples in every run, so that a red test is the change's; `EXPLORE=1` looks for others.
+settings.register_profile("same", derandomize=True)
+settings.register_profile("explore", derandomize=False)
+settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
 
 REAL = Path(__file__).parents[2] / "shared" / "real"
 
