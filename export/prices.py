@@ -41,6 +41,7 @@ SIZE = (5, 2)
 """Components and k where another number is varied."""
 SCALING = "IV"
 CALLS = 300
+ROUNDS = 15
 
 
 def grown(X: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
@@ -50,21 +51,24 @@ def grown(X: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
     return every * (1.0 + 1e-3 * stream.normal(size=every.shape) * (rows > len(X)))
 
 
-def median_us(decide: Callable[[], object], calls: int) -> float:
-    """Median microseconds of a call."""
-    decide()
-    taken = []
-    for _ in range(calls):
-        began = time.perf_counter_ns()
-        decide()
-        taken.append(time.perf_counter_ns() - began)
-    return round(statistics.median(taken) / 1e3, 1)
+def medians_us(decisions: Sequence[Callable[[], object]], calls: int) -> list[float]:
+    """Median microseconds of a call of each, taken in turns: a machine's pace drifts."""
+    rounds = min(ROUNDS, calls)
+    taken: list[list[int]] = [[] for _ in decisions]
+    for _ in tqdm(range(rounds), desc="arithmetic", unit=" rounds"):
+        for decide, times in zip(decisions, taken, strict=True):
+            decide()
+            for _ in range(max(calls // rounds, 1)):
+                began = time.perf_counter_ns()
+                decide()
+                times.append(time.perf_counter_ns() - began)
+    return [round(statistics.median(times) / 1e3, 1) for times in taken]
 
 
-def price(
-    dataset: DataSet, X: NDArray[np.float64], task: str, components: int, k: int, calls: int
-) -> dict[str, Any]:
-    """One decision of one task with a model of so many rows, components and neighbours."""
+def sized(
+    dataset: DataSet, X: NDArray[np.float64], task: str, components: int, k: int
+) -> tuple[dict[str, Any], Callable[[], object]]:
+    """A model of one task with so many rows, components and neighbours, and its decision."""
     y = dataset.labels(task)[np.arange(len(X)) % len(dataset.trials)]
     choice = Choice(SCALING, components, k)
     fitted = ContactClassifier({task: choice}, dataset.names).fit(X, {task: y})
@@ -75,17 +79,13 @@ def price(
         path.write_bytes(data)
         model = Model(path)
     vector = X[0] * 1.001
-    return {
-        "rows": len(X),
-        "components": components,
-        "k": k,
-        "operators": "ours, float64",
-        "us": median_us(lambda: model.decide(vector), calls),
-        "kilobytes": round(len(data) / 1024, 1),
-    }
+    size = {"rows": len(X), "components": components, "k": k, "operators": "ours, float64"}
+    return {**size, "kilobytes": round(len(data) / 1024, 1)}, lambda: model.decide(vector)
 
 
-def usual_price(X: NDArray[np.float64], y: NDArray[np.str_], calls: int) -> dict[str, Any]:
+def usual(
+    X: NDArray[np.float64], y: NDArray[np.str_]
+) -> tuple[dict[str, Any], Callable[[], object]]:
     """The same by skl2onnx's own conversion of scikit-learn's pipeline."""
     components, k = SIZE
     pipe = make_pipeline(StandardScaler(), PCA(components), KNeighborsClassifier(k)).fit(X, y)
@@ -95,14 +95,8 @@ def usual_price(X: NDArray[np.float64], y: NDArray[np.str_], calls: int) -> dict
     options.log_severity_level = 3
     session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     given = {session.get_inputs()[0].name: X[:1].astype(np.float32)}
-    return {
-        "rows": len(X),
-        "components": components,
-        "k": k,
-        "operators": "skl2onnx's own",
-        "us": median_us(lambda: session.run(None, given), calls),
-        "kilobytes": round(len(data) / 1024, 1),
-    }
+    size = {"rows": len(X), "components": components, "k": k, "operators": "skl2onnx's own"}
+    return {**size, "kilobytes": round(len(data) / 1024, 1)}, lambda: session.run(None, given)
 
 
 def prices(dataset: DataSet, task: str, calls: int = CALLS) -> list[dict[str, Any]]:
@@ -113,11 +107,10 @@ def prices(dataset: DataSet, task: str, calls: int = CALLS) -> list[dict[str, An
     cases = [(n, c, SIZE[1]) for c in COMPONENTS if c <= most]
     cases += [(n, SIZE[0], k) for k in NEIGHBOURS if k < n and k != SIZE[1]]
     cases += [(rows, *SIZE) for rows in ROWS if rows > n]
-    found = [
-        price(dataset, grown(X, rows), task, c, k, calls)
-        for rows, c, k in tqdm(cases, desc="arithmetic")
-    ]
-    return [*found, usual_price(X, dataset.labels(task), max(calls // 10, 5))]
+    models = [sized(dataset, grown(X, rows), task, c, k) for rows, c, k in cases]
+    models.append(usual(X, dataset.labels(task)))
+    times = medians_us([decide for _, decide in models], calls)
+    return [{**size, "us": us} for (size, _), us in zip(models, times, strict=True)]
 
 
 def run(arguments: argparse.Namespace) -> int:
