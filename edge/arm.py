@@ -163,7 +163,10 @@ class Chain:
             raise InputError(
                 f"{where}: unknown key {sorted(unknown)[0]!r}; allowed: base, tip, joint"
             )
-        return cls(joints, str(arm.get("base", "base")), str(arm.get("tip", "tip")))
+        try:
+            return cls(joints, str(arm.get("base", "base")), str(arm.get("tip", "tip")))
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Chain:

@@ -15,8 +15,9 @@ from edge.model import Decision, Model
 from edge.track import Contact, Tracker, for_device
 from edge.tracks import Tracks
 
-TRAINED_ON = "trained_on"
-"""Flag of a decision whose touch is one of the training trials, bit for bit."""
+AS_TRAINED = "as_trained"
+"""Flag of a decision whose features are those of a training trial to the last bit: nearly always
+it is that trial, replayed. Only a model that sees whole numbers alone meets such twins anew."""
 
 Event = dict[str, Any]
 """One JSON object; `event` says which."""
@@ -231,9 +232,8 @@ class Watcher:
     ) -> Event | None:
         """What a look says of a task; None where it must go on waiting."""
         candidates = waiting.candidates.get(task)
-        # No new touch repeats another to the last bit: this one was learnt from.
         if decision.distances[0] == 0.0:
-            flags = [*flags, TRAINED_ON]
+            flags = [*flags, AS_TRAINED]
         if candidates is None:
             return {
                 "label": decision.label,

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from edge.live import TRAINED_ON
+from edge.live import AS_TRAINED
 from edge.model import Task
 
 NONE = "(none)"
@@ -21,19 +21,19 @@ class Summary:
         self._tasks = tasks
         self._pairs: dict[str, Counter[tuple[str, str]]] = {task: Counter() for task in tasks}
         self.recordings = 0
-        self.trained_on = 0
-        """Recordings that the model learnt from."""
+        self.as_trained = 0
+        """Recordings just like one that the model learnt from."""
 
     def add(self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]) -> None:
         """Take in the events of one recording and its labels."""
         self.recordings += 1
         first: dict[str, str] = {}
-        trained_on = False
+        as_trained = False
         for event in events:
             if event["event"] == "decision":
                 first.setdefault(event["task"], event["label"] or NONE)
-                trained_on |= TRAINED_ON in event["flags"]
-        self.trained_on += trained_on
+                as_trained |= AS_TRAINED in event["flags"]
+        self.as_trained += as_trained
         for task in self._tasks:
             if task in labels:
                 self._pairs[task][labels[task], first.get(task, NONE)] += 1
@@ -46,10 +46,11 @@ class Summary:
     def text(self) -> str:
         """A table a task: rows are what was touched, columns what was said."""
         parts = [f"{self.recordings} recordings"]
-        if self.trained_on:
+        if self.as_trained:
             parts.append(
-                f"{self.trained_on} of them are among the trials that the model learnt from: they "
-                "say nothing of new touches (what `make export` printed, leave-one-out, does)"
+                f"{self.as_trained} of them are to the last bit as trials that the model learnt "
+                "from, most likely the same: they say nothing of new touches (what `make export` "
+                "printed, leave-one-out, does)"
             )
         for task in self._tasks:
             right, total = self.accuracy(task)

@@ -26,6 +26,7 @@ from tqdm import tqdm
 
 from edge.cli import dispatch
 from edge.commands.bench import machine
+from edge.errors import InputError
 from edge.files import write_whole
 from edge.model import Model
 from export.__main__ import describe
@@ -42,6 +43,8 @@ SIZE = (5, 2)
 SCALING = "IV"
 CALLS = 300
 ROUNDS = 15
+FEWEST = 10
+"""Trials below which there are no five components to measure."""
 
 
 def grown(X: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
@@ -115,7 +118,11 @@ def prices(dataset: DataSet, task: str, calls: int = CALLS) -> list[dict[str, An
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and write."""
+    if arguments.calls < 1:
+        raise InputError(f"--calls must be at least 1, not {arguments.calls}")
     dataset = load_trials(arguments.data, horizon_s=1.2)
+    if len(dataset.trials) < FEWEST:
+        raise InputError(f"prices need at least {FEWEST} trials, not {len(dataset.trials)}")
     task = "category" if "category" in dataset.tasks else dataset.tasks[0]
     found = {
         "machine": f"{machine()['kind']} ({machine()['name']})",

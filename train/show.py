@@ -156,7 +156,8 @@ def _side(
     joints = recording.joints
     assert joints is not None
     simulated = recording.meta.get("simulation")
-    values = simulated.get("values", {}) if isinstance(simulated, dict) else {}
+    told = simulated if isinstance(simulated, dict) else {}
+    width, radius, mass = (_size(told, key) for key in ("width_m", "radius_m", "mass_kg"))
     for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
         k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
         points = _links(chain, joints[k])
@@ -165,21 +166,29 @@ def _side(
         if found is not None:
             place, outward = found
             axis.plot(place[0], place[2], "*", color=style, markersize=13)
-            if values.get("width_m"):
-                outline = _outline(place, outward, values["width_m"], values.get("radius_m"))
+            if width is not None:
+                outline = _outline(place, outward, width, radius)
                 axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
-    if isinstance(simulated, dict):
-        family = simulated.get("family", "")
-        effects = ", ".join(simulated.get("effects", []))
-        mass = values.get("mass_kg")
-        what = f"{family}" + (f", {mass:.2g} kg" if mass is not None else "")
-        axis.set_title(f"seen from the side: {what}\n{effects}", fontsize=9)
+    if told:
+        effects = told.get("effects")
+        names = ", ".join(map(str, effects)) if isinstance(effects, list) else ""
+        what = str(told.get("family", "")) + (f", {mass:.2g} kg" if mass is not None else "")
+        axis.set_title(f"seen from the side: {what}\n{names}", fontsize=9)
     else:
         axis.set_title("seen from the side", fontsize=9)
     axis.set_xlabel("x, metres forward of the torso")
     axis.set_ylabel("z, metres up")
     axis.set_aspect("equal", adjustable="datalim")
     axis.legend(fontsize=8)
+
+
+def _size(simulated: dict[str, Any], key: str) -> float | None:
+    """A size that the simulation was drawn with, where the recording tells one that makes sense."""
+    values = simulated.get("values")
+    size = values.get(key) if isinstance(values, dict) else None
+    if isinstance(size, bool) or not isinstance(size, int | float):
+        return None
+    return float(size) if 0 < size < 1e9 else None
 
 
 DEPTH_M = 0.08

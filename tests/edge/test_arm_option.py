@@ -22,6 +22,7 @@ URDF = """<robot name="two"><link name="base"/><link name="upper"/><link name="s
 def files(tmp_path, make_touch):
     """A URDF of two joints, and a recording of as many angles that names no arm."""
     (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "still.toml").write_text('[[joint]]\nname="a"\naxis=[0,0,0]\n')
     trial = make_touch()
     swing = np.linspace(0.0, 0.2, len(trial.t))
     trial = replace(trial, joints=np.column_stack([swing, 0.5 + swing]))
@@ -59,6 +60,7 @@ def test_a_trial_keeps_the_chain_of_a_toml_file(files):
         (["--arm", "arm.urdf", "--base", "base", "--tip", "upper"], "gives 2 joint angles"),
         (["--arm", "arm.toml", "--tip", "skin"], "--base and --tip are for a .urdf file"),
         (["--arm", "none.toml"], "none.toml: cannot be read"),
+        (["--arm", "still.toml"], "still.toml: joint a: its axis is zero"),
         (["--tip", "skin"], "--tip needs --arm arm.urdf"),
         (
             ["--arm", "arm.urdf", "--base", "base", "--tip", "skin", "--dof", "3"],

@@ -36,7 +36,7 @@ def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(model, m
     assert decision["window_s"] == 1.2
     assert decision["confidence"] == 1.0
     assert decision["latency_ms"] > 0.0
-    assert decision["flags"] == ["trained_on"]
+    assert decision["flags"] == ["as_trained"]
 
 
 def test_a_new_touch_is_not_flagged(model, make_touch):

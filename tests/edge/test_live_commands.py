@@ -149,8 +149,8 @@ def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
         keys = ("event", "task", "label", "confidence", "flags", "window_s")
         # The wires' clock shifts times by less than a microsecond, which may tell them apart.
         for event in (*played, *live):
-            if "trained_on" in event.get("flags", ()):
-                event["flags"].remove("trained_on")
+            if "as_trained" in event.get("flags", ()):
+                event["flags"].remove("as_trained")
         assert [[e.get(k) for k in keys] for e in live[:-1]] == [
             [e.get(k) for k in keys] for e in played
         ]

@@ -95,23 +95,21 @@ def test_a_loop_ends_when_asked_after_the_frame_at_hand():
     assert seen == 7
 
 
-def test_a_signal_asks_once_and_is_itself_again_afterwards():
-    # A shell that runs the tests in the background lets them ignore SIGINT.
+@pytest.fixture
+def interruptible():
+    """A shell that runs the tests in the background lets them ignore SIGINT."""
     inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        _asks_once()
-    finally:
-        signal.signal(signal.SIGINT, inherited)
+    yield signal.default_int_handler
+    signal.signal(signal.SIGINT, inherited)
 
 
-def _asks_once():
-    before = signal.getsignal(signal.SIGINT)
+def test_a_signal_asks_once_and_is_itself_again_afterwards(interruptible):
     with stop_on(signal.SIGINT) as stop:
         signal.raise_signal(signal.SIGINT)
         assert stop.asked
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(signal.SIGINT) is interruptible
 
 
 def test_joints_are_asked_for_at_the_frames_own_time():

@@ -130,7 +130,7 @@ def test_a_task_is_decided_at_the_first_look_that_leaves_one_label(model, touche
     assert t == pytest.approx(0.5)
     assert category["error"] == 0.25
     assert category["confidence"] >= 0.75
-    assert category["flags"] == ["trained_on"]
+    assert category["flags"] == ["as_trained"]
 
 
 def test_where_several_labels_are_left_at_the_full_window_the_best_is_unsure(model, touches):
@@ -138,7 +138,7 @@ def test_where_several_labels_are_left_at_the_full_window_the_best_is_unsure(mod
     events = [e for _, e in replay(model, touches / "soft_03.npz", 0.12)]
     thing = next(e for e in events if e.get("task") == "object")
     assert thing["window_s"] == 1.2
-    assert thing["flags"] == ["trained_on", "unsure"]
+    assert thing["flags"] == ["as_trained", "unsure"]
     assert thing["label"] in thing["left"] == ["soft 0", "soft 1"]
 
 

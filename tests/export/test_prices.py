@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
+from edge.recording import save
 from export import prices as measured
 from train.dataset import load_trials
 from train.tradeoff import prices
@@ -67,3 +68,30 @@ def test_a_file_that_is_none_is_one_sentence(written, recordings, tmp_path, chan
     digest = json.loads(written.read_text())["data_digest"]
     with pytest.raises(InputError, match=said):
         prices.read(path, digest)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda found: found.update(decisions=[]),
+        lambda found: found["decisions"][0].update(components=0),
+        lambda found: found["decisions"][0].update(us=float("nan")),
+    ],
+)
+def test_a_price_that_makes_no_sense_is_refused(written, tmp_path, change):
+    found = json.loads(written.read_text())
+    change(found)
+    path = tmp_path / "prices.json"
+    path.write_text(json.dumps(found))
+    with pytest.raises(InputError, match="not a prices file"):
+        prices.read(path, found["data_digest"])
+
+
+def test_too_few_trials_and_calls_are_one_sentence(recordings, make_touch, tmp_path, capsys):
+    save(tmp_path / "one.npz", make_touch())
+    out = ["--out", str(tmp_path / "prices.json")]
+    assert measured.main(["--data", str(tmp_path / "one.npz"), *out]) == 2
+    assert "prices need at least 10 trials, not 1" in capsys.readouterr().err
+    assert measured.main(["--data", str(recordings), *out, "--calls", "0"]) == 2
+    assert "--calls must be at least 1, not 0" in capsys.readouterr().err
+    assert not (tmp_path / "prices.json").exists()

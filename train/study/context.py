@@ -31,7 +31,7 @@ class Table:
         columns: their headings.
         rows: cells.
         timed: columns that were measured with a clock, and differ from run to run; they go to a
-            CSV file of their own, beside the first column.
+            CSV file of their own, beside the first few columns.
     """
 
     name: str

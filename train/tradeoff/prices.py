@@ -78,6 +78,9 @@ def read(path: str | os.PathLike[str], digest: str) -> Prices:
             for one in found["decisions"]
         )
         prices = Prices(str(found["machine"]), str(found["data_digest"]), decisions)
+        numbers = [(d.rows, d.components, d.k, d.us, d.kilobytes) for d in decisions]
+        if not numbers or not all(0 < x < 1e12 for row in numbers for x in row):
+            raise ValueError("no decision, or one of no size")
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
     except (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError):
@@ -119,6 +122,8 @@ def section(prices: Prices, dataset: DataSet, task: str) -> Section:
         shown = (round(100 * share, 2) for share in (result.accuracy, low, high))
         learning.rows.append((len(some), *shown, result.components, result.k))
     ours = [one for one in prices.decisions if one.rows == n and "ours" in one.operators]
+    if not ours:
+        raise InputError(f"the prices are not of models of these {n} trials; measure them again")
     least, most = (edge(one.us for one in ours) for edge in (min, max))
     return Section(
         "The price of arithmetic",

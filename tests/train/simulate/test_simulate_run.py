@@ -175,6 +175,25 @@ class TestCommand:
         assert out.read_bytes().startswith(b"\x89PNG")
         assert capsys.readouterr().out.strip() == str(out)
 
+    @pytest.mark.parametrize(
+        "told",
+        [
+            {"values": {"width_m": "wide", "mass_kg": "x", "radius_m": [1]}, "effects": 5},
+            {"values": [1], "effects": [1, 2], "family": 3},
+            {"values": {"width_m": -1, "mass_kg": 10**400}},
+            "a scene",
+        ],
+    )
+    def test_show_draws_what_makes_sense_of_a_scene(self, written, tmp_path, told):
+        from dataclasses import replace
+
+        from edge.recording import save
+
+        trial = load(written[0] / "foam-block-movable-00.npz")
+        save(tmp_path / "odd.npz", replace(trial, meta={**trial.meta, "simulation": told}))
+        assert main(["show", str(tmp_path / "odd.npz"), "--scene"]) == 0
+        assert (tmp_path / "odd.png").read_bytes().startswith(b"\x89PNG")
+
     def test_show_without_an_arm(self, written, tmp_path, capsys):
         from dataclasses import replace
 
