@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -44,6 +45,10 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     return top
 
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What writing answers where there is no room."""
+
+
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and run; what goes wrong on purpose is one sentence on stderr and exit status 2."""
     arguments = top.parse_args(argv)
@@ -55,11 +60,26 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
         print(f"{top.prog}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        # The reader of the lines has gone; what is left in the buffer has nowhere to go.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()  # the reader of the lines has gone
         return 0
+    except OSError as error:
+        # Files are written through `edge.files`, which says so itself.
+        if error.filename is not None or error.errno not in FULL:
+            raise
+        _discard_output()
+        print(
+            f"{top.prog}: standard output cannot be written: {error.strerror or error}; make room "
+            "or send it elsewhere",
+            file=sys.stderr,
+        )
+        return 2
     except KeyboardInterrupt:
         return 130
+
+
+def _discard_output() -> None:
+    """What is left in the buffer of stdout has nowhere to go."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def main(argv: Sequence[str] | None = None) -> int:

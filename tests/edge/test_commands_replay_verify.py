@@ -160,3 +160,19 @@ def test_the_command_line_itself(exported, recordings):
     )
     assert piped.stdout.count("\n") == 1
     assert piped.stderr == ""
+
+
+def test_output_without_room_is_one_sentence(exported, recordings):
+    command = [sys.executable, "-m", "edge.cli", "replay", "--model", str(exported / "model.onnx")]
+    with open("/dev/full", "w") as full:
+        run = subprocess.run(
+            [*command, str(recordings / "hard_0.npz")],
+            cwd=ROOT,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert run.returncode == 2
+    assert run.stderr.startswith("edge-classify: standard output cannot be written: No space left")
+    assert run.stderr.count("\n") == 1
