@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from tests.hard_cases import everywhere, frames, moments, neighbours, refusals, scaling, simulator
+from tests.hard_cases import (
+    everywhere,
+    frames,
+    kinematics,
+    moments,
+    neighbours,
+    refusals,
+    scaling,
+    simulator,
+)
 from tests.hard_cases.cases import Case
 
 CASES: list[Case] = [
     *neighbours.CASES,
     *scaling.CASES,
     *frames.CASES,
+    *kinematics.CASES,
     *moments.CASES,
     *refusals.CASES,
     *everywhere.CASES,

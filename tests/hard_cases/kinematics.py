@@ -1,0 +1,186 @@
+"""The arm's kinematics: many steps, large and tiny angles, limits and wrapped angles."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from edge.arm import Chain, Joint
+from edge.frame import Frame
+from edge.joints import Joints
+from edge.track import Tracker, TrackSettings
+from tests.hard_cases.cases import Case
+from tests.hard_cases.frames import FOREARM, SEEDS, taxels
+
+
+def limits_usual() -> str:
+    angle = np.array([1.0, 1.0 + 1000 * 2.0 * math.pi])
+    turns = Rotation.from_rotvec(angle[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
+    off = np.abs(turns[0] - turns[1]).max() / 1000
+    return f"scipy's Rotation, 1000 turns further: off by {off:.1e} a turn"
+
+
+def orthonormal_error(steps: int, reach: float) -> float:
+    """Largest |R R^T - 1| along a path of `steps` poses."""
+    chain, worst = Chain.cody(), 0.0
+    rate = np.array([0.7, -1.1, 0.3, 1.7, -0.9])
+    for start in range(0, steps, 20000):
+        i = np.arange(start, min(start + 20000, steps))[:, None]
+        turn = chain.pose(reach * np.sin(1e-3 * i * rate) + 1e-4 * i)[:, :3, :3]
+        gap = turn @ turn.transpose(0, 2, 1) - np.eye(3)
+        worst = max(worst, float(np.abs(gap).max()))
+    return worst
+
+
+def orthonormal_usual() -> str:
+    step = Chain([Joint("j", (1.0, 2.0, -2.0))]).pose([1e-3])[:3, :3]
+    turn = np.eye(3)
+    for _ in range(100_000):
+        turn = turn @ step
+    return f"100 000 small rotations multiplied: {np.abs(turn @ turn.T - np.eye(3)).max():.1e}"
+
+
+def exact_turn(axis: tuple[float, float, float], angle: float) -> list[list[mpmath.mpf]]:
+    """Rodrigues' formula in 60 digits (400 for the reduction of large angles)."""
+    with mpmath.workdps(400):
+        a = mpmath.mpf(angle)
+        s, c = mpmath.sin(a), 1 - mpmath.cos(a)
+        size = mpmath.sqrt(sum(mpmath.mpf(v) ** 2 for v in axis))
+        x, y, z = (mpmath.mpf(v) / size for v in axis)
+        k = mpmath.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        out = mpmath.eye(3) + s * k + c * (k * k)
+        return [[out[i, j] for j in range(3)] for i in range(3)]
+
+
+def turn_error(angle: float, seed: int) -> float:
+    """Largest error of a rotation; off the diagonal relative to the angle where it is tiny."""
+    x, y, z = np.random.default_rng(seed).normal(size=3).tolist()
+    seen = Chain([Joint("j", (x, y, z))]).pose([angle])[:3, :3]
+    truth = exact_turn((x, y, z), angle)
+    scale = min(1.0, abs(angle)) or 1.0
+    worst = 0.0
+    for i in range(3):
+        for j in range(3):
+            gap = abs(float(mpmath.mpf(float(seen[i, j])) - truth[i][j]))
+            worst = max(worst, gap if i == j else gap / scale)
+    return worst
+
+
+def turn_usual() -> str:
+    angle = 1e-8
+    wrong = 1.0 - math.cos(angle)
+    return f"1 - cos(1e-8) as written: {wrong:.1e} instead of 5.0e-17"
+
+
+def wrapped_error(turns: int, seed: int) -> float:
+    """Metres between a pose and the same with one angle some turns further."""
+    chain = Chain.cody()
+    low, high = np.array([p or (-3.0, 3.0) for p in chain.limits]).T
+    rng = np.random.default_rng(seed)
+    q = np.where(rng.random(5) < 0.5, low, high)  # every joint at a limit
+    moved = q.copy()
+    moved[seed % 5] += turns * 2.0 * math.pi
+    return float(np.abs(chain.pose(q) - chain.pose(moved)).max()) / max(1, abs(turns))
+
+
+def wrapped_usual() -> str:
+    q = np.array([3.1, -3.1])
+    return f"joint angles interpolated as numbers: the mean of 3.1 and -3.1 is {q.mean():g}, not pi"
+
+
+def line_error(angle: float, step: float) -> float:
+    """Error of the pose midway between two lines of a sender that wraps its angles."""
+
+    def wrap(q: float) -> float:
+        return math.remainder(q, 2.0 * math.pi)
+
+    text = "".join(
+        json.dumps({"t": t, "q": [wrap(q)]}) + "\n" for t, q in ((5.0, angle), (5.01, angle + step))
+    )
+    lines = iter([text.encode(), None])
+    joints = Joints(lambda: next(lines), dof=1, now=lambda: 0.0)
+    seen = joints.at(-0.005)
+    if seen is None:
+        return math.inf
+    turn = Chain([Joint("j", (0.0, 0.0, 1.0))])
+    return float(np.abs(turn.pose(seen) - turn.pose([angle + 0.5 * step])).max())
+
+
+def moved_error(seed: int) -> float:
+    """Motion of a region that stays in the world while the link turns under it by 2 pi."""
+    layout = replace(FOREARM, radius_m=None, pitch_m=0.01)
+    tracker = Tracker(layout, TrackSettings(debounce=1), chain=Chain([Joint("j", (0.0, 0.0, 1.0))]))
+    angle = float(np.random.default_rng(seed).uniform(-3, 3))
+    contact = None
+    for i in range(3):
+        joints = np.array([angle + 2.0 * math.pi * i])
+        contact = tracker.push(Frame(0.01 * i, taxels((3, 7)), joints=joints)) or contact
+    assert contact is not None
+    return float(np.abs(contact.series().motion).max())
+
+
+CASES = [
+    Case(
+        "kinematics",
+        "orthonormal over a million steps",
+        "R R^T = 1",
+        "largest entry of R R^T - 1",
+        5e-15,
+        orthonormal_error,
+        [{"steps": 1_000_000, "reach": 2.0}],
+        {"steps": st.just(2000), "reach": st.floats(0, 1e6)},
+        orthonormal_usual,
+        examples=8,
+    ),
+    Case(
+        "kinematics",
+        "large and tiny angles",
+        "Rodrigues' formula in 400 digits",
+        "error of an entry, off the diagonal over a tiny angle",
+        1e-15,
+        turn_error,
+        [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)],
+        {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
+        turn_usual,
+        examples=25,
+    ),
+    Case(
+        "kinematics",
+        "joint angles at their limits, wrapped by 2 pi",
+        "the same pose",
+        "metres and entries a turn",
+        5e-15,
+        wrapped_error,
+        [{"turns": 1, "seed": s} for s in range(5)],
+        {"turns": st.integers(-1000, 1000), "seed": SEEDS},
+        limits_usual,
+    ),
+    Case(
+        "kinematics",
+        "a sender that wraps its angles between two lines",
+        "the pose midway on the shorter way",
+        "error of an entry",
+        2e-12,
+        line_error,
+        [{"angle": math.pi - 0.001, "step": 0.002}],
+        {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
+        wrapped_usual,
+    ),
+    Case(
+        "kinematics",
+        "a link that turns by 2 pi between frames",
+        "nothing moves",
+        "metres of motion",
+        1e-15,
+        moved_error,
+        [{"seed": 0}],
+        {"seed": SEEDS},
+        "does not apply: it follows no region",
+    ),
+]
