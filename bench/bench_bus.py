@@ -24,7 +24,7 @@ WIRE_S = (12 * 255 + 3 * 20) / 400_000
 
 
 def _shim():
-    spec = importlib.util.spec_from_file_location("shim", ROOT / "tests/edge/shim/build.py")
+    spec = importlib.util.spec_from_file_location("shim", ROOT / "tests/edge/i2c/shim/build.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -57,9 +57,9 @@ def _least_us(action, rounds=60, calls=20) -> float:
 
 
 def _skin():
-    from edge import skinfile
     from edge.fake.player import calibrated
-    from edge.skin import Skin
+    from edge.skin import file as skinfile
+    from edge.skin.skin import Skin
 
     return Skin.open(calibrated(skinfile.load(skinfile.shipped("cody"))))
 
@@ -104,7 +104,7 @@ def measure() -> dict:
 
 def keep_period(seconds: float) -> dict:
     """Milliseconds of the loop's period at 100 Hz, by percentile."""
-    from edge.loop import Loop
+    from edge.runtime.loop import Loop
 
     with _skin() as skin:
         loop = Loop(skin, lasts_s=seconds)
@@ -126,8 +126,8 @@ def bench_overhead_of_software(note):
 
 
 def bench_bits_on_the_wire(note):
-    from edge import skinfile
     from edge.fake.player import frame_bits
+    from edge.skin import file as skinfile
 
     bits = sum(frame_bits(skinfile.load(skinfile.shipped("cody")), 400)) / 400
     note(f"{LEAST_BITS}, the least", bits / LEAST_BITS, "at most 1.03")

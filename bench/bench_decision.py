@@ -9,10 +9,10 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from edge.features import FEATURES
-from edge.layout import SkinLayout
-from edge.model import Model, ModelInfo, Task
-from edge.track import TrackSettings
+from edge.model.model import Model, ModelInfo, Task
+from edge.touch.features import FEATURES
+from edge.touch.layout import SkinLayout
+from edge.touch.track import TrackSettings
 from export import graph
 from train.pipeline import Choice, ContactClassifier
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from edge.features import feature_vector
-from edge.golden import first_series
-from edge.live import Watcher
-from edge.model import Model
+from edge.classifier import Watcher
+from edge.model.model import Model
+from edge.model.verify import first_series
 from edge.recording import load
+from edge.touch.features import feature_vector
 from export.__main__ import main as export
 
 ROOT = Path(__file__).parents[1]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.ndimage
 
-from edge.region import largest_region
+from edge.touch.region import largest_region
 
 
 def contact():

@@ -15,9 +15,9 @@ import pytest
 from edge import recording
 from train.simulate.engine import Trial, run_batch
 from train.simulate.explain import costs
-from train.simulate.fields import EFFECTS
 from train.simulate.run import kinds, recordings
 from train.simulate.scene import COLUMN_ANGLES_DEG, from_dict
+from train.simulate.schema import EFFECTS
 
 BATCH = 256
 MOVES = {"mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35}

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from edge import skinfile
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
-from edge.frame import Frame
-from edge.loop import Schedule
-from edge.skinfile import SkinFile
+from edge.runtime.loop import Schedule
+from edge.skin import file as skinfile
+from edge.skin.file import SkinFile
+from edge.touch.frame import Frame
 
 PERIOD_S = 0.01
 BEGIN_S, END_S = 0.5, 1.0

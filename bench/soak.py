@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from edge import skinfile
 from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
-from edge.loop import Loop
+from edge.runtime.loop import Loop
+from edge.skin import file as skinfile
 
 PAGE_KB = 4
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 import sys
 
-from edge.features import feature_vector
-from edge.golden import first_series
-from edge.live import Watcher
-from edge.model import Model
+from edge.classifier import Watcher
+from edge.model.model import Model
+from edge.model.verify import first_series
 from edge.recording import load
+from edge.touch.features import feature_vector
 
 REPEATS = 20
 

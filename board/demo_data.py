@@ -12,8 +12,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from edge.golden import first_series
-from edge.model import Model
+from edge.model.model import Model
+from edge.model.verify import first_series
 from edge.recording import load, save_arrays
 from export import golden
 from train.dataset import load_trials

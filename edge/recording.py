@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from edge import npz
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.frame import Frame
-from edge.layout import SkinLayout
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
 
 LARGEST_BYTES = 1 << 30
 """A trial that claims to be larger is taken for a damaged file."""

@@ -11,20 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from edge import __version__, measures
+from edge import __version__
 from edge.cli import dispatch
 from edge.commands.arm_option import add_arm, open_arm
 from edge.errors import InputError
-from edge.features import FEATURES, SAMPLES, WINDOW_S
 from edge.files import write_whole
-from edge.model import Model, ModelInfo, Task
+from edge.model.model import Model, ModelInfo, Task
+from edge.touch import measures
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from export import golden
 from export.graph import to_onnx
+from train import operating_points as pick
 from train.conformal import FEWEST, FOLDS, SequentialClassifier
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
 from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier, check_columns
-from train.tradeoff import pick
 
 FRONTS = Path("build/tradeoff/front.json")
 LOOKS = "0.2:1.2:0.2"

@@ -1,4 +1,4 @@
-"""golden.npz: see `edge.golden` for the format."""
+"""golden.npz: see `edge.model.verify` for the format."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.features import feature_vector
-from edge.golden import first_series, outputs, parts
-from edge.model import Model
+from edge.model.model import Model
+from edge.model.verify import first_series, outputs, parts
 from edge.recording import Recording, load, save_arrays
+from edge.touch.features import feature_vector
 from train.dataset import DataSet
 
 TRIALS = 24

@@ -18,10 +18,10 @@ from onnx import TensorProto, helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
-from edge.model import METADATA_KEY, ModelInfo
-from edge.onnxfile import check
+from edge.model.model import METADATA_KEY, ModelInfo
+from edge.model.onnx_file import check
 from export.build import OPSET, Builder, project, widened
-from export.looks import pvalues
+from export.pvalues import pvalues
 from train.conformal import SequentialClassifier
 from train.pipeline import ContactClassifier
 

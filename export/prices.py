@@ -28,7 +28,7 @@ from edge.cli import dispatch
 from edge.commands.bench import machine
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.model import Model
+from edge.model.model import Model
 from export.__main__ import describe
 from export.graph import to_onnx
 from train.crossval import Chosen

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from edge.arm import Chain
-from edge.layout import SkinLayout
 from edge.recording import Recording, save
+from edge.touch.arm import Chain
+from edge.touch.layout import SkinLayout
 
 # The same examples in every run, so that a red test is the change's; `EXPLORE=1` looks for others.
 settings.register_profile("same", derandomize=True)

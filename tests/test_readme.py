@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from edge import bus, cli, skinfile
+from edge import cli
+from edge.i2c import bus
 from edge.recording import Recording, load, save
+from edge.skin import file as skinfile
 from export.__main__ import parser as export_parser
 from train.__main__ import main as train
 

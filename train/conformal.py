@@ -26,7 +26,7 @@ The scores, tried on simulated and real touches: the squared distance to the nea
 the label over that to the nearest with another. Two nearest instead of one, the distance alone,
 and exponents between them decide later at the same error. A further p-value, calibrated alike,
 has the squared distance to the nearest trial of any label for its score: it says that a contact
-lies far from all that was trained (`edge.candidates`).
+lies far from all that was trained (`edge.model.prediction_set`).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from sklearn.base import BaseEstimator
 from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
-from edge.features import FEATURES
+from edge.touch.features import FEATURES
 from train.pipeline import Choice, ContactClassifier, Projection
 
 FOLDS = 5

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from edge.errors import InputError
-from edge.features import FEATURES
+from edge.touch.features import FEATURES
 from train.pipeline import SCALINGS, Choice, leading_axes, scale_of
 
 MAX_COMPONENTS = 20

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from edge import measures
-from edge.arm import Chain
 from edge.errors import InputError
-from edge.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
-from edge.golden import first_contact
-from edge.layout import SkinLayout
+from edge.model.verify import first_contact
 from edge.recording import Recording, find, load
-from edge.track import FeatureSeries, Tracker, TrackSettings, for_device
+from edge.touch import measures
+from edge.touch.arm import Chain
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
+from edge.touch.layout import SkinLayout
+from edge.touch.track import FeatureSeries, Tracker, TrackSettings, for_device
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class DataSet:
         samples: int = SAMPLES,
         names: Sequence[str] | None = None,
     ) -> NDArray[np.float64]:
-        """(n, features * samples) feature vectors (see `edge.features.feature_vector`).
+        """(n, features * samples) feature vectors (see `edge.touch.features.feature_vector`).
 
         Args:
             window_s: seconds from onset.
@@ -144,7 +144,7 @@ def load_trials(
         onset: counts above which a contact begins; scaled with the threshold where None.
         tracking: how contacts begin and end.
         horizon_s: seconds from onset that are kept of each contact.
-        features: what is measured on each contact (see `edge.measures`).
+        features: what is measured on each contact (see `edge.touch.measures`).
         arm: of recordings with joint angles that name none.
         progress: show progress bars on stderr.
 

@@ -15,7 +15,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
-from edge.features import FEATURES
+from edge.touch.features import FEATURES
 
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from edge.arm import Chain
 from edge.errors import InputError
+from edge.touch.arm import Chain
 
 
 def add_arm(parser: argparse.ArgumentParser, use: str) -> None:

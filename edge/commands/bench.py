@@ -19,23 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge import __version__
+from edge.classifier import Watcher
 from edge.commands.check import FRAMES
 from edge.errors import EdgeError, InputError
 from edge.fake.player import frame_bits
-from edge.features import feature_vector
 from edge.files import write_whole
-from edge.frame import Frame
-from edge.live import Watcher
-from edge.loop import garbage_aside
-from edge.model import Model
-from edge.region import largest_region
-from edge.skinfile import SkinFile, frame_rate, load
-from edge.track import Tracker
+from edge.model.model import Model
+from edge.runtime.loop import garbage_aside
+from edge.skin.file import SkinFile, frame_rate, load
+from edge.touch.features import feature_vector
+from edge.touch.frame import Frame
+from edge.touch.region import largest_region
+from edge.touch.track import Tracker
 
 FORMAT = 1
 RATE_HZ = 100.0
 COLD_STARTS = 5
-COLD = "import sys; from edge.live import Watcher; from edge.model import Model; \
+COLD = "import sys; from edge.classifier import Watcher; from edge.model.model import Model; \
 Watcher(Model(sys.argv[1]))"
 Timings = dict[str, float | int]
 

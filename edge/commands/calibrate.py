@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.calibration import save_calibration
 from edge.commands.source import add_skin, open_skin
 from edge.errors import InputError
-from edge.loop import Loop
-from edge.skin import Skin
-from edge.skinfile import Calibration
+from edge.runtime.loop import Loop
+from edge.skin.calibration import save_calibration
+from edge.skin.file import Calibration
+from edge.skin.skin import Skin
 
 FRAMES = 1000
 """As the lab took for its bias."""

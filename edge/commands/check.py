@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from edge.fake.player import frame_bits
-from edge.skinfile import frame_rate, load
+from edge.skin.file import frame_rate, load
 
 FRAMES = 100
 """Counted together, so that what is sent only now and then counts by its share."""

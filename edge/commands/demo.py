@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from edge import demo
+from edge.classifier import Event, Watcher
 from edge.fake.player import play, skin_file
-from edge.live import Event, Watcher
-from edge.loop import Loop
-from edge.model import Model
+from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.runtime.loop import Loop
 
 
 def add_parser(commands: Any) -> None:

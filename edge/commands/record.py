@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from edge.arm import Chain
 from edge.commands.arm_option import add_arm, open_arm
 from edge.commands.source import Opened, add_skin, open_joints, open_skin
 from edge.errors import InputError
-from edge.frame import Frame
-from edge.loop import Loop, stop_on
 from edge.recording import Recording, save
-from edge.track import Contact, Tracker, TrackSettings
+from edge.runtime.loop import Loop, stop_on
+from edge.touch.arm import Chain
+from edge.touch.frame import Frame
+from edge.touch.track import Contact, Tracker, TrackSettings
 
 LEAD_S = 0.2
 LENGTH_S = 2.0

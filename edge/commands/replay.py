@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from edge.classifier import Event, Watcher, require_joints
+from edge.commands.summary import Summary
 from edge.commands.sure import add_error, check_error
 from edge.errors import InputError
-from edge.live import Event, Watcher, require_joints
-from edge.model import Model
+from edge.model.model import Model
 from edge.recording import Recording, find, load
-from edge.summary import Summary
 
 
 def add_parser(commands: Any) -> None:

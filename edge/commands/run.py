@@ -9,15 +9,15 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
+from edge.classifier import Event, Watcher
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
 from edge.commands.sure import add_error, check_error
-from edge.lines import Lines
-from edge.live import Event, Watcher
-from edge.loop import Loop, Schedule, stop_on
-from edge.model import Model
-from edge.notify import Notifier
-from edge.skin import ChipStatus
-from edge.touchmap import MapFile
+from edge.model.model import Model
+from edge.runtime.event_writer import Lines
+from edge.runtime.loop import Loop, Schedule, stop_on
+from edge.runtime.systemd import Notifier
+from edge.runtime.touch_map import MapFile
+from edge.skin.skin import ChipStatus
 
 
 def add_parser(commands: Any) -> None:

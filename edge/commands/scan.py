@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from edge.commands.source import add_skin, open_skin
-from edge.skin import ChipStatus
-from edge.skinfile import UNUSED, SkinFile
+from edge.skin.file import UNUSED, SkinFile
+from edge.skin.skin import ChipStatus
 
 
 def add_parser(commands: Any) -> None:

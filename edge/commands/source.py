@@ -10,15 +10,17 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from edge import interest, joints, skinfile
+from edge.classifier import require_joints
 from edge.errors import InputError
 from edge.fake.clock import PacedClock, VirtualClock
 from edge.fake.player import Playback, play, skin_file
-from edge.live import require_joints
-from edge.loop import JointSource
-from edge.model import Model
+from edge.model.model import Model
 from edge.recording import load
-from edge.skin import Skin
+from edge.runtime import joint_stream as joints
+from edge.runtime.loop import JointSource
+from edge.skin import file as skinfile
+from edge.skin import read_scheduler as interest
+from edge.skin.skin import Skin
 
 
 def add_skin(parser: argparse.ArgumentParser, *, joint_options: bool = False) -> None:

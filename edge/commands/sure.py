@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from edge.candidates import check_rate
 from edge.errors import InputError
-from edge.model import Model
+from edge.model.model import Model
+from edge.model.prediction_set import check_rate
 
 
 def add_error(parser: argparse.ArgumentParser) -> None:

@@ -7,8 +7,8 @@ import json
 import sys
 from typing import Any
 
-from edge.golden import verify
-from edge.model import Model
+from edge.model.model import Model
+from edge.model.verify import verify
 
 
 def add_parser(commands: Any) -> None:

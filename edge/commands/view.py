@@ -7,15 +7,15 @@ import signal
 import sys
 from typing import Any
 
-from edge import terminal
+from edge.classifier import Event, Watcher
+from edge.commands import terminal
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
 from edge.errors import InputError
-from edge.frame import Frame
-from edge.layout import SkinLayout
-from edge.live import Event, Watcher
-from edge.loop import Loop, stop_on
-from edge.model import Model
-from edge.region import find_regions
+from edge.model.model import Model
+from edge.runtime.loop import Loop, stop_on
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.region import find_regions
 
 RATE_HZ = 10.0
 FULL_NEWTONS, FULL_FACTOR = 17.0, 50

@@ -8,17 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from edge.bus import (
-    LARGEST_BYTES,
-    LARGEST_MESSAGES,
-    Message,
-    Transfer,
-    bus_error,
-    wire_bits,
-)
 from edge.fake.chips import FakeChip, FakeTCA9548A
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault, Place, Script
+from edge.i2c.bus import LARGEST_BYTES, LARGEST_MESSAGES, Message, Transfer, bus_error, wire_bits
 
 Way = tuple[str, int, int | None, int | None]
 
@@ -30,7 +23,7 @@ class FakeBus:
     Raspberry Pi up to 4), a second address in one call (EINVAL, Pi 5), more than 42 messages
     or 8192 bytes (linux/i2c-dev.h).
 
-    >>> from edge.bus import fetch, send
+    >>> from edge.i2c.bus import fetch, send
     >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
     >>> send(bus, 0x70, [4])
     >>> fetch(bus, 0x70, b"", 1)

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.chips import ad7147, block, mpr121
+from edge.i2c import ad7147, block, mpr121
 
 Sense = Callable[[float], NDArray[np.uint16]]
 """Raw values of the chip's taxels, (taxels,), at a time in seconds."""
@@ -152,7 +152,7 @@ class FakeMPR121:
 
 
 class FakeBlock:
-    """A model of a microcontroller that serves frames (`edge.chips.block`)."""
+    """A model of a microcontroller that serves frames (`edge.i2c.block`)."""
 
     def __init__(
         self, sense: Sense, *, taxels: int, bits: int = 16, rate_hz: float = 100.0

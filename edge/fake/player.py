@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from edge import skinfile
-from edge.chips import ad7147, block
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
 from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA9548A, Sense
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
-from edge.layout import SkinLayout
+from edge.i2c import ad7147, block
 from edge.recording import Recording
-from edge.skin import Skin
-from edge.skinfile import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
+from edge.skin import file as skinfile
+from edge.skin.file import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
+from edge.skin.skin import Skin
+from edge.touch.layout import SkinLayout
 
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from edge.model import Model
+from edge.model.model import Model
 from export.__main__ import main
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from edge.cli import main as edge_classify
-from edge.model import Model
+from edge.model.model import Model
 from export.__main__ import main
 
 SIX = ["skin_force", "right_length", "left_width", "skin_slant", "regions", "contact_area_rate"]

@@ -7,10 +7,10 @@ import numpy as np
 import onnx
 import pytest
 
-from edge.features import FEATURES
-from edge.layout import SkinLayout
-from edge.model import Model, ModelInfo, Task
-from edge.track import TrackSettings
+from edge.model.model import Model, ModelInfo, Task
+from edge.touch.features import FEATURES
+from edge.touch.layout import SkinLayout
+from edge.touch.track import TrackSettings
 from export import graph
 from train.pipeline import SCALINGS, Choice, ContactClassifier, vote
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge.golden import verify
-from edge.model import Model
+from edge.model.model import Model
+from edge.model.verify import verify
 
 HERE = Path(__file__).parent
 

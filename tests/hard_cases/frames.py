@@ -9,12 +9,12 @@ import numpy as np
 import scipy.ndimage
 from hypothesis import strategies as st
 
-from edge.features import feature_vector
-from edge.frame import Frame
-from edge.layout import SkinLayout
-from edge.region import largest_region
-from edge.track import FeatureSeries, Tracker, TrackSettings
-from tests.edge.test_region import SHAPES, check_against_reference
+from edge.touch.features import feature_vector
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.region import largest_region
+from edge.touch.track import FeatureSeries, Tracker, TrackSettings
+from tests.edge.touch.test_region import SHAPES, check_against_reference
 from tests.hard_cases.cases import Case
 
 SEEDS = st.integers(0, 10**6)

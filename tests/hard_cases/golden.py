@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.files import write_whole
-from edge.model import Model
+from edge.model.model import Model
 from edge.recording import Recording, save
 from export import golden
 from export.__main__ import describe

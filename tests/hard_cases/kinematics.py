@@ -11,10 +11,10 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from edge.arm import Chain, Joint
-from edge.frame import Frame
-from edge.joints import Joints
-from edge.track import Tracker, TrackSettings
+from edge.runtime.joint_stream import Joints
+from edge.touch.arm import Chain, Joint
+from edge.touch.frame import Frame
+from edge.touch.track import Tracker, TrackSettings
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, SEEDS, taxels
 

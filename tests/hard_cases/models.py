@@ -18,10 +18,10 @@ from sklearn.decomposition import PCA
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
-from edge.features import FEATURES
-from edge.layout import SkinLayout
-from edge.model import Model, ModelInfo, Task
-from edge.track import TrackSettings
+from edge.model.model import Model, ModelInfo, Task
+from edge.touch.features import FEATURES
+from edge.touch.layout import SkinLayout
+from edge.touch.track import TrackSettings
 from export.graph import to_onnx
 from tests.hard_cases import exact
 from train.pipeline import Choice, ContactClassifier

@@ -13,10 +13,10 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from edge.features import feature_vector
-from edge.frame import Frame
-from edge.model import Model
-from edge.track import Tracker, TrackSettings
+from edge.model.model import Model
+from edge.touch.features import feature_vector
+from edge.touch.frame import Frame
+from edge.touch.track import Tracker, TrackSettings
 from export.graph import to_onnx
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM

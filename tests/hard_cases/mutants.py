@@ -45,13 +45,13 @@ class Mutant:
         return "" if found == 1 else f"{self.file}: found {found} times: {self.source!r}"
 
 
-PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/track.py"
-CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/features.py", "edge/region.py"
+PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/touch/track.py"
+CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
 HARD = "tests/hard_cases/test_hard_cases.py"
 OF_PIPELINE, OF_GRAPH = "tests/train/test_pipeline.py", "tests/export/test_graph.py"
-OF_TRACK, OF_FEATURES = "tests/edge/test_track.py", "tests/edge/test_features.py"
-OF_REGION, OF_CROSSVAL = "tests/edge/test_region.py", "tests/train/test_crossval.py"
-OF_ARM, OF_MODEL = "tests/edge/test_arm.py", "tests/edge/test_model.py"
+OF_TRACK, OF_FEATURES = "tests/edge/touch/test_track.py", "tests/edge/touch/test_features.py"
+OF_REGION, OF_CROSSVAL = "tests/edge/touch/test_region.py", "tests/train/test_crossval.py"
+OF_ARM, OF_MODEL = "tests/edge/touch/test_arm.py", "tests/edge/model/test_model.py"
 
 MUTANTS = (
     Mutant(
@@ -205,7 +205,7 @@ MUTANTS = (
     ),
     Mutant(
         "label -1 is refused on the board",
-        "edge/model.py",
+        "edge/model/model.py",
         "if index < 0:",
         "if False:",
         (OF_MODEL, "refused_with_its_place or beyond_any_distance"),
@@ -324,28 +324,28 @@ MUTANTS = (
     ),
     Mutant(
         "1 - cos as 2 sin^2 of the half angle",
-        "edge/arm.py",
+        "edge/touch/arm.py",
         "f, g = np.sin(angles), 2.0 * half * half",
         "f, g = np.sin(angles), 1.0 - np.cos(angles)",
         (HARD, "tiny"),
     ),
     Mutant(
         "an angle that is not finite is refused",
-        "edge/arm.py",
+        "edge/touch/arm.py",
         "if not np.isfinite(angles).all():",
         "if False:",
         (OF_ARM, "non_finite"),
     ),
     Mutant(
         "angles between two lines go the shorter way",
-        "edge/joints.py",
+        "edge/runtime/joint_stream.py",
         "                    turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))\n",
         "",
-        ("tests/edge/test_joints.py", "shorter_way"),
+        ("tests/edge/runtime/test_joint_stream.py", "shorter_way"),
     ),
     Mutant(
         "a line that is not finite is no pose",
-        "edge/joints.py",
+        "edge/runtime/joint_stream.py",
         "        if not finite:\n",
         "        if False:\n",
         (HARD, "NaN"),

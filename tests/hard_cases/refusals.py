@@ -10,16 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from edge import skinfile, touchmap
-from edge.arm import Chain, Joint
 from edge.errors import InputError
-from edge.features import feature_vector
-from edge.frame import Frame
-from edge.joints import Joints
-from edge.layout import SkinLayout
-from edge.model import ModelInfo
+from edge.model.model import ModelInfo
 from edge.recording import Recording, load, save
-from edge.track import Tracker
+from edge.runtime import touch_map as touchmap
+from edge.runtime.joint_stream import Joints
+from edge.skin import file as skinfile
+from edge.touch.arm import Chain, Joint
+from edge.touch.features import feature_vector
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.track import Tracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, flicker_frames, series_of, taxels
 from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge.candidates import Candidates
 from edge.errors import InputError
-from edge.features import feature_vector
-from edge.golden import first_contact
-from edge.track import Tracker
+from edge.model.prediction_set import Candidates
+from edge.model.verify import first_contact
+from edge.touch.features import feature_vector
+from edge.touch.track import Tracker
 from train.conformal import Ranking, SequentialClassifier, deal, ratios
 from train.importers import sdh2
 from train.pipeline import Choice

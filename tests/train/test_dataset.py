@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.arm import Chain, Joint
+from edge.classifier import Watcher
 from edge.errors import InputError
-from edge.features import feature_vector
-from edge.live import Watcher
-from edge.model import Model
+from edge.model.model import Model
 from edge.recording import load, save
+from edge.touch.arm import Chain, Joint
+from edge.touch.features import feature_vector
 from train.dataset import load_trials
 
 

@@ -30,12 +30,12 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
     from edge.recording import load
-    from train.show import draw
+    from train.draw.recording import draw
 
     out = Path(arguments.out or Path(arguments.recording).with_suffix(".png"))
     if Path(arguments.recording).suffix != ".npz":
-        from edge import touchmap
-        from train import showmap
+        from edge.runtime import touch_map as touchmap
+        from train.draw import touch_map as showmap
 
         found = touchmap.load(arguments.recording)
         showmap.draw(found, out, arguments.recording, arguments.task)

@@ -1,4 +1,4 @@
-"""An MCAP file of ROS 2 or JSON messages: one recording; see train/topics.py.
+"""An MCAP file of ROS 2 or JSON messages: one recording; see train/importers/topics.py.
 
 Needs the extra `ros`: pip install edge-classify[ros]
 """
@@ -11,7 +11,7 @@ from typing import Any
 
 from edge.errors import InputError
 from edge.recording import Recording
-from train.topics import FRAMES, JOINTS, Log
+from train.importers.topics import FRAMES, JOINTS, Log
 
 
 def trials(path: Path) -> Iterator[tuple[str, Recording]]:

@@ -1,4 +1,4 @@
-"""A bag of ROS 1 (`.bag`) or ROS 2 (its folder): one recording; see train/topics.py.
+"""A bag of ROS 1 (`.bag`) or ROS 2 (its folder): one recording; see train/importers/topics.py.
 
 Needs the extra `ros`: pip install edge-classify[ros]
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from edge.errors import InputError
 from edge.recording import Recording
-from train.topics import FRAMES, JOINTS, Log
+from train.importers.topics import FRAMES, JOINTS, Log
 
 
 def trials(path: Path) -> Iterator[tuple[str, Recording]]:

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
-from edge.layout import SkinLayout
 from edge.recording import Recording, load_arrays
+from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.0034
 THRESHOLD_COUNTS = 50

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arm import Chain
 from edge.errors import InputError
+from edge.touch.arm import Chain
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from train.simulate.arm import Array
 from train.simulate.engine import Batch, Trial, kind_of, run_batch
-from train.simulate.fields import SPREAD
 from train.simulate.plan import make_plan
-from train.simulate.things import Scene
+from train.simulate.scene_model import Scene
+from train.simulate.schema import SPREAD
 
 HALVINGS = 6
 

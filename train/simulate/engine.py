@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from train.simulate import streams
 from train.simulate.arm import Array, Kinematics
-from train.simulate.calls import callers
 from train.simulate.contact import State
-from train.simulate.fields import SPREAD, STIFFNESSES
-from train.simulate.film import Film
 from train.simulate.plan import Plan, make_plan
-from train.simulate.things import Scene, SceneObject
+from train.simulate.required_effects import callers
+from train.simulate.scene_model import Scene, SceneObject
+from train.simulate.schema import SPREAD, STIFFNESSES
+from train.simulate.sensor_frames import Film
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from train.simulate.calls import callers
 from train.simulate.convergence import Convergence, measure
 from train.simulate.engine import Trial, kind_of, run_batch
-from train.simulate.fields import EFFECTS
 from train.simulate.plan import STAGES, Plan, make_plan
+from train.simulate.required_effects import callers
 from train.simulate.run import kinds, steps
-from train.simulate.things import Scene
+from train.simulate.scene_model import Scene
+from train.simulate.schema import EFFECTS
 
 MEASURED = 64
 """Trials in a batch that is timed."""

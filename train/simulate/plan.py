@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from train.simulate import base
-from train.simulate.things import Scene
+from train.simulate.scene_model import Scene
 
 Function = Callable[[Any], None]
 STAGES = ("setup", "frame", "step", "sample", "clock", "sensor")
@@ -69,7 +69,7 @@ class Build:
 
     def settings(self, effect: str) -> dict[str, float]:
         """The effect's settings of the scene."""
-        from train.simulate.fields import EFFECTS
+        from train.simulate.schema import EFFECTS
 
         defaults = {k: float(f.default or 0.0) for k, f in EFFECTS[effect].settings.items()}
         return {**defaults, **self.scene.settings.get(effect, {})}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from edge.errors import InputError
-from train.simulate.fields import Field
+from train.simulate.schema import Field
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from edge.errors import InputError
 from edge.recording import Recording
 from train.simulate.convergence import choose_step
 from train.simulate.engine import Batch, Kind, Trial, kind_of, run_batch
-from train.simulate.fields import SOFT_FAMILIES
-from train.simulate.things import Scene
+from train.simulate.scene_model import Scene
+from train.simulate.schema import SOFT_FAMILIES
 
 BATCH = 256
 """Trials in a batch: enough to spread numpy's cost a call, few enough to stay in the cache."""

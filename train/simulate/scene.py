@@ -9,14 +9,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from edge.arm import Chain
 from edge.errors import InputError
-from edge.layout import SkinLayout
-from train.simulate import fields
-from train.simulate.calls import check_supported
-from train.simulate.fields import EFFECTS, Field
+from edge.touch.arm import Chain
+from edge.touch.layout import SkinLayout
+from train.simulate import schema as fields
 from train.simulate.reader import Reader, Value
-from train.simulate.things import Scene, SceneObject
+from train.simulate.required_effects import check_supported
+from train.simulate.scene_model import Scene, SceneObject
+from train.simulate.schema import EFFECTS, Field
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)

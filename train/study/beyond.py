@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
-from edge.features import FEATURES, SAMPLES, WINDOW_S
-from edge.golden import first_contact
-from edge.measures import feature, names
+from edge.model.verify import first_contact
 from edge.recording import Recording
-from edge.track import Tracker, for_device
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
+from edge.touch.measures import feature, names
+from edge.touch.track import Tracker, for_device
 from train.pipeline import scale_of
+from train.report.tables import SCORE, Context, Figure, Section, Table, percent, score
 from train.study import plots
-from train.study.context import SCORE, Context, Figure, Section, Table, percent, score
 from train.study.honest import FOLDS, nested
 from train.study.score import Labels, Result, collect, evaluate, nested_fold, shuffled_folds
 from train.study.skins import View, vectors
@@ -174,7 +174,7 @@ def section(context: Context) -> Section:
         "Beyond three features",
         [
             f"Every feature type is a place and a quantity by whole-number arithmetic on the "
-            f"frame ({len(types)} types; see `edge/measures.py`), measured only where a model "
+            f"frame ({len(types)} types; see `edge/touch/measures.py`), measured only where a model "
             f"names it. {FEW} samples each, Method IV, 1.2 s. The cost is that of following a "
             f"contact on this machine ({floor:.0f} us a frame with max_force alone, of the 10 ms "
             "that a frame has).",

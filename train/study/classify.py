@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from edge.features import FEATURES
+from edge.touch.features import FEATURES
 from train.pipeline import SCALINGS
+from train.report.tables import SCORE, Context, Figure, Section, Table, percent, score
 from train.study import plots
-from train.study.context import SCORE, Context, Figure, Section, Table, percent, score
 from train.study.paper import entries
 from train.study.score import Result, evaluate
 

@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.features import FEATURES
-from edge.layout import SkinLayout
 from edge.recording import Recording
+from edge.touch.features import FEATURES
+from edge.touch.layout import SkinLayout
+from train.report.tables import SCORE, Context, Figure, Section, Table, score
 from train.study import plots
-from train.study.context import SCORE, Context, Figure, Section, Table, score
 from train.study.score import (
     Labels,
     Result,

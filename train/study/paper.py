@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
-from edge.summary import wilson
-from train.study.context import Context, Section, Table, percent
+from edge.commands.summary import wilson
+from train.report.tables import Context, Section, Table, percent
 
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140

@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from edge.layout import SkinLayout
+from edge.touch.layout import SkinLayout
+from train.report.tables import SCORE, Context, Figure, Section, Table, percent, score
 from train.study import plots
 from train.study.classify import papers
-from train.study.context import SCORE, Context, Figure, Section, Table, percent, score
 from train.study.score import evaluate
 from train.study.skins import View, masked, pooled_down, pooled_layout, thinned, vectors
 

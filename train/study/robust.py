@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from edge.arm import Chain
 from edge.errors import InputError
-from edge.layout import SkinLayout
-from edge.track import FeatureSeries, TrackSettings
+from edge.touch.arm import Chain
+from edge.touch.layout import SkinLayout
+from edge.touch.track import FeatureSeries, TrackSettings
+from train.report.tables import SCORE, Context, Figure, Section, Table, score
 from train.simulate.engine import Trial, kind_of, read_out, shoot
-from train.simulate.fields import EFFECTS
 from train.simulate.plan import make_plan
 from train.simulate.run import parts, recordings
-from train.simulate.things import Scene
+from train.simulate.scene_model import Scene
+from train.simulate.schema import EFFECTS
 from train.study import plots
-from train.study.context import SCORE, Context, Figure, Section, Table, score
 from train.study.score import evaluate, transfer
 from train.study.skins import Remembering, follow, vectors
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from edge.features import FEATURES
-from edge.summary import wilson
+from edge.commands.summary import wilson
+from edge.touch.features import FEATURES
 from train.crossval import (
     MAX_COMPONENTS,
     MAX_K,

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge.arm import Chain
-from edge.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
-from edge.golden import first_contact
-from edge.layout import SkinLayout
+from edge.model.verify import first_contact
 from edge.recording import Recording
-from edge.track import FeatureSeries, Tracker, TrackSettings, for_device
+from edge.touch.arm import Chain
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
+from edge.touch.layout import SkinLayout
+from edge.touch.track import FeatureSeries, Tracker, TrackSettings, for_device
 
 BLOCK = (4, 3)
 """Taxels that one chip reads: rows and columns (Cody's skin: 32 chips of 12)."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from edge.candidates import ALARMS, Candidates
+from edge.model.prediction_set import ALARMS, Candidates
 from train.conformal import FEWEST, SequentialClassifier
 from train.conformal import FOLDS as CALIBRATION_FOLDS
-from train.simulate.things import Scene
+from train.simulate.scene_model import Scene
 from train.tradeoff.accuracy import told
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)

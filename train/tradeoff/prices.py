@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from train.crossval import MAX_K, accuracies, neighbours
 from train.dataset import DataSet
-from train.study.context import Section, Table
+from train.report.tables import Section, Table
 from train.study.score import Result, best_cell, shuffled_folds
 
 SCALING = "IV"

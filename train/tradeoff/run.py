@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from edge.errors import InputError
-from edge.features import FEATURES, SAMPLES, feature_vector
 from edge.files import write_whole
-from edge.layout import SkinLayout
 from edge.recording import load
-from edge.track import FeatureSeries
+from edge.touch.features import FEATURES, SAMPLES, feature_vector
+from edge.touch.layout import SkinLayout
+from edge.touch.track import FeatureSeries
 from train.dataset import DataSet, load_trials
+from train.report.html import write
 from train.simulate import scene as scenes
 from train.study import skins
-from train.study.report import write
 from train.tradeoff import board as boards
 from train.tradeoff import early, prices, sections
 from train.tradeoff.accuracy import Point, front, nested, thinned

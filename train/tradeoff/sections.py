@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from train.study.context import Figure, Section, Table
+from train.report.tables import Figure, Section, Table
 from train.tradeoff import early, plots
 from train.tradeoff.accuracy import Point
 from train.tradeoff.board import Board

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from edge import skinfile
-from edge.chips import ad7147
 from edge.fake.player import frame_bits
-from edge.layout import SkinLayout
-from edge.skinfile import UNUSED, BusSpec, ChipSpec, SkinFile, frame_rate
+from edge.i2c import ad7147
+from edge.skin import file as skinfile
+from edge.skin.file import UNUSED, BusSpec, ChipSpec, SkinFile, frame_rate
+from edge.touch.layout import SkinLayout
 
 FRAMES = 100
 """Counted together, so that what is sent only now and then counts by its share."""

@@ -5,11 +5,11 @@ import errno
 import numpy as np
 import pytest
 
-from edge.bus import BusGone, BusNack, BusRefused, BusTimeout, fetch, read, send, write
 from edge.fake.bus import FakeBus
 from edge.fake.chips import FakeTCA9548A
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
+from edge.i2c.bus import BusGone, BusNack, BusRefused, BusTimeout, fetch, read, send, write
 
 
 class Echo:

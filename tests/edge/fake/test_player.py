@@ -6,13 +6,13 @@ import time
 import numpy as np
 import pytest
 
-from edge import skinfile
 from edge.errors import InputError
 from edge.fake.clock import PacedClock
 from edge.fake.player import Playback, fake_skin, play, skin_file
-from edge.layout import SkinLayout
-from edge.loop import Loop
 from edge.recording import Recording
+from edge.runtime.loop import Loop
+from edge.skin import file as skinfile
+from edge.touch.layout import SkinLayout
 
 
 def noise(shape, n=20, top=65536):

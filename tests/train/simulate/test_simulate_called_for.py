@@ -13,12 +13,12 @@ import pytest
 
 from train.simulate import plan as plans
 from train.simulate import streams
-from train.simulate.calls import callers
 from train.simulate.engine import begin, kind_of, run_batch, values_of
-from train.simulate.fields import EFFECTS
 from train.simulate.plan import STAGES, make_plan
+from train.simulate.required_effects import callers
 from train.simulate.run import kinds
 from train.simulate.scene import from_dict
+from train.simulate.schema import EFFECTS
 
 ROOT = Path(__file__).parents[3]
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from edge.arm import Chain
+from edge.touch.arm import Chain
 from train.simulate import arm, base, contact
 from train.simulate.convergence import measure
 from train.simulate.effects import impact

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from train.simulate import scene as scenes
-from train.simulate.fields import EFFECTS
 from train.simulate.scene import from_dict
+from train.simulate.schema import EFFECTS
 
 SCENES = Path(__file__).parents[3] / "train" / "scenes"
 GOOD = {

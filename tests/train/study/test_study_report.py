@@ -12,11 +12,11 @@ import pytest
 
 from edge.recording import save
 from train.__main__ import main
+from train.report.html import page, table_csv
+from train.report.tables import Figure, Section, Table
 from train.study import beyond
 from train.study.beyond import CHOSEN, columns, search
-from train.study.context import Figure, Section, Table
 from train.study.paper import entries, section
-from train.study.report import page, table_csv
 
 
 def test_the_papers_numbers_are_46_and_whole_trials_of_140():

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.layout import SkinLayout
 from edge.recording import Recording
+from edge.touch.layout import SkinLayout
 from train.study.resolution import layouts
 from train.study.skins import masked, pool, pooled, pooled_layout, thinned
 

@@ -10,15 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import (
-    Array,
-    State,
-    share_out,
-    sort_bed,
-    spring_loads,
-    total,
-    touching,
-)
+from train.simulate.contact import Array, State, share_out, sort_bed, spring_loads, total, touching
 from train.simulate.plan import Build
 
 SLOPES = (1.0, 4.0, 16.0)

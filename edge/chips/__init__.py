@@ -1,1 +1,0 @@
-"""Drivers, one module a chip."""

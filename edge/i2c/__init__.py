@@ -1,0 +1,1 @@
+"""The buses and the chips on them."""

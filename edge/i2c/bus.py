@@ -1,0 +1,340 @@
+"""An I2C bus: what travels over it, what goes wrong on it, and Linux's adapter.
+
+Only the transaction that every adapter carries is built on top of this module: one chip,
+`[write]`, `[read]` or `[write pointer][read n]`, in one call. Raspberry Pis up to 4 refuse a
+read anywhere but last, the Pi 5 a second address in one call.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import math
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fcntl import ioctl
+from typing import Any, NoReturn, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import EdgeError
+
+I2C_TIMEOUT = 0x0702
+"""ioctl of linux/i2c-dev.h; its unit is 10 ms, and it holds for the whole adapter."""
+I2C_RDWR = 0x0707
+LARGEST_MESSAGES = 42
+LARGEST_BYTES = 8192
+"""Limits of one I2C_RDWR call (linux/i2c-dev.h)."""
+
+
+class BusError(EdgeError):
+    """A transaction that failed.
+
+    Attributes:
+        errno: what the kernel said.
+        bus: the bus's name.
+        address: the chip's 7-bit address, or None where the bus itself is at fault.
+    """
+
+    errno: int | None = None
+    bus = ""
+    address: int | None = None
+
+
+class BusNack(BusError, ConnectionError):
+    """Nothing acknowledged the address (EREMOTEIO or ENXIO, by adapter)."""
+
+
+class BusFault(BusError, OSError):
+    """The transfer broke off: clock stretched too long, short transfer, wrong channel (EIO)."""
+
+
+class BusTimeout(BusError, TimeoutError):
+    """The transfer hung until the adapter's timeout (ETIMEDOUT)."""
+
+
+class BusArbitration(BusError, BlockingIOError):
+    """Another master won the bus (EAGAIN)."""
+
+
+class BusBusy(BusError, OSError):
+    """A driver of the kernel owns the address (EBUSY)."""
+
+
+class BusRefused(BusError, ValueError):
+    """The adapter does not carry a transaction of this shape (EOPNOTSUPP, EINVAL)."""
+
+
+class BusMissing(BusError, FileNotFoundError):
+    """There is no such bus (ENOENT)."""
+
+
+class BusDenied(BusError, PermissionError):
+    """The bus may not be opened (EACCES, EPERM)."""
+
+
+class BusGone(BusError, ConnectionAbortedError):
+    """The adapter has gone, as an unplugged USB adapter has (ENODEV)."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What to do about an error.
+
+    Attributes:
+        error: the exception that stands for it.
+        retries: how often the transaction is sent again within the same frame.
+        reopen: the bus is opened anew before it is used again.
+        passing: it may pass; otherwise it is for a person to mend.
+        mend: the end of the sentence for that person.
+    """
+
+    error: type[BusError]
+    retries: int = 0
+    reopen: bool = False
+    passing: bool = True
+    mend: str = ""
+
+
+_NACK = Response(BusNack, 3, mend="does not answer; check its power, wiring and address")
+_GONE = Response(BusGone, reopen=True, mend="the adapter has gone; plug it in again")
+_REFUSED = Response(
+    BusRefused, passing=False, mend="the adapter refuses a transaction of this shape"
+)
+_DENIED = Response(
+    BusDenied, passing=False, mend="may not be opened; add yourself to the group i2c, or use sudo"
+)
+RESPONSES: dict[int, Response] = {
+    errno.EREMOTEIO: _NACK,
+    errno.ENXIO: _NACK,
+    errno.EIO: Response(
+        BusFault, 2, mend="the transfer broke off; check cable length and pull-ups"
+    ),
+    errno.ETIMEDOUT: Response(BusTimeout, reopen=True, mend="the transfer hung until its timeout"),
+    errno.EAGAIN: Response(BusArbitration, 3, mend="another master holds the bus"),
+    errno.EBUSY: Response(
+        BusBusy, passing=False, mend="a driver of the kernel owns the address; unbind it"
+    ),
+    errno.EOPNOTSUPP: _REFUSED,
+    errno.EINVAL: _REFUSED,
+    errno.ENOENT: Response(
+        BusMissing, passing=False, mend="no such bus; is I2C switched on, and the number right?"
+    ),
+    errno.EACCES: _DENIED,
+    errno.EPERM: _DENIED,
+    errno.ENODEV: _GONE,
+}
+"""errno to response (notes on real adapters). An errno that is not here is treated as EIO."""
+
+
+def response(code: int | None) -> Response:
+    """What to do about an errno."""
+    return RESPONSES.get(code or errno.EIO, RESPONSES[errno.EIO])
+
+
+def bus_error(code: int | None, bus: str, address: int | None = None) -> BusError:
+    """The named error of an errno, with a sentence that names the bus and the chip.
+
+    >>> raise bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
+    Traceback (most recent call last):
+    edge.i2c.bus.BusTimeout: /dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)
+    """
+    code = code or errno.EIO
+    place = bus if address is None else f"{bus}, address {address:#04x}"
+    answer = response(code)
+    name = errno.errorcode.get(code, str(code))
+    error = answer.error(f"{place}: {answer.mend} ({name})")
+    error.errno, error.bus, error.address = code, bus, address
+    return error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """One message: bytes to a chip, or room for bytes from it."""
+
+    address: int
+    buffer: NDArray[np.uint8]
+    read: bool = False
+
+
+def write(address: int, data: bytes | Sequence[int]) -> Message:
+    """A message of bytes to a chip."""
+    return Message(address, np.frombuffer(bytes(data), dtype=np.uint8).copy())
+
+
+def read(address: int, into: NDArray[np.uint8] | int) -> Message:
+    """A message of bytes from a chip, into an array given or a new one."""
+    buffer = np.zeros(into, dtype=np.uint8) if isinstance(into, int) else into
+    if buffer.dtype != np.uint8 or not buffer.flags.c_contiguous or not buffer.flags.writeable:
+        raise ValueError("a read needs a writable, contiguous uint8 array")
+    return Message(address, buffer, read=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transfer:
+    """Messages of one call, prepared once and sent as often as wanted."""
+
+    messages: tuple[Message, ...]
+    handle: Any = None
+
+    @property
+    def buffer(self) -> NDArray[np.uint8]:
+        """The last message's bytes: what was read, where the last message is a read."""
+        return self.messages[-1].buffer
+
+
+def wire_bits(messages: Sequence[Message]) -> int:
+    """Bits on the wire: 9 a byte, 1 each for START, repeated START and STOP.
+
+    >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
+    255
+    """
+    return 1 + sum(1 + 9 * (1 + len(m.buffer)) for m in messages)
+
+
+class Bus(Protocol):
+    """What carries transactions: an adapter, a mux's channel, or a fake."""
+
+    @property
+    def name(self) -> str:
+        """What errors call it."""
+        ...
+
+    def prepare(self, *messages: Message) -> Transfer:
+        """Build a call's structures once, outside the loop."""
+        ...
+
+    def transfer(self, prepared: Transfer) -> None:
+        """Send it; what was read is in its messages' buffers.
+
+        Raises:
+            BusError: it failed; `RESPONSES` says what to do about it.
+        """
+        ...
+
+    def now(self) -> float:
+        """Seconds on the bus's clock."""
+        ...
+
+    def sleep(self, seconds: float) -> None:
+        """Wait, as some chips need it."""
+        ...
+
+    def reopen(self) -> None:
+        """Open it anew; what was prepared stays good.
+
+        Raises:
+            BusError: it is not there.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let it go; twice is fine."""
+        ...
+
+
+def send(bus: Bus, address: int, data: bytes | Sequence[int]) -> None:
+    """Write bytes to a chip, once."""
+    bus.transfer(bus.prepare(write(address, data)))
+
+
+def fetch(bus: Bus, address: int, pointer: bytes, n: int) -> bytes:
+    """Read `n` bytes from a chip, once, after writing `pointer` (nothing where it is empty)."""
+    messages = [write(address, pointer)] if pointer else []
+    prepared = bus.prepare(*messages, read(address, n))
+    bus.transfer(prepared)
+    return prepared.buffer.tobytes()
+
+
+def device_path(device: str | int) -> str:
+    """`/dev/i2c-1` for 1."""
+    return f"/dev/i2c-{device}" if isinstance(device, int) else device
+
+
+class LinuxBus:
+    """An adapter of Linux, `/dev/i2c-N`, over smbus2.
+
+    >>> bus = LinuxBus(1, timeout_s=0.02)                       # doctest: +SKIP
+    >>> fetch(bus, 0x2C, b"\\x00\\x17", 2).hex()                # doctest: +SKIP
+    '1470'
+    """
+
+    def __init__(self, device: str | int, *, timeout_s: float = 0.02) -> None:
+        """Open the bus and set its timeout.
+
+        Args:
+            device: `/dev/i2c-1`, or 1.
+            timeout_s: how long a hung transfer may last, rounded up to the adapter's 10 ms;
+                the kernel's own default is a second, a hundred frames.
+
+        Raises:
+            BusError: it is not there, may not be opened, or carries no plain I2C.
+        """
+        self.name = device_path(device)
+        self.timeout_s = timeout_s
+        self._smbus: Any = None
+        self._fd = -1
+        self.reopen()
+
+    now = staticmethod(time.monotonic)
+    sleep = staticmethod(time.sleep)
+
+    def reopen(self) -> None:
+        """Close it, open it again and set its timeout.
+
+        Raises:
+            BusError: it is not there, may not be opened, or carries no plain I2C.
+        """
+        import smbus2
+
+        self.close()
+        smbus: Any = smbus2.SMBus()
+        try:
+            smbus.open(self.name)
+            if not smbus.funcs & smbus2.I2cFunc.I2C:
+                raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
+            ioctl(smbus.fd, I2C_TIMEOUT, max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)))
+        except OSError as error:
+            smbus.close()
+            raise bus_error(error.errno, self.name) from None
+        self._smbus, self._fd = smbus, smbus.fd
+
+    def prepare(self, *messages: Message) -> Transfer:
+        """Build smbus2's structures over the messages' own buffers: nothing is copied later."""
+        from smbus2 import i2c_msg
+        from smbus2.smbus2 import i2c_rdwr_ioctl_data
+
+        parts: list[Any] = []
+        for message in messages:
+            buffer = message.buffer
+            pointer = ctypes.cast(buffer.ctypes.data, ctypes.POINTER(ctypes.c_char))
+            parts.append(
+                i2c_msg(addr=message.address, flags=int(message.read), len=len(buffer), buf=pointer)
+            )
+        return Transfer(messages, i2c_rdwr_ioctl_data.create(*parts))
+
+    def transfer(self, prepared: Transfer) -> None:
+        """Send it; the interpreter lock is free while it is on the wire.
+
+        Raises:
+            BusError: it failed.
+        """
+        try:
+            ioctl(self._fd, I2C_RDWR, prepared.handle)
+        except (OSError, ValueError) as error:
+            self._fail(error, prepared)
+
+    def _fail(self, error: OSError | ValueError, prepared: Transfer) -> NoReturn:
+        # A closed bus has the file descriptor -1, which ioctl answers with ValueError.
+        code = error.errno if isinstance(error, OSError) else errno.ENODEV
+        raise bus_error(code, self.name, prepared.messages[0].address) from None
+
+    def close(self) -> None:
+        """Let it go; twice is fine."""
+        self._fd = -1
+        if self._smbus is not None:
+            self._smbus.close()
+            self._smbus = None

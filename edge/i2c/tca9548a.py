@@ -1,0 +1,141 @@
+"""TCA9548A: one bus to eight, one control byte. Each channel is itself a bus.
+
+A channel connects only after STOP, so that selecting it is a call of its own (TCA9548A data
+sheet, section 8.5).
+"""
+
+from __future__ import annotations
+
+import errno
+
+from edge.i2c.bus import Bus, BusError, BusNack, Message, Transfer, bus_error, read, write
+
+ADDRESSES = range(0x70, 0x78)
+CHANNELS = 8
+
+
+class TCA9548A:
+    """One mux.
+
+    >>> mux = TCA9548A(bus, 0x70)                                # doctest: +SKIP
+    >>> AD7147(mux.channel(3), 0x2C)                             # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        address: int = 0x70,
+        *,
+        verify: bool = True,
+        beside: tuple[TCA9548A, ...] = (),
+    ) -> None:
+        """Check that it is there, and disconnect all its channels.
+
+        Args:
+            bus: the bus it hangs on.
+            address: 0x70 to 0x77.
+            verify: read the control byte back whenever a channel is selected. It costs 20 bits
+                (1.9 % of a frame of 32 AD7147) and catches the wrong channel, whose data would
+                be plausible and wrong.
+            beside: other muxes on the same bus, of which at most one may have a channel open.
+
+        Raises:
+            BusError: it does not answer, or does not keep its control byte.
+        """
+        self.bus, self.address, self.verify = bus, address, verify
+        self.selected: int | None = None
+        """The channel known to be connected; None where unknown."""
+        self._select = [bus.prepare(write(address, [1 << n])) for n in range(CHANNELS)]
+        self._none = bus.prepare(write(address, [0]))
+        self._control = bus.prepare(read(address, 1))
+        self._beside = beside
+        self._open: bool | None = None
+        for mux in beside:
+            mux._beside = (*mux._beside, self)
+        self.disconnect()
+
+    def channel(self, n: int) -> Channel:
+        """Channel `n`, 0 to 7, as a bus."""
+        return Channel(self, n)
+
+    def disconnect(self) -> None:
+        """Disconnect all channels.
+
+        Raises:
+            BusError: it failed.
+        """
+        self._set(self._none, 0)
+        self._open = False
+
+    def select(self, n: int) -> None:
+        """Connect channel `n` alone; nothing is sent where it is connected already.
+
+        Raises:
+            BusError: it failed; which channel is connected is then unknown.
+        """
+        if self.selected == n:
+            return
+        for mux in self._beside:
+            if mux._open is not False:
+                mux._leave()
+        self._set(self._select[n], 1 << n)
+        self._open, self.selected = True, n
+
+    def forget(self) -> None:
+        """Take the connected channel for unknown, as it is after any error."""
+        self.selected = self._open = None
+
+    def _leave(self) -> None:
+        """Disconnect, for a mux beside; one that has gone for good does not cost the others."""
+        for _ in range(4):
+            try:
+                return self.disconnect()
+            except BusNack:
+                continue
+
+    def _set(self, control: Transfer, expected: int) -> None:
+        self.forget()
+        self.bus.transfer(control)
+        if self.verify:
+            self.bus.transfer(self._control)
+            if self._control.buffer[0] != expected:
+                raise bus_error(errno.EIO, self.bus.name, self.address)
+
+
+class Channel:
+    """One channel of a mux: a bus that selects itself before it is used."""
+
+    def __init__(self, mux: TCA9548A, n: int) -> None:
+        if not 0 <= n < CHANNELS:
+            raise ValueError(f"a TCA9548A has channels 0 to 7, not {n}")
+        self.mux, self.n = mux, n
+        self.name = f"{mux.bus.name}, mux {mux.address:#04x} channel {n}"
+        self.now, self.sleep = mux.bus.now, mux.bus.sleep
+        self._send = mux.bus.transfer
+
+    def prepare(self, *messages: Message) -> Transfer:
+        """Build a call's structures once."""
+        return self.mux.bus.prepare(*messages)
+
+    def transfer(self, prepared: Transfer) -> None:
+        """Select the channel where it is not, then send.
+
+        Raises:
+            BusError: either failed; the channel is unknown from then on.
+        """
+        mux = self.mux
+        if mux.selected != self.n:
+            mux.select(self.n)
+        try:
+            self._send(prepared)
+        except BusError:
+            mux.forget()
+            raise
+
+    def reopen(self) -> None:
+        """Open the mux's bus anew."""
+        self.mux.forget()
+        self.mux.bus.reopen()
+
+    def close(self) -> None:
+        """Nothing: whoever opened the bus closes it."""

@@ -1,0 +1,1 @@
+"""The exported model: loading, deciding, and checking it."""

@@ -1,0 +1,414 @@
+"""model.onnx on the board: what it says of itself, and decisions."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from edge.errors import EdgeError, InputError
+from edge.model import onnx_file as onnxfile
+from edge.touch import measures
+from edge.touch.arm import Chain
+from edge.touch.layout import SkinLayout
+from edge.touch.track import TrackSettings
+
+METADATA_KEY = "edge-classify"
+FORMAT = 1
+LARGEST_BYTES = 1 << 30
+NO_LOOK = -1
+"""Asks the graph for the full window, and not for p-values."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One question that the model answers, and how it was fitted.
+
+    Attributes:
+        labels: the answers, in the order of the scores.
+        k: neighbours that vote.
+        components: principal components.
+        scaling: "none" or "I" to "V" (paper, Eqs. 1 to 5).
+        accuracy: leave-one-out accuracy at export, 0 to 1.
+    """
+
+    labels: tuple[str, ...]
+    k: int
+    components: int
+    scaling: str
+    accuracy: float
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """A model's metadata: all that the board needs besides the weights."""
+
+    tasks: dict[str, Task]
+    layout: SkinLayout
+    tracking: TrackSettings
+    window_s: float
+    samples: int
+    features: tuple[str, ...]
+    units: dict[str, str]
+    motion_frame: str
+    """`world` (with joint angles) or `skin`."""
+    chain: Chain | None
+    rows: int
+    """Training trials."""
+    data_digest: str
+    versions: dict[str, str] = field(default_factory=dict)
+    looks_s: tuple[float, ...] = ()
+    """Windows at which the model can be asked, the last the full one; none without calibration."""
+    folds: tuple[int, ...] = ()
+    """Trials in each fold of the calibration."""
+
+    @property
+    def width(self) -> int:
+        """Length of a feature vector."""
+        return len(self.features) * self.samples
+
+    @property
+    def smallest_error(self) -> float:
+        """No label can be struck out at a smaller one: there are too few calibration trials."""
+        return sum(1.0 / (1 + size) for size in self.folds) / len(self.folds)
+
+    def to_json(self) -> str:
+        """As the model file carries it."""
+        calibration = {"looks_s": self.looks_s, "folds": self.folds} if self.looks_s else {}
+        return json.dumps(
+            {
+                **calibration,
+                "format": FORMAT,
+                "tasks": {name: vars(task) for name, task in self.tasks.items()},
+                "skin": self.layout.to_dict(),
+                "tracking": vars(self.tracking),
+                "window_s": self.window_s,
+                "samples": self.samples,
+                "features": self.features,
+                "units": self.units,
+                "motion_frame": self.motion_frame,
+                "arm": None if self.chain is None else self.chain.to_dict(),
+                "rows": self.rows,
+                "data_digest": self.data_digest,
+                "versions": self.versions,
+            },
+            sort_keys=True,
+            allow_nan=False,
+            ensure_ascii=False,
+        )
+
+    @classmethod
+    def from_json(cls, text: str, name: str) -> ModelInfo:
+        """Read what `to_json` wrote.
+
+        Raises:
+            InputError: something is missing or of the wrong kind; the sentence names `name`.
+        """
+        try:
+            meta = json.loads(text)
+            if meta["format"] != FORMAT:
+                raise InputError(
+                    f"{name}: its format is {meta['format']}, this edge-classify reads {FORMAT}; "
+                    "export it with the same version"
+                )
+            info = cls(
+                tasks={
+                    str(task): Task(
+                        labels=tuple(map(str, entry["labels"])),
+                        k=int(entry["k"]),
+                        components=int(entry["components"]),
+                        scaling=str(entry["scaling"]),
+                        accuracy=float(entry["accuracy"]),
+                    )
+                    for task, entry in meta["tasks"].items()
+                },
+                layout=SkinLayout.from_dict(meta["skin"], where=name),
+                tracking=TrackSettings(**meta["tracking"]),
+                window_s=float(meta["window_s"]),
+                samples=int(meta["samples"]),
+                features=tuple(map(str, meta["features"])),
+                units={str(k): str(v) for k, v in meta["units"].items()},
+                motion_frame=str(meta["motion_frame"]),
+                chain=None if meta["arm"] is None else Chain.from_dict(meta["arm"], where=name),
+                rows=int(meta["rows"]),
+                data_digest=str(meta["data_digest"]),
+                versions={str(k): str(v) for k, v in meta.get("versions", {}).items()},
+                looks_s=tuple(map(float, meta.get("looks_s", ()))),
+                folds=tuple(map(int, meta.get("folds", ()))),
+            )
+        except InputError:
+            raise
+        except KeyError as error:
+            raise InputError(f"{name}: its metadata lacks {error}; export it again") from None
+        except (TypeError, ValueError, AttributeError, RecursionError):
+            raise InputError(f"{name}: its metadata cannot be read; export it again") from None
+        info._check(name)
+        return info
+
+    def _check(self, name: str) -> None:
+        try:
+            measures.features(self.features)
+        except InputError as error:
+            raise InputError(
+                f"{name}: was made for the features {', '.join(self.features)}; {error}; "
+                "export it with this version of edge-classify"
+            ) from None
+        if not self.tasks or not all(task.labels for task in self.tasks.values()):
+            raise InputError(f"{name}: its metadata names no task or no label; export it again")
+        if not (0.0 < self.window_s <= 3600.0 and 2 <= self.samples <= 10000):
+            raise InputError(f"{name}: its window or samples make no sense; export it again")
+        if self.looks_s:
+            before = (0.0, *self.looks_s[:-1])
+            rising = all(a < b for a, b in zip(before, self.looks_s, strict=True))
+            if not rising or self.looks_s[-1] != self.window_s or min(self.folds, default=0) < 1:
+                raise InputError(f"{name}: its looks make no sense; export it again")
+        if (self.motion_frame == "world") != (self.chain is not None):
+            raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
+
+
+class Decision(NamedTuple):
+    """The answer to one task.
+
+    Attributes:
+        label: what was touched.
+        confidence: the label's share of the votes, 0 to 1.
+        scores: (labels,) share of the votes of each label.
+        distances: (k,) of the neighbours, nearest first, in PCA space.
+        neighbours: (k,) rows of the training set, nearest first.
+        tie: another label had as many votes; the nearest of the tied won.
+        pvalues: (folds, labels + 1) at the look that was asked for; see `edge.model.prediction_set`.
+    """
+
+    label: str
+    confidence: float
+    scores: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    neighbours: NDArray[np.int64]
+    tie: bool
+    pvalues: NDArray[np.float64] | None = None
+
+
+class Model:
+    """A `model.onnx`, ready to decide.
+
+    Raises:
+        InputError: the file is missing, is not an exported model, or contradicts itself.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, threads: int = 1) -> None:
+        """Load the file; one thread is fastest for models of this size."""
+        name = os.fspath(path)
+        contents, checked = _contents(name)
+        text = contents.metadata.get(METADATA_KEY)
+        if text is None:
+            raise InputError(
+                f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
+            )
+        self.path = name
+        self.info = ModelInfo.from_json(text, name)
+        runtime = _onnxruntime()
+        options = runtime.SessionOptions()
+        options.intra_op_num_threads = threads
+        options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        # The exported graph has nothing left to optimise, and the board's memory is dear.
+        options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_DISABLE_ALL
+        options.enable_cpu_mem_arena = False
+        try:
+            # By its name: from bytes, it would hold the file in memory twice, and keep one.
+            self._session = runtime.InferenceSession(
+                name, options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # onnxruntime's own exceptions share no base but this
+            raise InputError(
+                f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
+            ) from None
+        if not _is(name, checked):
+            raise InputError(f"{name}: was changed while it was read; start again")
+        self._check(name)
+        self._names = [output.name for output in self._session.get_outputs()]
+        # Input and outputs are arrays of ours that ONNX Runtime reads and writes in place: a
+        # decision then allocates next to nothing.
+        self._shape = (self.info.width,)
+        self._input = np.zeros((1, *self._shape))
+        self._look = np.full(1, NO_LOOK, dtype=np.int64)
+        outputs: dict[str, NDArray[Any]] = {
+            output.name: np.zeros(
+                [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
+            )
+            for output in self._session.get_outputs()
+        }
+        self._binding = self._session.io_binding()
+        value = runtime.OrtValue.ortvalue_from_numpy
+        self._binding.bind_ortvalue_input("features", value(self._input))
+        if self.info.looks_s:
+            self._binding.bind_ortvalue_input("look", value(self._look))
+        for output, array in outputs.items():
+            self._binding.bind_ortvalue_output(output, value(array))
+        self._answers = [
+            _Answer(
+                task,
+                entry.labels,
+                outputs[f"{task}_label"],
+                outputs[f"{task}_scores"][0],
+                outputs[f"{task}_distances"][0],
+                outputs[f"{task}_neighbours"][0],
+                outputs[f"{task}_pvalues"][0] if self.info.looks_s else None,
+            )
+            for task, entry in self.info.tasks.items()
+        ]
+
+    def _check(self, name: str) -> None:
+        inputs = self._session.get_inputs()
+        shape = inputs[0].shape if inputs else []
+        if not inputs or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
+            raise InputError(f"{name}: has no float64 input `features`; export it again")
+        more = [(i.name, i.type, list(i.shape)) for i in inputs[1:]]
+        if more != ([("look", "tensor(int64)", [1])] if self.info.looks_s else []):
+            raise InputError(f"{name}: its inputs and its looks disagree; export it again")
+        if len(shape) != 2 or shape[1] != self.info.width:
+            raise InputError(
+                f"{name}: takes {shape[1:]} features, its metadata says {self.info.width}; "
+                "export it again"
+            )
+        outputs = {output.name: output.shape for output in self._session.get_outputs()}
+        for task, entry in self.info.tasks.items():
+            widths = {"scores": len(entry.labels), "distances": entry.k, "neighbours": entry.k}
+            if f"{task}_label" not in outputs:
+                raise InputError(f"{name}: has no output {task}_label; export it again")
+            for part, width in widths.items():
+                shape = outputs.get(f"{task}_{part}")
+                if shape is None or len(shape) != 2 or shape[1] != width:
+                    raise InputError(
+                        f"{name}: has no output {task}_{part} of width {width}, "
+                        "as its metadata says; export it again"
+                    )
+            folds = [len(self.info.folds), len(entry.labels) + 1]
+            if self.info.looks_s and list(outputs.get(f"{task}_pvalues", ()))[1:] != folds:
+                raise InputError(
+                    f"{name}: has no output {task}_pvalues of shape {folds}, "
+                    "as its metadata says; export it again"
+                )
+
+    @property
+    def looks_s(self) -> tuple[float, ...]:
+        """Windows at which the model can be asked; the full one alone without calibration."""
+        return self.info.looks_s or (self.info.window_s,)
+
+    def run(self, vectors: NDArray[np.float64], look: int | None = None) -> dict[str, NDArray[Any]]:
+        """The graph's outputs for vectors (n, width), unguarded; for checks and benchmarks.
+
+        Args:
+            vectors: measured over the window of the look.
+            look: place in `looks_s`; the last where None.
+        """
+        given: dict[str, NDArray[Any]] = {"features": vectors}
+        if self.info.looks_s:
+            given["look"] = np.array([self._place(look)], dtype=np.int64)
+        values = self._session.run(self._names, given)
+        return dict(zip(self._names, values, strict=True))
+
+    def _place(self, look: int | None) -> int:
+        looks = len(self.looks_s)
+        if look is None:
+            return looks - 1
+        if not 0 <= look < looks:
+            raise InputError(f"{self.path}: has the looks 0 to {looks - 1}, not {look}")
+        return look
+
+    def decide(self, vector: ArrayLike, look: int | None = None) -> dict[str, Decision]:
+        """Decide all tasks for one feature vector; not for several threads at once.
+
+        Args:
+            vector: (width,) measured over the window of the look.
+            look: place in `looks_s`, to know the p-values there; the full window without them
+                where None.
+
+        Raises:
+            InputError: the vector has another length, or a value that is not finite (or is so
+                large that no distance to the training rows is); the model has no such look.
+        """
+        x = np.asarray(vector, dtype=np.float64)
+        if x.shape != self._shape:
+            raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
+        self._input[0] = x
+        self._look[0] = NO_LOOK if look is None else self._place(look)
+        self._session.run_with_iobinding(self._binding)
+        decisions: dict[str, Decision] = {}
+        for name, labels, label, scores, distances, neighbours, pvalues in self._answers:
+            index = int(label[0])
+            if index < 0:
+                raise self._refusal(x)
+            shares = scores.tolist()
+            decisions[name] = Decision(
+                labels[index],
+                shares[index],
+                scores.copy(),
+                distances.copy(),
+                neighbours.copy(),
+                shares.count(shares[index]) > 1,
+                None if look is None or pvalues is None else pvalues.copy(),
+            )
+        return decisions
+
+    def _refusal(self, x: NDArray[np.float64]) -> InputError:
+        """Why the graph answered -1: it does so for every vector it cannot measure."""
+        if np.isfinite(x).all():
+            return InputError(
+                "the features are too large for the model to measure a distance to them"
+            )
+        bad = int(np.argmin(np.isfinite(x)))
+        feature = self.info.features[bad // self.info.samples]
+        return InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
+
+
+class _Answer(NamedTuple):
+    """A task, and the arrays that ONNX Runtime writes its answer to."""
+
+    task: str
+    labels: tuple[str, ...]
+    label: NDArray[np.int64]
+    scores: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    neighbours: NDArray[np.int64]
+    pvalues: NDArray[np.float64] | None
+
+
+def _contents(name: str) -> tuple[onnxfile.Contents, os.stat_result]:
+    """What the file holds, checked, and which file that was."""
+    try:
+        with open(name, "rb") as file:
+            stat = os.fstat(file.fileno())
+            data = file.read(LARGEST_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(f"{name}: no such model; make one with `make export`") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if len(data) > LARGEST_BYTES:
+        raise InputError(f"{name}: is larger than any model; copy or export it again")
+    return onnxfile.check(data, name), stat
+
+
+def _is(name: str, stat: os.stat_result) -> bool:
+    """The file is still the one that was checked, unchanged."""
+    try:
+        now = os.stat(name)
+    except OSError:
+        return False
+    return all(
+        getattr(now, part) == getattr(stat, part)
+        for part in ("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
+    )
+
+
+def _onnxruntime() -> Any:
+    """onnxruntime, imported where a model is first needed: it is most of the start-up time."""
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise EdgeError(f"onnxruntime cannot be imported ({error}); install it with pip") from None
+    return onnxruntime

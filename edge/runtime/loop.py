@@ -1,0 +1,197 @@
+"""The loop in real time: ticks that do not drift, frames with their joints, a clean stop."""
+
+from __future__ import annotations
+
+import gc
+import math
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import FrameType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.clock import Clock
+from edge.skin.skin import Skin
+from edge.touch.frame import Frame
+
+COLLECT_TICKS = 100
+COLLECT_SLACK_S = 0.001
+
+
+class JointSource(Protocol):
+    """Where joint angles come from."""
+
+    def at(self, t: float) -> NDArray[np.float64] | None:
+        """Angles (dof,) in radians at a time of the loop's clock; None where not known."""
+        ...
+
+
+class Periods:
+    """Times between ticks, counted in bins of 10 us: any length of run in the same memory.
+
+    >>> periods = Periods()
+    >>> for period in (0.01, 0.01, 0.01, 0.02):
+    ...     periods.add(period)
+    >>> periods.percentile(50), periods.percentile(99)
+    (0.01001, 0.02001)
+    """
+
+    BIN_S = 1e-5
+    BINS = 100_000
+
+    def __init__(self) -> None:
+        self._counts = [0] * self.BINS
+        self.n = 0
+        self.longest = 0.0
+
+    def add(self, period_s: float) -> None:
+        """Count one; longer than a second counts as a second."""
+        # A period on a bin's edge must not fall below it by the last bit of a float.
+        self._counts[min(int(period_s / self.BIN_S + 1e-6), self.BINS - 1)] += 1
+        self.n += 1
+        self.longest = max(self.longest, period_s)
+
+    def percentile(self, percent: float) -> float:
+        """Seconds that so many percent of the periods are not above (to a bin's upper edge)."""
+        if self.n == 0:
+            return math.nan
+        wanted, seen = math.ceil(self.n * percent / 100.0), 0
+        for i, count in enumerate(self._counts):
+            seen += count
+            if seen >= wanted:
+                return round((i + 1) * self.BIN_S, 9)
+        return self.longest
+
+
+class Schedule:
+    """Ticks at start + k * period: one that comes late does not move the next ones.
+
+    Ticks that have passed altogether are left out and counted in `missed`. Garbage is
+    collected here, while there is time to the next tick.
+    """
+
+    def __init__(self, clock: Clock, period_s: float) -> None:
+        self.clock, self.period_s = clock, period_s
+        self.start = math.nan
+        self.tick = -1
+        self.missed = 0
+        self.late_s = 0.0
+        """How late the last tick came."""
+        self.periods = Periods()
+        self._last = math.nan
+
+    def wait(self) -> float:
+        """Wait for the next tick; returns its time as it should be, in seconds."""
+        now = self.clock.now()
+        if self.tick < 0:
+            self.start, self._last = now, math.nan
+        self.tick += 1
+        due = self.start + self.tick * self.period_s
+        if now >= due + self.period_s:
+            gone = int((now - due) / self.period_s)
+            self.missed += gone
+            self.tick += gone
+            due = self.start + self.tick * self.period_s
+        elif self.tick % COLLECT_TICKS == 0 and due - now > COLLECT_SLACK_S and not gc.isenabled():
+            gc.collect(1)
+        self.clock.sleep_until(due)
+        began = self.clock.now()
+        self.late_s = began - due
+        if not math.isnan(self._last):
+            self.periods.add(began - self._last)
+        self._last = began
+        return due
+
+
+@contextmanager
+def garbage_aside() -> Iterator[None]:
+    """Keep the collector out of the block: what is there stays, what comes is freed by count.
+
+    `Schedule.wait` collects what is left over, between two ticks.
+    """
+    was = gc.isenabled()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if was:
+            gc.enable()
+
+
+@dataclass
+class Stop:
+    """Whether someone has asked the loop to end."""
+
+    asked: bool = False
+
+
+@contextmanager
+def stop_on(*signals: int) -> Iterator[Stop]:
+    """Let signals end the loop after the frame at hand; a second one is as violent as ever."""
+    stop = Stop()
+    before: dict[int, Any] = {}
+
+    def ask(number: int, _: FrameType | None) -> None:
+        stop.asked = True
+        signal.signal(number, before[number])
+
+    for number in signals:
+        before[number] = signal.signal(number, ask)
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class Loop:
+    """Frames of a skin at its rate.
+
+    >>> from edge import skinfile
+    >>> from edge.fake.player import still
+    >>> with still(skinfile.load(skinfile.shipped())) as skin:
+    ...     sum(1 for _ in Loop(skin, lasts_s=0.05).frames())
+    5
+    """
+
+    def __init__(
+        self,
+        skin: Skin,
+        *,
+        joints: JointSource | None = None,
+        lasts_s: float = math.inf,
+        stop: Stop | None = None,
+    ) -> None:
+        """Read a skin.
+
+        Args:
+            skin: started.
+            joints: asked for the angles at each frame's time.
+            lasts_s: how long.
+            stop: ends it early.
+        """
+        self.skin, self.joints = skin, joints
+        self.schedule = Schedule(skin.clock, skin.period_s)
+        self._lasts, self._stop = lasts_s, stop or Stop()
+
+    def frames(self) -> Iterator[Frame]:
+        """Read until the time is over or someone asks to stop."""
+        with garbage_aside():
+            while not self._stop.asked:
+                due = self.schedule.wait()
+                # A thousandth of a tick: a time that is meant to be the end is the end.
+                if due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s:
+                    return
+                if self._stop.asked:
+                    return
+                frame = self.skin.read()
+                if self.joints is not None:
+                    frame = replace(frame, joints=self.joints.at(frame.t))
+                yield frame

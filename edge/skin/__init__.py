@@ -1,0 +1,1 @@
+"""The skin: its file, its calibration, and frames read over its buses."""

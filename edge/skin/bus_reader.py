@@ -1,0 +1,380 @@
+"""The chips of one bus, read frame by frame, whatever the bus does.
+
+A chip that fails is sent the same transaction again as `edge.i2c.bus.RESPONSES` says, then left
+out and tried again after a pause that grows; when it answers it is identified and, where its
+settings are gone, set up again, a few transactions a frame. None of it costs another chip.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.i2c.ad7147 import AD7147
+from edge.i2c.block import Block, data_bytes
+from edge.i2c.bus import (
+    Bus,
+    BusError,
+    BusGone,
+    BusRefused,
+    BusTimeout,
+    Transfer,
+    read,
+    response,
+    wire_bits,
+    write,
+)
+from edge.i2c.chip import Chip
+from edge.i2c.mpr121 import MPR121
+from edge.i2c.tca9548a import TCA9548A
+from edge.skin.file import BusSpec, ChipSpec
+
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
+"""Before a chip that does not answer is tried again; a try costs a few bits."""
+HUNG_PAUSE_S, LONGEST_HUNG_PAUSE_S = 0.05, 1.0
+"""Before a hung chip is: a try costs the adapter's timeout. Each pause is four times
+the one before."""
+GONE_PAUSE_S = 0.05
+"""Between two tries to open a bus whose adapter has gone."""
+RETRIES_PER_FRAME = 12
+STEPS_PER_FRAME = 24
+"""Most transactions a frame spends on bringing chips back."""
+
+
+NEVER = -1.0e9
+"""When a chip that was never read was read: long ago, but a number."""
+
+
+class State(enum.Enum):
+    """Of one chip."""
+
+    RUNNING = "running"
+    STARTING = "starting"
+    DOWN = "down"
+
+
+class Slot:
+    """One chip's place on the bus.
+
+    Attributes:
+        spec: as in the skin's file.
+        row: (bytes,) that its frame is read into.
+        state: see `State`.
+        error: why it is down.
+        bits: of one reading on the wire.
+        at: when it was last read, on the bus's clock.
+        good: the bytes in `row` are of one whole transfer of a chip with its settings.
+        recoveries: how often it has come back.
+    """
+
+    def __init__(self, spec: ChipSpec, row: NDArray[np.uint8]) -> None:
+        self.spec, self.row = spec, row
+        self.chip: Chip | None = None
+        self.state = State.DOWN
+        self.error: BusError | None = None
+        self.at = NEVER
+        self.good = False
+        self.bits = frame_wire_bits(spec, row)
+        self.suspect = False
+        """Its bytes look like those of a chip that has lost its settings: check it first."""
+        self.recoveries = 0
+        self.failures = 0
+        self.retry_at = -math.inf
+        self.revival: Iterator[None] | None = None
+        self.send: Callable[[Transfer], None] = _nothing
+        self.frame: Transfer | None = None
+
+    @property
+    def running(self) -> bool:
+        """Set up and answering."""
+        return self.state is State.RUNNING
+
+
+def _nothing(transfer: Transfer) -> None:
+    raise AssertionError("a chip that is down is not read")
+
+
+def frame_wire_bits(spec: ChipSpec, row: NDArray[np.uint8]) -> int:
+    """Bits on the wire of one reading of a chip: `[write pointer][read row]`."""
+    pointer = b"\0\0" if spec.kind == "ad7147" else b"\0"
+    return wire_bits([write(spec.address, pointer), read(spec.address, row)])
+
+
+def frame_bytes(spec: ChipSpec) -> int:
+    """Bytes of one reading of a chip."""
+    if spec.kind == "block":
+        return 4 + data_bytes(len(spec.taxels), spec.bits)
+    return 24
+
+
+class Persistent:
+    """A bus that sends a transaction again as often as its error allows."""
+
+    def __init__(self, bus: Bus, reader: BusReader) -> None:
+        self._bus, self._reader = bus, reader
+        self.name = bus.name
+        self.now, self.sleep, self.prepare = bus.now, bus.sleep, bus.prepare
+        self.reopen, self.close = bus.reopen, bus.close
+        self._send = bus.transfer
+
+    def transfer(self, prepared: Transfer) -> None:
+        """Send it.
+
+        Raises:
+            BusError: it failed for good, or the frame's retries are used up.
+        """
+        try:
+            self._send(prepared)
+        except BusError as error:
+            self._again(prepared, error)
+
+    def _again(self, prepared: Transfer, error: BusError) -> None:
+        tries = 0
+        while True:
+            answer = response(error.errno)
+            if tries >= answer.retries or self._reader.retries == 0:
+                raise error
+            tries += 1
+            self._reader.retries -= 1
+            try:
+                return self._send(prepared)
+            except BusError as another:
+                error = another
+
+
+class BusReader:
+    """The chips of one bus; one thread's own."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        spec: BusSpec,
+        rows: Sequence[NDArray[np.uint8]],
+        *,
+        verify_mux: bool = True,
+        recheck_frames: int = 4,
+    ) -> None:
+        """Take the bus over; nothing is sent yet.
+
+        Args:
+            bus: an open bus.
+            spec: its chips.
+            rows: for each chip the bytes that its frame is read into.
+            verify_mux: see `edge.i2c.tca9548a.TCA9548A`.
+            recheck_frames: see `edge.skin.file.Reading`.
+        """
+        self.bus = bus
+        self.slots = [Slot(chip, row) for chip, row in zip(spec.chips, rows, strict=True)]
+        self._verify, self._recheck = verify_mux, recheck_frames
+        self._muxes: dict[int, TCA9548A] = {}
+        self._frames = 0
+        self._turn = 0
+        self._resting_until = -math.inf
+        self._gone = False
+        self._rests = 0
+        self.retries = RETRIES_PER_FRAME
+        self._timeouts = 0
+        self._all_running = False
+
+    def start(self) -> None:
+        """Identify and set up every chip; those that fail are left down.
+
+        Raises:
+            BusRefused: the adapter does not carry the transactions that drivers use.
+        """
+        for slot in self.slots:
+            slot.revival = None
+            self.retries, self._timeouts = RETRIES_PER_FRAME, 0
+            while not slot.running and self._step(slot):
+                pass
+
+    def read(self, slots: Sequence[Slot], deadline: float = math.inf) -> None:
+        """Read these chips once; `good` and `at` of each say how it went.
+
+        Args:
+            slots: of this bus, in the order in which to read them.
+            deadline: on the bus's clock; chips are not brought back after it.
+
+        Raises:
+            BusRefused: a transaction has a shape that the adapter does not carry.
+        """
+        self._frames += 1
+        self.retries, self._timeouts = RETRIES_PER_FRAME, 0
+        for slot in slots:
+            slot.good = False
+        now = self.bus.now
+        if now() < self._resting_until or (self._gone and not self._return()):
+            return
+        read_any = False
+        for slot in slots:
+            if slot.state is not State.RUNNING:
+                continue
+            try:
+                slot.send(slot.frame)  # type: ignore[arg-type]
+            except BusError as error:
+                self._fail(slot, error)
+                if self._gone or self._timeouts > 1:
+                    break
+                continue
+            slot.good = read_any = True
+            slot.at = now()
+        if self._gone or self._timeouts > 1:
+            self._give_up(read_any)
+            return
+        if self._frames % self._recheck == 0:
+            self._check_next()
+        # After the reading, so that what is broken takes no time from what is whole.
+        if not self._all_running:
+            self._revive(deadline)
+
+    def _fail(self, slot: Slot, error: BusError) -> None:
+        """Take a chip down, and say when to try it again.
+
+        Raises:
+            BusRefused: the error is one; it is the program's, and no chip's.
+        """
+        if isinstance(error, BusRefused):
+            raise error
+        slot.good = False
+        slot.state, slot.error, slot.revival = State.DOWN, error, None
+        self._all_running = False
+        slot.failures += 1
+        pause = 0.0
+        if slot.failures > 1:
+            pause = min(FIRST_PAUSE_S * 2.0 ** min(slot.failures - 2, 10), LONGEST_PAUSE_S)
+        if isinstance(error, BusTimeout):
+            pause = min(HUNG_PAUSE_S * 4.0 ** min(slot.failures - 1, 10), LONGEST_HUNG_PAUSE_S)
+            self._timeouts += 1
+            self._reopen()
+        elif isinstance(error, BusGone):
+            self._gone = True
+        slot.retry_at = self.bus.now() + pause
+
+    def _reopen(self) -> None:
+        for mux in self._muxes.values():
+            mux.forget()
+        try:
+            self.bus.reopen()
+        except BusError:
+            self._gone = True
+
+    def _return(self) -> bool:
+        """Try a bus that was gone."""
+        for mux in self._muxes.values():
+            mux.forget()
+        try:
+            self.bus.reopen()
+        except BusError:
+            self._resting_until = self.bus.now() + GONE_PAUSE_S
+            return False
+        self._gone = False
+        for slot in self.slots:
+            slot.state, slot.revival, slot.retry_at = State.DOWN, None, -math.inf
+        self._all_running = False
+        return True
+
+    def _give_up(self, read_any: bool) -> None:
+        """Leave the bus for this frame; where nothing on it answers, for a while."""
+        now = self.bus.now()
+        if self._gone:
+            self.bus.close()
+            for slot in self.slots:
+                slot.good = False
+            self._resting_until = now + GONE_PAUSE_S
+        elif not read_any:
+            self._rests += 1
+            pause = min(HUNG_PAUSE_S * 4.0 ** min(self._rests - 1, 10), LONGEST_HUNG_PAUSE_S)
+            self._resting_until = now + pause
+        else:
+            self._rests = 0
+
+    def _revive(self, deadline: float) -> None:
+        """Bring chips back, as far as the frame has time, and by one step where it has none."""
+        now = self.bus.now
+        self._all_running = True
+        steps = STEPS_PER_FRAME
+        for slot in self.slots:
+            if slot.running:
+                continue
+            self._all_running = False
+            while not slot.running and slot.retry_at <= now():
+                if steps <= 0 or (steps < STEPS_PER_FRAME and now() >= deadline):
+                    return
+                steps -= 1
+                if not self._step(slot):
+                    if self._gone or self._timeouts:
+                        return
+                    break
+
+    def _step(self, slot: Slot) -> bool:
+        """One step of a chip's return; False where it failed."""
+        if slot.revival is None:
+            slot.revival = self._revival(slot)
+            slot.state = State.STARTING
+        try:
+            next(slot.revival)
+        except StopIteration:
+            slot.recoveries += slot.error is not None
+            slot.state, slot.revival, slot.error = State.RUNNING, None, None
+            slot.failures, slot.suspect = 0, False
+        except BusError as error:
+            self._fail(slot, error)
+            return False
+        return True
+
+    def _revival(self, slot: Slot) -> Iterator[None]:
+        """Steps from down to running; a chip that kept its settings is back at once."""
+        if slot.chip is not None and slot.chip.healthy():
+            return
+        slot.chip = chip = self._make(slot.spec, slot.row)
+        slot.send, slot.frame = chip.bus.transfer, chip.frame
+        yield
+        yield from chip.settings()
+
+    def _make(self, spec: ChipSpec, row: NDArray[np.uint8]) -> Chip:
+        bus: Bus = self.bus
+        if spec.mux is not None and spec.channel is not None:
+            if spec.mux not in self._muxes:
+                self._muxes[spec.mux] = TCA9548A(
+                    self.bus, spec.mux, verify=self._verify, beside=tuple(self._muxes.values())
+                )
+            bus = self._muxes[spec.mux].channel(spec.channel)
+        bus = Persistent(bus, self)
+        if spec.kind == "ad7147":
+            return AD7147(bus, spec.address, decimation=spec.decimation, into=row)
+        if spec.kind == "mpr121":
+            return MPR121(bus, spec.address, into=row)
+        return Block(bus, spec.address, taxels=len(spec.taxels), bits=spec.bits, into=row)
+
+    def _check_next(self) -> None:
+        """Read one running chip's settings again; a suspect one goes first."""
+        running = [slot for slot in self.slots if slot.state is State.RUNNING]
+        if not running:
+            return
+        self._turn += 1
+        suspects = [slot for slot in running if slot.suspect]
+        slot = suspects[0] if suspects and self._turn % 2 else running[self._turn % len(running)]
+        slot.suspect = False
+        self.check(slot)
+
+    def check(self, slot: Slot) -> None:
+        """Read a running chip's settings; where they are gone, what it serves is not good."""
+        if slot.chip is None or slot.state is not State.RUNNING:
+            return
+        try:
+            if slot.chip.healthy():
+                return
+            slot.state, slot.revival = State.STARTING, self._restart(slot)
+            slot.good, self._all_running = False, False
+        except BusError as error:
+            # The check itself failed: the chip is checked again before it is read.
+            self._fail(slot, error)
+
+    def _restart(self, slot: Slot) -> Iterator[None]:
+        assert slot.chip is not None
+        slot.recoveries += 1
+        yield from slot.chip.settings()

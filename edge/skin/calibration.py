@@ -1,0 +1,84 @@
+"""A skin's calibration written into its file, and what it says about the noise."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.files import write_whole
+from edge.skin.file import Calibration, SkinFile, parse, read_text
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """The `[calibration]` table as TOML, a line a row of the skin."""
+
+    def rows(values: Iterable[Iterable[object]]) -> Iterator[str]:
+        for row in values:
+            yield f"  [{', '.join(map(str, row))}],\n"
+
+    lines = ["[calibration]\n"]
+    if calibration.taken is not None:
+        lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")
+    lines += ["baseline = [\n", *rows(calibration.baseline.tolist()), "]\n"]
+    noise = [[round(float(x), 3) for x in row] for row in calibration.noise]
+    lines += ["noise = [\n", *rows(noise), "]\n"]
+    return "".join(lines)
+
+
+def with_calibration(text: str, calibration: Calibration, where: str = "skin") -> str:
+    """The file's text with its `[calibration]` replaced; all else, comments too, stays.
+
+    Raises:
+        InputError: the file writes its calibration in a way that cannot be replaced.
+    """
+    before = parse(text, where)
+    table = re.compile(
+        r"^[ \t]*\[calibration\][ \t]*(#.*)?\n(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*", re.M
+    )
+    rest = table.sub("", text if text.endswith("\n") else text + "\n").rstrip("\n")
+    out = f"{rest}\n\n{calibration_text(calibration)}"
+    after = parse(out, where)
+    kept = all(
+        getattr(before, f.name) == getattr(after, f.name)
+        for f in fields(SkinFile)
+        if f.name != "calibration"
+    )
+    if not kept or after.calibration is None:
+        raise InputError(f"{where}: write [calibration] as a table of its own, at the end")
+    return out
+
+
+def save_calibration(path: str | os.PathLike[str], calibration: Calibration) -> Path:
+    """Put a calibration into a skin's file, whole or not at all; the old file stays beside it.
+
+    Returns:
+        Path of the old file, `skin.toml.bak`.
+
+    Raises:
+        InputError: the file cannot be read or written.
+    """
+    target = Path(path)
+    text = with_calibration(read_text(target), calibration, os.fspath(path))
+    backup = target.with_name(f"{target.name}.bak")
+    with write_whole(backup) as file, open(target, "rb") as old:
+        shutil.copyfileobj(old, file)
+    with write_whole(target) as file:
+        file.write(text.encode())
+    return backup
+
+
+def dead_band(skin: SkinFile) -> NDArray[np.int32]:
+    """(rows * cols,) counts under which a taxel reads 0; at least 1, so that none is negative."""
+    floor = max(1, skin.signal.dead_band_counts)
+    if skin.calibration is None:
+        return np.full(skin.layout.rows * skin.layout.cols, floor, dtype=np.int32)
+    sigma = skin.signal.dead_band_sigma * skin.calibration.noise.ravel()
+    return np.maximum(floor, np.ceil(np.minimum(sigma, 65535.0))).astype(np.int32)

@@ -1,0 +1,320 @@
+"""Forward kinematics of a joint chain: joint angles to the pose of the link with the skin."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from edge.errors import InputError
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: a fixed step (`origin`), then the motion about or along `axis`, then another.
+
+    A URDF gives `origin_xyz` and `origin_rpy`; an arm that is written as "turn, then go on"
+    (Cody's) gives `translate`. Lengths in metres, angles in radians; limits for `q`.
+    """
+
+    name: str
+    axis: Vector
+    kind: str = "revolute"
+    origin_xyz: Vector = ZERO
+    origin_rpy: Vector = ZERO
+    translate: Vector = ZERO
+    limits: tuple[float, float] | None = None
+
+
+class Chain:
+    """Joints from a base to a tip.
+
+    >>> chain = Chain.cody()
+    >>> chain.pose([0.0] * 5)[:3, 3].round(5).tolist()
+    [0.00635, -0.21668, -0.55648]
+    """
+
+    def __init__(self, joints: Sequence[Joint], base: str = "base", tip: str = "tip") -> None:
+        """Chain the joints; a `kind` of "fixed" takes no angle.
+
+        Raises:
+            InputError: a joint's axis is zero or a number is not finite.
+        """
+        self.joints = tuple(joints)
+        self.base, self.tip = base, tip
+        self._moving: list[Joint] = []
+        # Each moving joint's step is still + f sway + g swing: f = sin q and g = 1 - cos q turn
+        # about the axis (Rodrigues), f = q and g = 0 slide along it.
+        still: list[NDArray[np.float64]] = []
+        sway: list[NDArray[np.float64]] = []
+        swing: list[NDArray[np.float64]] = []
+        fixed = np.eye(4)
+        for joint in self.joints:
+            _check_joint(joint)
+            fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
+            if joint.kind != "fixed":
+                first, second = _generators(joint)
+                self._moving.append(joint)
+                still.append(fixed)
+                sway.append(fixed @ first)
+                swing.append(fixed @ second)
+                fixed = np.eye(4)
+            fixed = fixed @ _transform(joint.translate, ZERO)
+        self._still, self._sway, self._swing = (
+            np.array(steps).reshape(-1, 4, 4) for steps in (still, sway, swing)
+        )
+        self._after = fixed
+        self._slides = np.array([j.kind == "prismatic" for j in self._moving], dtype=bool)
+        self._any_slide = bool(self._slides.any())
+
+    @property
+    def dof(self) -> int:
+        """How many angles `pose` takes."""
+        return len(self._moving)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The moving joints' names, in the order of the angles."""
+        return tuple(j.name for j in self._moving)
+
+    @property
+    def limits(self) -> tuple[tuple[float, float] | None, ...]:
+        """(lower, upper) of each moving joint in radians (metres where it slides), or None."""
+        return tuple(j.limits for j in self._moving)
+
+    def pose(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Pose of the tip in the base's frame.
+
+        Rotations by Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2, where 1 - cos(q)
+        is taken as 2 sin^2(q/2), which keeps its digits at small angles.
+
+        Args:
+            q: (dof,) or (..., dof) radians (metres for a sliding joint), base to tip.
+
+        Returns:
+            (4, 4) or (..., 4, 4) homogeneous transform, metres.
+
+        Raises:
+            InputError: the number of angles is not `dof`, or one is not finite.
+        """
+        try:
+            angles = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"joint angles must be numbers, not {q!r}") from None
+        if angles.ndim == 0 or angles.shape[-1] != self.dof:
+            given = angles.shape[-1] if angles.ndim else "a single number"
+            raise InputError(
+                f"the arm {self.base} to {self.tip} takes {self.dof} joint angles "
+                f"({', '.join(self.names)}), not {given}"
+            )
+        if not np.isfinite(angles).all():
+            bad = np.argwhere(~np.isfinite(angles))[0][-1]
+            raise InputError(f"the angle of joint {self.names[bad]} is not finite")
+        half = np.sin(0.5 * angles)
+        f, g = np.sin(angles), 2.0 * half * half
+        if self._any_slide:
+            f, g = np.where(self._slides, angles, f), np.where(self._slides, 0.0, g)
+        steps = self._still + f[..., None, None] * self._sway + g[..., None, None] * self._swing
+        pose = self._after
+        for i in range(self.dof - 1, -1, -1):
+            pose = steps[..., i, :, :] @ pose
+        if self.dof == 0:
+            pose = np.broadcast_to(pose, (*angles.shape[:-1], 4, 4))
+        return pose
+
+    def to_dict(self) -> dict[str, Any]:
+        """The chain as plain numbers, exact in JSON."""
+        joints = []
+        for j in self.joints:
+            entry: dict[str, Any] = {"name": j.name, "axis": list(j.axis), "type": j.kind}
+            for key in ("origin_xyz", "origin_rpy", "translate"):
+                if getattr(j, key) != ZERO:
+                    entry[key] = list(getattr(j, key))
+            if j.limits is not None:
+                entry["limits"] = list(j.limits)
+            joints.append(entry)
+        return {"base": self.base, "tip": self.tip, "joint": joints}
+
+    @classmethod
+    def from_dict(cls, arm: Mapping[str, Any], where: str = "arm") -> Chain:
+        """Read what `to_dict` or an arm's TOML file gives.
+
+        Raises:
+            InputError: a key is unknown or missing, or a value makes no sense.
+        """
+        if not isinstance(arm, Mapping):
+            raise InputError(f"{where}: an arm must be a table of base, tip and joints")
+        entries = arm.get("joint")
+        if not isinstance(entries, list) or not entries:
+            raise InputError(f"{where}: no [[joint]] given")
+        joints = [_joint_from(entry, i, where) for i, entry in enumerate(entries)]
+        unknown = set(arm) - {"base", "tip", "joint"}
+        if unknown:
+            raise InputError(
+                f"{where}: unknown key {sorted(unknown)[0]!r}; allowed: base, tip, joint"
+            )
+        try:
+            return cls(joints, str(arm.get("base", "base")), str(arm.get("tip", "tip")))
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Chain:
+        """Read a chain from a TOML file like `edge/arms/cody.toml`.
+
+        Raises:
+            InputError: the file cannot be read, or is not a chain.
+        """
+        import tomllib  # a model brings its arm along: most runs read no such file
+
+        try:
+            with open(path, "rb") as file:
+                arm = tomllib.load(file)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: not TOML: {error}") from None
+        return cls.from_dict(arm, where=str(path))
+
+    @classmethod
+    def cody(cls) -> Chain:
+        """Right arm of Cody to the wrist frame that carries the skin: 5 angles."""
+        return cls.from_toml(Path(__file__).parents[1] / "arms" / "cody.toml")
+
+    @classmethod
+    def from_file(
+        cls, path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
+    ) -> Chain:
+        """Read a chain from a TOML file, or from a URDF file between two of its links.
+
+        Raises:
+            InputError: as `from_toml` and `from_urdf`; a URDF needs both links, a TOML file none.
+        """
+        if Path(path).suffix.lower() in (".urdf", ".xml"):
+            if base is None or tip is None:
+                raise InputError(
+                    f"{path}: a URDF needs --base and --tip, the arm's first link and the link "
+                    "that carries the skin"
+                )
+            return cls.from_urdf(path, base, tip)
+        if base is not None or tip is not None:
+            raise InputError(f"{path}: --base and --tip are for a .urdf file")
+        return cls.from_toml(path)
+
+    @classmethod
+    def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Chain:
+        """Read the joints between two links of a URDF file.
+
+        Raises:
+            InputError: the file cannot be read, or no chain leads from `base` to `tip`.
+        """
+        from edge.touch.urdf import joints_between
+
+        joints = joints_between(path, base, tip)
+        if not joints:
+            return cls([], base, tip)
+        return cls.from_dict({"base": base, "tip": tip, "joint": joints}, where=os.fspath(path))
+
+
+def _check_joint(joint: Joint) -> None:
+    if joint.kind not in (*MOVING, "fixed"):
+        raise InputError(
+            f"joint {joint.name}: type {joint.kind!r} is not one of {', '.join((*MOVING, 'fixed'))}"
+        )
+    numbers = (*joint.axis, *joint.origin_xyz, *joint.origin_rpy, *joint.translate)
+    if not all(math.isfinite(x) for x in numbers):
+        raise InputError(f"joint {joint.name}: a number is not finite")
+    if joint.kind != "fixed" and math.hypot(*joint.axis) < 1e-9:
+        raise InputError(f"joint {joint.name}: its axis is zero; give a direction")
+    if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
+        raise InputError(f"joint {joint.name}: its limits {joint.limits} are turned round")
+
+
+def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """K and K^2 of a turn about the joint's axis; of a slide its direction and nothing."""
+    x, y, z = np.array(joint.axis, dtype=float) / math.hypot(*joint.axis)
+    first = np.zeros((4, 4))
+    if joint.kind == "prismatic":
+        first[:3, 3] = x, y, z
+        return first, np.zeros((4, 4))
+    first[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    return first, first @ first
+
+
+def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
+    """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y, z."""
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
+            [-sp, cp * sr, cp * cr, xyz[2]],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def _vector(value: object, name: str, where: str) -> Vector:
+    if (
+        not isinstance(value, list | tuple)
+        or len(value) != 3
+        or any(isinstance(x, bool) or not isinstance(x, int | float) for x in value)
+    ):
+        raise InputError(f"{where}: {name} must be three numbers, not {value!r}")
+    x, y, z = map(float, value)
+    return x, y, z
+
+
+def _joint_from(entry: object, index: int, where: str) -> Joint:
+    if not isinstance(entry, Mapping):
+        raise InputError(f"{where}: joint {index} must be a table")
+    allowed = (
+        "name",
+        "type",
+        "axis",
+        "origin_xyz",
+        "origin_rpy",
+        "translate",
+        "limits",
+        "limits_deg",
+    )
+    unknown = set(entry) - set(allowed)
+    if unknown:
+        raise InputError(
+            f"{where}: joint {index} has an unknown key {sorted(unknown)[0]!r}; "
+            f"allowed: {', '.join(allowed)}"
+        )
+    name = str(entry.get("name", f"joint {index}"))
+    place = f"{where}: joint {name}"
+    if "axis" not in entry:
+        raise InputError(f"{place}: axis is missing")
+    vectors = {
+        key: _vector(entry[key], key, place)
+        for key in ("origin_xyz", "origin_rpy", "translate")
+        if key in entry
+    }
+    limits: tuple[float, float] | None = None
+    for key, unit in (("limits", 1.0), ("limits_deg", math.pi / 180.0)):
+        if key in entry:
+            pair = entry[key]
+            if not isinstance(pair, list) or len(pair) != 2:
+                raise InputError(f"{place}: {key} must be [lower, upper], not {pair!r}")
+            lower, upper, _ = _vector([*pair, 0.0], key, place)
+            limits = (lower * unit, upper * unit)
+    return Joint(
+        name=name,
+        axis=_vector(entry["axis"], "axis", place),
+        kind=str(entry.get("type", "revolute")),
+        limits=limits,
+        **vectors,
+    )

@@ -1,0 +1,82 @@
+"""Joints of a URDF file (wiki.ros.org/urdf/XML) between two of its links."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from typing import Any
+
+from edge.errors import InputError
+
+
+def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[dict[str, Any]]:
+    """The joints that lead from link `base` to link `tip`, in that order, as an arm's TOML file
+    has them (`edge.touch.arm.Chain.from_dict`).
+
+    Raises:
+        InputError: the file cannot be read, or no chain leads from `base` to `tip`.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: not a URDF file: {error}") from None
+    if root.tag != "robot":
+        raise InputError(f"{path}: not a URDF file: its root is <{root.tag}>, not <robot>")
+    links = [link.get("name") for link in root.findall("link")]
+    for name in (base, tip):
+        if name not in links:
+            raise InputError(f"{path}: no link {name!r}; it has {', '.join(map(str, links))}")
+    parents: dict[str, ElementTree.Element] = {}
+    for element in root.findall("joint"):
+        parents[_attribute(path, element, "child", "link")] = element
+    joints: list[dict[str, Any]] = []
+    link = tip
+    while link != base:
+        if link not in parents:
+            raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
+        element = parents.pop(link)  # popped, so that a loop of links ends
+        joints.append(_joint(path, element))
+        link = _attribute(path, element, "parent", "link")
+    return joints[::-1]
+
+
+def _attribute(
+    path: str | os.PathLike[str], element: ElementTree.Element, tag: str, name: str
+) -> str:
+    child = element.find(tag)
+    value = None if child is None else child.get(name)
+    if value is None:
+        raise InputError(f"{path}: joint {element.get('name')!r} has no <{tag} {name}=...>")
+    return value
+
+
+def _numbers(path: str | os.PathLike[str], text: str, what: str, count: int) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count:
+        raise InputError(f"{path}: {what} must be {count} numbers, not {text!r}")
+    return numbers
+
+
+def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:
+    name = str(element.get("name"))
+    kind = str(element.get("type"))
+    joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}
+    for tag, keys in (
+        ("axis", {"xyz": "axis"}),
+        ("origin", {"xyz": "origin_xyz", "rpy": "origin_rpy"}),
+    ):
+        child = element.find(tag)
+        for attribute, key in keys.items():
+            text = None if child is None else child.get(attribute)
+            if text is not None:
+                joint[key] = _numbers(path, text, f"{tag} of joint {name!r}", 3)
+    limit = element.find("limit")
+    if limit is not None and kind in ("revolute", "prismatic"):
+        text = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"
+        joint["limits"] = _numbers(path, text, f"limit of joint {name!r}", 2)
+    return joint

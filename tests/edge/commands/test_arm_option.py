@@ -1,0 +1,75 @@
+"""Trials keep the arm that carried the skin, named by a TOML file or two links of a URDF."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from edge import recording
+from edge.cli import main
+from edge.touch.arm import Chain
+
+URDF = """<robot name="two"><link name="base"/><link name="upper"/><link name="skin"/>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="skin"/>
+    <origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.fixture
+def files(tmp_path, make_touch):
+    """A URDF of two joints, and a recording of as many angles that names no arm."""
+    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "still.toml").write_text('[[joint]]\nname="a"\naxis=[0,0,0]\n')
+    trial = make_touch()
+    swing = np.linspace(0.0, 0.2, len(trial.t))
+    trial = replace(trial, joints=np.column_stack([swing, 0.5 + swing]))
+    recording.save(tmp_path / "two.npz", trial)
+    return tmp_path
+
+
+def record(folder, *options):
+    given = {"--fake": "two.npz", "--out": "out.npz"}
+    paths = [str(part) for name, file in given.items() for part in (name, folder / file)]
+    return main(["record", "--label", "object=a", *paths, *map(str, options)])
+
+
+def test_a_trial_keeps_the_chain_of_a_urdf(files, capsys):
+    urdf = files / "arm.urdf"
+    assert record(files, "--arm", urdf, "--base", "base", "--tip", "skin") == 0
+    assert json.loads(capsys.readouterr().out)["joints"] is True
+    kept = Chain.from_dict(recording.load(files / "out.npz").meta["arm"])
+    assert kept.names == ("shoulder", "elbow")
+    assert kept.pose([0.0, 0.0])[:3, 3].tolist() == [0.3, 0.0, 0.0]
+
+
+def test_a_trial_keeps_the_chain_of_a_toml_file(files):
+    path = files / "arm.toml"
+    path.write_text('[[joint]]\nname="a"\naxis=[0,0,1]\n[[joint]]\nname="b"\naxis=[0,1,0]\n')
+    assert record(files, "--arm", path) == 0
+    assert Chain.from_dict(recording.load(files / "out.npz").meta["arm"]).names == ("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--arm", "arm.urdf"], "a URDF needs --base and --tip"),
+        (["--arm", "arm.urdf", "--base", "base", "--tip", "hand"], "no link 'hand'"),
+        (["--arm", "arm.urdf", "--base", "base", "--tip", "upper"], "gives 2 joint angles"),
+        (["--arm", "arm.toml", "--tip", "skin"], "--base and --tip are for a .urdf file"),
+        (["--arm", "none.toml"], "none.toml: cannot be read"),
+        (["--arm", "still.toml"], "still.toml: joint a: its axis is zero"),
+        (["--tip", "skin"], "--tip needs --arm arm.urdf"),
+        (
+            ["--arm", "arm.urdf", "--base", "base", "--tip", "skin", "--dof", "3"],
+            "--dof 3: arm.urdf has 2 joints",
+        ),
+    ],
+)
+def test_an_arm_that_cannot_be_used_is_refused(files, options, said, capsys, monkeypatch):
+    monkeypatch.chdir(files)
+    assert record(files, *options) == 2
+    assert said in capsys.readouterr().err
+    assert not (files / "out.npz").exists()

@@ -1,0 +1,98 @@
+"""`edge-classify bench`: a board's figures in one file, written whole."""
+
+import hashlib
+import json
+
+import pytest
+
+from edge.cli import main
+from edge.commands.bench import summary, touch
+from edge.model.model import Model
+from edge.model.verify import first_contact
+from edge.recording import Recording
+from edge.skin.file import shipped
+from edge.touch.track import Tracker
+
+
+@pytest.fixture(scope="module")
+def board(exported, tmp_path_factory):
+    out = tmp_path_factory.mktemp("bench") / "board.json"
+    given = ["--rounds", "40", "--skin", str(shipped("cody")), "--out", str(out)]
+    assert main(["bench", "--model", str(exported / "model.onnx"), *given]) == 0
+    return json.loads(out.read_text())
+
+
+def test_every_stage_has_a_median_and_a_99th_percentile(board):
+    assert list(board["stages"]) == ["region", "track", "features", "decision", "frame", "last"]
+    for stage in board["stages"].values():
+        assert 0.0 < stage["median_us"] <= stage["p99_us"]
+        assert stage["n"] >= 20
+
+
+def test_memory_cold_start_and_machine_are_named(board):
+    assert 10.0 < board["memory_mb"] < 10_000.0
+    assert board["cold_start_ms"] > 10.0
+    machine = board["machine"]
+    assert machine["kind"]
+    assert machine["cores"] >= 1
+    assert set(machine["versions"]) == {"edge-classify", "python", "numpy", "onnxruntime"}
+
+
+def test_the_model_is_named_by_its_digest(board, exported):
+    data = (exported / "model.onnx").read_bytes()
+    assert board["model"]["sha256"] == hashlib.sha256(data).hexdigest()
+    assert board["model"]["bytes"] == len(data)
+    assert board["model"]["data_digest"] == Model(exported / "model.onnx").info.data_digest
+    assert board["model"]["tasks"]["object"]["k"] >= 1
+
+
+def test_wire_time_is_the_busiest_bus_at_its_clock(board):
+    wire = board["wire"]
+    slowest = max(b / hz for b, hz in zip(wire["bits"], wire["clock_hz"], strict=True))
+    assert wire["frame_ms"] == pytest.approx(1e3 * slowest, abs=1e-4)
+    assert 100.0 < wire["frame_rate_hz"] < 200.0
+
+
+def test_percentiles_are_by_nearest_rank():
+    assert summary([float(i) for i in range(1, 201)]) == {
+        "median_us": 100.5,
+        "p99_us": 198.0,
+        "n": 200,
+    }
+
+
+def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
+    info = Model(exported / "model.onnx").info
+    frames = touch(Model(exported / "model.onnx"), info.window_s)
+    tracker = Tracker(info.layout, info.tracking, chain=info.chain, horizon_s=info.window_s)
+    import numpy as np
+
+    recording = Recording(
+        t=np.array([f.t for f in frames]),
+        frames=np.stack([f.counts for f in frames]),
+        joints=np.stack([f.joints for f in frames]),
+        meta={"skin": info.layout.to_dict()},
+    )
+    onset, series = first_contact(recording, tracker)
+    assert onset == 0.0
+    assert series.t[-1] == pytest.approx(info.window_s)
+    assert series.area[-1] > series.area[0] > 1
+    assert series.peak[-1] > series.peak[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (["--rounds", "3"], "--rounds must be 20 to 1000000, not 3"),
+        (["--skin", "missing.toml"], "missing.toml"),
+        (["--model", "missing.onnx"], "missing.onnx: no such model"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_writes_nothing(given, sentence, exported, tmp_path, capsys):
+    out = tmp_path / "board.json"
+    model = ["--model", str(exported / "model.onnx")]
+    assert main(["bench", *model, "--out", str(out), *given]) == 2
+    err = capsys.readouterr().err
+    assert sentence in err
+    assert err.count("\n") == 1
+    assert not out.exists()

@@ -1,0 +1,359 @@
+"""check, scan, calibrate, record, run and view, as a user runs them, over the fake."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge import recording
+from edge.cli import main
+from edge.recording import Recording
+from edge.skin import file as skinfile
+
+ROOT = Path(__file__).parents[3]
+
+
+def lines(text):
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@pytest.fixture
+def edge(capsys):
+    """Run a command; returns status, stdout's lines as JSON, and stderr."""
+
+    def run(*arguments, text=False):
+        status = main([str(a) for a in arguments])
+        out = capsys.readouterr()
+        return status, out.out if text else lines(out.out), out.err
+
+    return run
+
+
+@pytest.fixture
+def skin(tmp_path):
+    path = tmp_path / "skin.toml"
+    shutil.copy(skinfile.shipped("cody"), path)
+    return path
+
+
+@pytest.fixture
+def quiet(tmp_path, make_touch):
+    """A recording in which nothing touches."""
+    trial = make_touch(arm=False)
+    path = tmp_path / "quiet.npz"
+    recording.save(path, replace(trial, frames=np.zeros_like(trial.frames)))
+    return path
+
+
+def test_check_counts_what_the_wire_carries(edge, skin):
+    status, (event,), err = edge("check", skin)
+    assert status == 0
+    assert (event["taxels"], event["chips"]) == (384, 32)
+    assert event["frame_rate_hz"] == 125.1
+    assert "the wire carries 125.1 frames a second" in err
+    assert "not calibrated yet" in err
+
+
+@pytest.mark.parametrize(
+    ("more", "status", "rate", "said"),
+    [
+        ("", 1, 47.0, "asks for 100 Hz, the wire carries 47.0"),
+        ("verify_mux = false\n", 1, 48.0, "the wire carries 48.0"),
+        ("region_of_interest = true\n", 0, 47.0, "the chips near a contact at the rate"),
+    ],
+)
+def test_check_says_where_one_bus_is_too_slow(edge, skin, more, status, rate, said):
+    text = skin.read_text().replace("verify_mux = true", "")
+    head, *buses = text.split("[[bus]]")
+    channel = 0
+    chips = ""
+    for bus in buses:
+        rows = [line for line in bus.splitlines() if line.startswith("  {")]
+        for row in rows:
+            old = int(row.split("channel = ")[1].split(",")[0])
+            chips += row.replace(f"channel = {old}", f"channel = {channel + old}") + "\n"
+        channel += len(rows) // 4
+    one = buses[0].split("chips = [")[0] + "chips = [\n" + chips + "]\n"
+    skin.write_text(head.replace("[read]\n", f"[read]\n{more}") + "[[bus]]" + one)
+    got, (event,), err = edge("check", skin)
+    assert (got, event["frame_rate_hz"]) == (status, rate)
+    assert said in err
+
+
+def test_check_says_what_is_wrong(edge, skin):
+    skin.write_text(skin.read_text().replace("address = 0x2D", "address = 0x3D", 1))
+    status, _, err = edge("check", skin)
+    assert status == 2
+    assert err == (f"edge-classify: {skin}: bus 0 chip 1: address must be 0x2c to 0x2f, not 61\n")
+
+
+def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
+    status, events, err = edge("scan", "--fake", quiet)
+    assert status == 0
+    assert [e["state"] for e in events] == ["running"] * 32
+    assert err.count("|" + "#" * 24 + "|") == 16
+
+
+def test_calibrate_measures_what_the_fake_rests_at(edge, skin, quiet):
+    before = skin.read_text()
+    status, (event,), _ = edge("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
+    assert (status, event["frames"], event["unread"]) == (0, 50, 0)
+    assert Path(event["backup"]).read_text() == before
+    file = skinfile.load(skin)
+    assert (file.calibration.baseline == 20946).all()
+    assert (file.calibration.noise == 0.0).all()
+    assert file.calibration.taken is not None
+    assert edge("check", skin)[2].count("\n") == 1
+
+
+def test_calibrate_refuses_a_skin_that_is_touched(edge, skin, make_touch, tmp_path):
+    touched = tmp_path / "touched.npz"
+    recording.save(touched, make_touch(arm=False))
+    before = skin.read_text()
+    status, _, err = edge("calibrate", "--skin", skin, "--fake", touched, "--frames", 100)
+    assert status == 2
+    assert "taxels move while they should rest, most of all [" in err
+    assert skin.read_text() == before
+    assert edge("calibrate", "--skin", skin, "--fake", touched, "--frames", 100, "--force")[0] == 0
+
+
+def test_calibration_is_exact_at_a_large_offset():
+    from edge.commands.calibrate import mean_and_deviation
+
+    draw = np.random.default_rng(0)
+    values = (60000 + draw.integers(-2, 3, (5000, 4, 6))).astype(np.int64)
+    values[:, 0, 0] = 65535
+    mean, deviation = mean_and_deviation(
+        np.full((4, 6), 5000), values.sum(axis=0), (values * values).sum(axis=0)
+    )
+    np.testing.assert_array_equal(mean, np.rint(values.mean(axis=0)))
+    exact = (values - 60000).astype(np.float64).std(axis=0, ddof=1)
+    exact[0, 0] = 0.0
+    np.testing.assert_allclose(deviation, exact, rtol=1e-12, atol=1e-12)
+
+
+def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
+    """The same frames, once from the file and once through drivers, wires and threads."""
+    model = exported / "model.onnx"
+    for name in ("hard_0", "soft_3"):
+        path = recordings / f"{name}.npz"
+        status, live, err = edge("run", "--model", model, "--fake", path)
+        assert (status, err) == (0, "")
+        _, played, _ = edge("replay", "--model", model, path)
+        keys = ("event", "task", "label", "confidence", "flags", "window_s")
+        # The wires' clock shifts times by less than a microsecond, which may tell them apart.
+        for event in (*played, *live):
+            if "as_trained" in event.get("flags", ()):
+                event["flags"].remove("as_trained")
+        assert [[e.get(k) for k in keys] for e in live[:-1]] == [
+            [e.get(k) for k in keys] for e in played
+        ]
+        assert live[0]["onset_s"] == pytest.approx(played[0]["onset_s"], abs=1e-6)
+        assert live[-1] == {
+            "event": "end",
+            "frames": 180,
+            "missed_ticks": 0,
+            "period_ms": {"p50": 10.01, "p99": 10.01, "p99.9": 10.01},
+        }
+
+
+def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, recordings):
+    model, path = exported / "model.onnx", recordings / "hard_1.npz"
+    once = edge("run", "--model", model, "--fake", path)[1]
+    twice = edge("run", "--model", model, "--fake", path, "--loop", "--seconds", 3.6)[1]
+    assert [sum(e["event"] == "onset" for e in events) for events in (once, twice)] == [1, 2]
+    assert twice[-1]["frames"] == 360
+
+
+def test_run_needs_the_joint_angles_that_its_model_was_made_with(edge, exported, make_touch,
+                                                                 tmp_path):  # fmt: skip
+    model, bare = exported / "model.onnx", tmp_path / "bare.npz"
+    recording.save(bare, make_touch(arm=False))
+    status, _, err = edge("run", "--model", model, "--fake", bare)
+    assert status == 2
+    assert "has no joint angles, the model measures motion with 5" in err
+    status, events, _ = edge("run", "--model", model, "--fake", bare, "--without-joints", "skin")
+    decisions = [e for e in events if e["event"] == "decision"]
+    assert status == 0
+    assert len(decisions) == 2
+    assert all("skin_motion" in e["flags"] for e in decisions)
+
+
+def test_run_flags_a_decision_whose_joints_never_came(edge, exported, recordings, monkeypatch):
+    """A model with an arm, a sender that is silent."""
+    arguments = ("run", "--model", exported / "model.onnx", "--fake", recordings / "hard_0.npz",
+                 "--joints", "udp:0")  # fmt: skip
+    status, events, _ = edge(*arguments)
+    flags = [e["flags"] for e in events if e["event"] == "decision"]
+    assert status == 0
+    assert [f[:1] for f in flags] == [["missing_pose"]] * 2
+    events = edge(*arguments, "--without-joints", "skin")[1]
+    flags = [e["flags"] for e in events if e["event"] == "decision"]
+    assert [f[:1] for f in flags] == [["skin_motion"]] * 2
+
+
+def test_run_takes_joints_from_stdin(exported, recordings):
+    """Lines on the fake's own clock, so that its virtual time finds them all."""
+    trial = recording.load(recordings / "hard_2.npz")
+    sent = "".join(
+        json.dumps({"t": t, "q": q}) + "\n"
+        for t, q in zip(trial.t.tolist()[:64], trial.joints.tolist(), strict=False)
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "edge.cli", "run", "--model", str(exported / "model.onnx"),
+         "--fake", str(recordings / "hard_2.npz"), "--joints", "stdin", "--joints-shared-clock"],
+        cwd=ROOT, input=sent + "nonsense\n", capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0
+    flags = [e["flags"] for e in lines(done.stdout) if e["event"] == "decision"]
+    # 64 lines are 0.64 s of a window that ends at 1.4 s: known at first, then missing.
+    assert all("missing_pose" in f for f in flags)
+    assert "1 lines could not be used, the last because a line is not" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--loop"], "--loop and --real-time need --fake"),
+        (["--real-time", "--skin", "PAD"], "--loop and --real-time need --fake"),
+        ([], "give --skin skin.toml, or --fake REC.npz for no hardware"),
+        (["--fake", "no.npz"], "no.npz: no such file"),
+        (["--skin", "no.toml"], "no.toml: cannot be read"),
+        (["--fake", "REC", "--joints", "tcp:5"], "--joints: give stdin or udp:[HOST:]PORT"),
+        (["--fake", "REC", "--joints", "udp:x"], "joints udp:x: give udp:PORT"),
+        (["--fake", "REC", "--skin", "PAD"], "16 x 24 taxels, the skin 'mpr121 pad' 8 x 12"),
+    ],
+)
+def test_a_bad_option_is_one_sentence(edge, exported, recordings, arguments, said):
+    named = {"REC": recordings / "hard_0.npz", "PAD": skinfile.shipped("mpr121")}
+    given = [named.get(a, a) for a in arguments]
+    status, events, err = edge("run", "--model", exported / "model.onnx", *given)
+    assert (status, events) == (2, [])
+    assert err.startswith("edge-classify: ")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_run_stops_cleanly_at_ctrl_c(exported, recordings):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "edge.cli", "run", "--model", str(exported / "model.onnx"),
+         "--fake", str(recordings / "hard_0.npz"), "--loop"],
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    first = process.stdout.readline()
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    rest, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (0, "")
+    events = lines(first + rest)
+    assert events[-1]["event"] == "end"
+
+
+def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
+    source = recording.load(recordings / "soft_1.npz")
+    out = tmp_path / "trials"
+    status, (event,), _ = edge("record", "--fake", recordings / "soft_1.npz", "--out", out,
+                               "--label", "object=foam", "--label", "category=soft-fixed",
+                               "--lead", 0.1, "--length", 1.3)  # fmt: skip
+    assert (status, event["complete"], event["joints"]) == (0, True, True)
+    trial = recording.load(event["file"])
+    assert trial.labels == {"object": "foam", "category": "soft-fixed"}
+    assert Path(event["file"]).name == "foam-soft-fixed-001.npz"
+    # Onset is at frame 20: ten frames of lead-in, and 130 from onset on, the last included.
+    np.testing.assert_array_equal(trial.frames, source.frames[10:151])
+    np.testing.assert_array_equal(trial.joints, source.joints[10:151])
+    np.testing.assert_allclose(trial.t, np.arange(141) * 0.01, atol=1e-9)
+    assert trial.layout == source.layout
+    assert trial.valid is None
+
+
+def test_record_saves_one_trial_a_contact_and_never_overwrites(edge, recordings, tmp_path):
+    arguments = ("record", "--fake", recordings / "hard_1.npz", "--loop", "--label", "object=a b/c",
+                 "--out", tmp_path / "t", "--length", 1.2, "--trials")  # fmt: skip
+    assert len(edge(*arguments, 2)[1]) == 2
+    assert len(edge(*arguments, 1)[1]) == 1
+    names = sorted(p.name for p in (tmp_path / "t").iterdir())
+    assert names == ["a_b_c-001.npz", "a_b_c-002.npz", "a_b_c-003.npz"]
+
+
+def test_record_refuses_a_file_that_exists_before_it_waits(edge, recordings, tmp_path):
+    path = tmp_path / "one.npz"
+    arguments = (
+        "record",
+        "--fake",
+        recordings / "hard_1.npz",
+        "--label",
+        "object=a",
+        "--out",
+        path,
+    )
+    assert edge(*arguments)[0] == 0
+    kept = path.read_bytes()
+    status, _, err = edge(*arguments)
+    assert status == 2
+    assert f"{path}: exists already" in err
+    assert path.read_bytes() == kept
+
+
+def test_record_without_contact_saves_nothing(edge, quiet, tmp_path):
+    status, events, err = edge("record", "--fake", quiet, "--label", "object=a", "--out",
+                               tmp_path / "t")  # fmt: skip
+    assert (status, events) == (1, [])
+    assert "no contact, nothing saved" in err
+    assert not (tmp_path / "t").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ([], "give --label TASK=LABEL"),
+        (["--label", "a=b", "--label", "a=c"], "a task is named twice"),
+        (["--label", "a=b", "--length", "0"], "--length 0.1 to 600"),
+        (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
+    ],
+)
+def test_record_says_what_it_needs(edge, quiet, options, said):
+    status, _, err = edge("record", "--fake", quiet, *options)
+    assert status == 2
+    assert said in err
+
+
+def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(edge, recordings, tmp_path):
+    status, (event,), _ = edge("record", "--fake", recordings / "hard_0.npz", "--label", "o=a",
+                               "--out", tmp_path, "--seconds", 1.0)  # fmt: skip
+    assert (status, event["complete"], event["seconds"]) == (0, False, 0.99)
+
+
+def test_two_contacts_are_two_trials(edge, make_touch, tmp_path):
+    one = make_touch(seconds=0.5, arm=False)
+    gap = np.zeros((50, 16, 24), dtype=np.uint16)
+    frames = np.concatenate([one.frames, gap, one.frames, gap])
+    both = Recording(np.arange(len(frames)) / 100.0, frames, meta=one.meta)
+    recording.save(tmp_path / "two.npz", both)
+    events = edge("record", "--fake", tmp_path / "two.npz", "--label", "object=a", "--out",
+                  tmp_path / "t")[1]  # fmt: skip
+    # 20 frames of lead-in, 50 of contact, 5 that show its end.
+    assert [(e["frames"], e["complete"]) for e in events] == [(75, True)] * 2
+
+
+def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
+    path = recordings / "hard_0.npz"
+    status, text, err = edge("view", "--fake", path, "--model", exported / "model.onnx", "--rate",
+                             5, text=True)  # fmt: skip
+    assert (status, err) == (0, "")
+    pictures = text.split("\x1b[H")[1:]
+    # 1.8 s at five a second; while nothing changes nothing is sent.
+    assert 5 <= len(pictures) <= 10
+    assert "category: rigid-fixed (100%)" in pictures[-1]
+    assert "object: hard " in pictures[-1]
+    assert "taxels at row" in pictures[-1]
+    assert pictures[-1].count("▀") == 8 * 24 * 2
+    assert max(map(len, pictures)) < 4000
+    assert text.endswith("\x1b[0m\x1b[?25h")

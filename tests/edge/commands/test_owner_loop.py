@@ -1,0 +1,63 @@
+"""A robot owner's loop, over the fake: calibrate, record, export, run. No line of code."""
+
+import json
+import shutil
+
+import pytest
+
+from edge import recording
+from edge.cli import main
+from edge.recording import load
+from edge.skin import file as skinfile
+
+
+@pytest.fixture
+def skin(tmp_path, forearm):
+    """The owner's own skin file: Cody's, with the thresholds of this skin."""
+    text = skinfile.shipped("cody").read_text()
+    text = text.replace("threshold_counts = 40", f"threshold_counts = {forearm.threshold_counts}")
+    text = text.replace("onset_counts = 60", f"onset_counts = {forearm.onset_counts}")
+    path = tmp_path / "skin.toml"
+    path.write_text(text)
+    return path
+
+
+def test_record_export_run(skin, recordings, tmp_path, capsys):
+    from export.__main__ import main as export
+
+    def run(*arguments):
+        status = main([str(a) for a in arguments])
+        out = capsys.readouterr().out
+        return status, [json.loads(line) for line in out.splitlines()]
+
+    first = load(recordings / "hard_0.npz")
+    rest = recording.Recording(first.t[:20], first.frames[:20], meta={})
+    recording.save(tmp_path / "rest.npz", rest)
+    assert run("check", skin)[0] == 0
+    assert run("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
+    assert run("calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)[0] == 0
+
+    trials = tmp_path / "trials"
+    shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(3)]
+    for name in shown:
+        labels = load(recordings / f"{name}.npz").labels
+        given = [part for task in labels for part in ("--label", f"{task}={labels[task]}")]
+        status, (event,) = run("record", "--skin", skin, "--fake", recordings / f"{name}.npz",
+                               "--out", trials, "--length", 1.3, *given)  # fmt: skip
+        assert (status, event["complete"]) == (0, True)
+    assert len(list(trials.iterdir())) == len(shown)
+
+    assert export(["--data", str(trials), "--out", str(tmp_path / "build"), "--jobs", "1"]) == 0
+    capsys.readouterr()
+
+    # One file goes to the board; what it was shown it knows again, live.
+    board = tmp_path / "board"
+    board.mkdir()
+    shutil.copy(tmp_path / "build" / "model.onnx", board)
+    for name in ("hard_1", "soft_2"):
+        status, events = run("run", "--model", board / "model.onnx", "--skin", skin,
+                             "--fake", recordings / f"{name}.npz")  # fmt: skip
+        said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
+        assert status == 0
+        assert said["category"] == load(recordings / f"{name}.npz").labels["category"]
+        assert [e["event"] for e in events] == ["onset", "decision", "decision", "end"]

@@ -1,0 +1,178 @@
+"""`edge-classify replay` and `verify`, as a user runs them."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.cli import main
+
+ROOT = Path(__file__).parents[3]
+
+
+def lines(text):
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@pytest.fixture
+def replay(exported, capsys):
+    def run(*arguments):
+        status = main(["replay", "--model", str(exported / "model.onnx"), *map(str, arguments)])
+        out = capsys.readouterr()
+        return status, lines(out.out), out.err
+
+    return run
+
+
+def test_a_folder_is_replayed_and_summed_up(replay, recordings):
+    status, events, err = replay(recordings, "--summary")
+    assert status == 0
+    decisions = [e for e in events if e["event"] == "decision"]
+    assert len(decisions) == 32
+    keys = {"event", "task", "label", "confidence", "window_s", "onset_s", "latency_ms"}
+    assert all(keys <= set(e) for e in decisions)
+    # Every trial is its own nearest neighbour here, so nothing can be wrong.
+    assert all(e["label"] == e["expected"] for e in decisions if e["task"] == "category")
+    assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
+    assert "rigid-fixed            8           ." in err
+    assert "16 of them are to the last bit as trials that the model learnt from" in err
+
+
+def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_path):
+    good = recordings / "hard_0.npz"
+    (tmp_path / "short.npz").write_bytes(good.read_bytes()[:5000])
+    np.savez(tmp_path / "skin.npz", t=np.zeros(1), frames=np.zeros((1, 3, 3), np.uint16), meta="{}")
+    missing = tmp_path / "missing.npz"
+    status, events, err = replay(tmp_path / "short.npz", missing, good, tmp_path / "skin.npz")
+    assert status == 2
+    assert [e["task"] for e in events if e["event"] == "decision"] == ["category", "object"]
+    said = err.splitlines()
+    assert len(said) == 3
+    assert "short.npz: not a readable .npz file" in said[0]
+    assert "missing.npz: no such file" in said[1]
+    assert "skin.npz: has no joint angles" in said[2]
+
+
+def test_a_recording_without_contact_says_so(replay, make_touch, tmp_path):
+    from dataclasses import replace
+
+    from edge.recording import save
+
+    quiet = make_touch()
+    save(tmp_path / "quiet.npz", replace(quiet, frames=np.zeros_like(quiet.frames)))
+    status, events, err = replay(tmp_path / "quiet.npz", "--summary")
+    assert (status, [e["event"] for e in events]) == (0, ["no_contact"])
+    assert "0 of 1 right" in err
+
+
+def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, capsys):
+    assert replay(tmp_path)[0] == 2
+    assert main(["replay", "--model", str(tmp_path / "no.onnx"), str(tmp_path)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("edge-classify: ")
+    assert err.count("\n") == 1
+
+
+def verify(exported, golden, capsys):
+    status = main(["verify", "--model", str(exported / "model.onnx"), "--golden", str(golden)])
+    out = capsys.readouterr()
+    return status, lines(out.out), out.err
+
+
+def test_the_golden_file_is_met(exported, capsys):
+    status, checks, err = verify(exported, exported / "golden.npz", capsys)
+    assert status == 0
+    assert [c["name"] for c in checks] == [
+        "series length",
+        "series counts",
+        "onset",
+        "features",
+        *(f"category_{part}" for part in ("label", "neighbours", "scores", "distances")),
+        *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances")),
+    ]
+    assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
+    assert "12 quantities are as in the golden file" in err
+
+
+@pytest.mark.parametrize(
+    ("key", "row", "change", "said"),
+    [
+        ("object_label", 5, 1, "object_label differs, worst in row 5"),
+        ("object_neighbours", 7, 1, "object_neighbours differs, worst in row 7"),
+        ("object_distances", 30, 1e-9, "object_distances differs, worst in row 30"),
+        ("category_scores", 2, 1e-12, "category_scores differs, worst in row 2"),
+        ("series_counts", 11, 1, "series counts differs, worst in row 11"),
+        ("frames", 60, 500, "differs"),
+        ("onset_s", 1, 1e-6, "onset differs, worst in row 1"),
+    ],
+)
+def test_a_difference_names_the_worst_row(exported, capsys, tmp_path, key, row, change, said):
+    arrays = dict(np.load(exported / "golden.npz"))
+    arrays[key] = arrays[key].copy()
+    value = arrays[key][row]
+    arrays[key][row] = value + np.array(change).astype(value.dtype)
+    np.savez(tmp_path / "golden.npz", **arrays)
+    status, checks, err = verify(exported, tmp_path / "golden.npz", capsys)
+    assert status == 1
+    assert said in err
+    assert not all(c["passed"] for c in checks)
+
+
+def test_a_difference_within_the_bound_passes(exported, capsys, tmp_path):
+    arrays = dict(np.load(exported / "golden.npz"))
+    arrays["object_distances"] = arrays["object_distances"] * (1 + 1e-13)
+    np.savez(tmp_path / "golden.npz", **arrays)
+    assert verify(exported, tmp_path / "golden.npz", capsys)[0] == 0
+
+
+def test_a_damaged_golden_file_is_one_sentence(exported, capsys, tmp_path):
+    path = tmp_path / "golden.npz"
+    arrays = dict(np.load(exported / "golden.npz"))
+    for key in ("start", "vectors", "meta", "object_label", "series_counts"):
+        np.savez(path, **{k: v for k, v in arrays.items() if k != key})
+        status, _, err = verify(exported, path, capsys)
+        assert (status, err.count("\n")) == (2, 1), key
+        assert str(path) in err
+    np.savez(path, **{**arrays, "vectors": arrays["vectors"][:, :50]})
+    assert "50,) long" in verify(exported, path, capsys)[2]
+    shutil.copy(exported / "model.onnx", path)
+    assert verify(exported, path, capsys)[0] == 2
+
+
+def test_the_command_line_itself(exported, recordings):
+    """In a process of its own: usage errors are exit 2, a closed pipe is quiet."""
+    command = [sys.executable, "-m", "edge.cli"]
+    run = subprocess.run([*command, "dance"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert "Traceback" not in run.stderr
+    model = ["replay", "--model", str(exported / "model.onnx"), str(recordings)]
+    piped = subprocess.run(
+        f"{sys.executable} -m edge.cli {' '.join(model)} | head -1",
+        shell=True,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert piped.stdout.count("\n") == 1
+    assert piped.stderr == ""
+
+
+def test_output_without_room_is_one_sentence(exported, recordings):
+    command = [sys.executable, "-m", "edge.cli", "replay", "--model", str(exported / "model.onnx")]
+    with open("/dev/full", "w") as full:
+        run = subprocess.run(
+            [*command, str(recordings / "hard_0.npz")],
+            cwd=ROOT,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert run.returncode == 2
+    assert run.stderr.startswith("edge-classify: standard output cannot be written: No space left")
+    assert run.stderr.count("\n") == 1

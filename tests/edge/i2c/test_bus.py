@@ -1,0 +1,77 @@
+"""Errors by name, bits on the wire, and what the Linux adapter says when there is none."""
+
+import errno
+
+import numpy as np
+import pytest
+
+from edge.errors import EdgeError
+from edge.i2c import bus
+from edge.i2c.bus import LinuxBus, bus_error, read, response, wire_bits, write
+
+
+@pytest.mark.parametrize(
+    ("messages", "bits"),
+    [
+        ([write(0x2C, [0, 0x0B]), read(0x2C, 24)], 255),  # AD7147, 12 results
+        ([write(0x5A, [0x04]), read(0x5A, 24)], 246),  # MPR121, 12 electrodes
+        ([write(0x70, [1])], 20),  # TCA9548A, a channel
+        ([read(0x70, 1)], 20),
+        ([write(0x28, [0]), read(0x28, 768)], 6942),  # 57.6 frames a second at 400 kHz
+        ([write(0x28, [0]), read(0x28, 384)], 3486),  # 114.7
+    ],
+)
+def test_bits_on_the_wire_are_those_of_the_data_sheets(messages, bits):
+    assert wire_bits(messages) == bits
+
+
+@pytest.mark.parametrize(
+    ("code", "error", "builtin", "retries", "passing"),
+    [
+        (errno.EREMOTEIO, bus.BusNack, ConnectionError, 3, True),
+        (errno.ENXIO, bus.BusNack, ConnectionError, 3, True),
+        (errno.EIO, bus.BusFault, OSError, 2, True),
+        (errno.ETIMEDOUT, bus.BusTimeout, TimeoutError, 0, True),
+        (errno.EAGAIN, bus.BusArbitration, BlockingIOError, 3, True),
+        (errno.EBUSY, bus.BusBusy, OSError, 0, False),
+        (errno.EOPNOTSUPP, bus.BusRefused, ValueError, 0, False),
+        (errno.EINVAL, bus.BusRefused, ValueError, 0, False),
+        (errno.ENOENT, bus.BusMissing, FileNotFoundError, 0, False),
+        (errno.EACCES, bus.BusDenied, PermissionError, 0, False),
+        (errno.ENODEV, bus.BusGone, ConnectionAbortedError, 0, True),
+    ],
+)
+def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin, retries, passing):
+    raised = bus_error(code, "/dev/i2c-1", 0x2C)
+    assert type(raised) is error
+    assert isinstance(raised, EdgeError)
+    assert isinstance(raised, builtin)
+    assert (raised.errno, raised.bus, raised.address) == (code, "/dev/i2c-1", 0x2C)
+    assert str(raised).startswith("/dev/i2c-1, address 0x2c: ")
+    assert errno.errorcode[code] in str(raised)
+    assert (response(code).retries, response(code).passing) == (retries, passing)
+
+
+def test_an_unknown_errno_is_treated_as_a_transfer_that_broke_off():
+    assert response(errno.EPROTO) is response(errno.EIO)
+    assert "EPROTO" in str(bus_error(errno.EPROTO, "b"))
+
+
+def test_a_missing_bus_is_named_with_the_mend():
+    with pytest.raises(bus.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"):
+        LinuxBus("/dev/i2c-no-such")
+
+
+def test_a_file_that_is_no_bus_is_refused(tmp_path):
+    path = tmp_path / "i2c"
+    path.write_text("")
+    with pytest.raises(bus.BusError, match=str(path)):
+        LinuxBus(str(path))
+
+
+@pytest.mark.parametrize(
+    "into", [np.zeros(4, dtype=np.int8), np.zeros(8, dtype=np.uint8)[::2], np.zeros((2, 2))]
+)
+def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
+    with pytest.raises(ValueError, match="contiguous uint8"):
+        read(0x2C, into)

@@ -1,0 +1,159 @@
+"""An unmodified smbus2 end to end: open, I2C_TIMEOUT, I2C_RDWR and errno over a C shim."""
+
+import importlib.util
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+_spec = importlib.util.spec_from_file_location(
+    "shim_build", Path(__file__).with_name("shim") / "build.py"
+)
+shim = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(shim)
+
+pytestmark = pytest.mark.skipif(
+    shim.compiler() is None, reason="needs Linux and a C compiler to stand in for /dev/i2c-N"
+)
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory):
+    return shim.build(tmp_path_factory.mktemp("shim"))
+
+
+def python(library, code, *arguments, **environment):
+    """Run code in a Python of its own, over the shim; returns the finished process."""
+    return subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code), *arguments],
+        env=shim.environment(library, **environment),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+WHOLE_SKIN = """
+    from edge.skin import file as skinfile
+    from edge.skin.skin import Skin
+    with Skin.open(skinfile.load(skinfile.shipped("cody"))) as skin:
+        for _ in range(5):
+            frame = skin.read()
+        raw, valid = skin.raw()
+        wrong = 0
+        for b, bus in enumerate(skin.file.buses, 1):
+            for chip in bus.chips:
+                for stage, taxel in enumerate(chip.taxels):
+                    felt = 1000 * b + 100 * chip.channel + 12 * (chip.address - 0x2C) + stage
+                    wrong += valid.flat[taxel] and raw.flat[taxel] != felt
+        print(int(valid.sum()), int(wrong))
+"""
+
+
+def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
+    log = tmp_path / "log"
+    done = python(library, WHOLE_SKIN, I2CDEV_LOG=str(log))
+    assert (done.stdout, done.stderr) == ("384 0\n", "")
+    # 20 ms are two of the adapter's units of 10 ms, on each of the three buses.
+    assert log.read_text() == "timeout 2\n" * 3
+
+
+def test_one_mute_chip_costs_its_twelve_taxels(library):
+    done = python(library, WHOLE_SKIN, I2CDEV_MUTE="2:0x2E")
+    assert done.stdout == "372 0\n"
+
+
+def test_a_bus_that_is_not_there_is_one_sentence(library):
+    code = "from edge.i2c.bus import LinuxBus; LinuxBus(77)"
+    done = python(library, code)
+    assert done.stderr.splitlines()[-1] == (
+        "edge.i2c.bus.BusMissing: /dev/i2c-77: no such bus; is I2C switched on, and the number right? "
+        "(ENOENT)"
+    )
+
+
+def test_what_smbus2_reads_itself_is_what_the_bus_reads(library):
+    done = python(
+        library,
+        """
+        from smbus2 import SMBus, i2c_msg
+        from edge.i2c.bus import LinuxBus, fetch, send
+        bus = LinuxBus(3)
+        send(bus, 0x70, [4])
+        with SMBus(3) as smbus:
+            read = i2c_msg.read(0x2D, 2)
+            smbus.i2c_rdwr(i2c_msg.write(0x2D, [0, 0x17]), read)
+        print(bytes(read).hex(), fetch(bus, 0x2D, bytes([0, 0x17]), 2).hex())
+        """,
+    )
+    assert done.stdout == "1473 1473\n", done.stderr
+
+
+def test_adapter_and_fake_refuse_the_same_shapes_with_the_same_errors(library):
+    done = python(
+        library,
+        """
+        from edge.i2c.bus import BusError, LinuxBus, read, send, write
+        from edge.fake.bus import FakeBus
+        from edge.fake.chips import FakeTCA9548A
+        shapes = [
+            [read(0x70, 1), write(0x70, [1])],
+            [write(0x70, [1]), read(0x2C, 2)],
+            [write(0x70, [1])] * 43,
+            [read(0x70, 8193)],
+            [write(0x33, [0])],
+            [write(0x70, [1]), read(0x70, 1)],
+        ]
+        for bus in (LinuxBus(1), FakeBus(chips={0x70: FakeTCA9548A()})):
+            said = []
+            for shape in shapes:
+                try:
+                    bus.transfer(bus.prepare(*shape))
+                    said.append("fine")
+                except BusError as error:
+                    said.append(f"{type(error).__name__} {error.errno}")
+            print(", ".join(said))
+        """,
+    )
+    real, fake = done.stdout.splitlines()
+    assert real == fake
+    assert real.split(", ")[-1] == "fine"
+    assert len(set(real.split(", "))) == 4
+
+
+def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
+    done = python(
+        library,
+        """
+        from edge.i2c.bus import BusGone, LinuxBus, fetch
+        bus = LinuxBus(1)
+        bus.close(); bus.close()
+        try:
+            fetch(bus, 0x70, b"", 1)
+        except BusGone as error:
+            print(error)
+        bus.reopen()
+        print(fetch(bus, 0x70, b"", 1))
+        """,
+    )
+    assert done.stdout == (
+        "/dev/i2c-1, address 0x70: the adapter has gone; plug it in again (ENODEV)\nb'\\x00'\n"
+    )
+
+
+def test_scan_maps_the_chips_that_answer(library, tmp_path):
+    from edge.skin import file as skinfile
+
+    code = "import sys; from edge.cli import main; sys.exit(main(sys.argv[1:]))"
+    skin = str(skinfile.shipped("cody"))
+    done = python(library, code, "scan", "--skin", skin)
+    assert done.returncode == 0
+    assert done.stdout.count('"state": "running"') == 32
+    assert done.stderr.count("#") == 384
+    done = python(library, code, "scan", "--skin", skin, I2CDEV_MUTE="1:0x2C")
+    assert done.returncode == 1
+    assert "  0 |...#####################|" in done.stderr
+    assert "31 of 32 chips answer" in done.stderr
+    assert "/dev/i2c-1, address 0x2c: does not answer" in done.stdout

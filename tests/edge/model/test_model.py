@@ -1,0 +1,271 @@
+"""A model file: what is refused, and what a decision says."""
+
+import json
+import os
+import shutil
+
+import numpy as np
+import onnx
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from onnx import TensorProto, helper
+
+from edge.errors import InputError
+from edge.model import onnx_file as onnxfile
+from edge.model.model import METADATA_KEY, Model
+
+
+@pytest.fixture(scope="module")
+def model(exported):
+    return Model(exported / "model.onnx")
+
+
+@pytest.fixture(scope="module")
+def golden(exported):
+    return np.load(exported / "golden.npz")
+
+
+@pytest.fixture
+def altered(exported, tmp_path):
+    """Write the exported model with a change; returns the new path."""
+
+    def write(change):
+        proto = onnx.load(exported / "model.onnx")
+        change(proto)
+        path = tmp_path / "altered.onnx"
+        path.write_bytes(proto.SerializeToString())
+        return path
+
+    return write
+
+
+def meta_of(proto):
+    return next(p for p in proto.metadata_props if p.key == METADATA_KEY)
+
+
+def test_metadata_says_what_the_board_needs(model, forearm):
+    info = model.info
+    assert list(info.tasks) == ["category", "object"]
+    assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
+    assert info.layout == forearm
+    assert (info.window_s, info.samples, info.rows) == (1.2, 40, 16)
+    assert info.units == {
+        "max_force": "newton",
+        "contact_area": "taxel",
+        "contact_motion": "metre",
+    }
+    assert info.motion_frame == "world"
+    assert info.chain.dof == 5
+    assert len(info.data_digest) == 64
+    assert info.from_json(info.to_json(), "again").to_json() == info.to_json()
+
+
+def test_a_decision_is_the_graphs_answer(model, golden):
+    m = len(golden["onset_s"])
+    for i in range(m):
+        decision = model.decide(golden["vectors"][i])["object"]
+        task = model.info.tasks["object"]
+        assert decision.label == task.labels[golden["object_label"][i]]
+        assert decision.scores.tolist() == golden["object_scores"][i].tolist()
+        assert decision.confidence == golden["object_scores"][i].max()
+        assert decision.neighbours.tolist() == golden["object_neighbours"][i].tolist()
+        bound = json.loads(str(golden["meta"]))["bounds"]["distances"]
+        assert decision.distances == pytest.approx(golden["object_distances"][i], bound, bound)
+
+
+def test_decisions_do_not_share_their_arrays(model, golden):
+    first = model.decide(golden["vectors"][0])["object"]
+    before = first.distances.copy()
+    model.decide(golden["vectors"][40])
+    assert (first.distances == before).all()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_not_finite_is_refused_with_its_place(model, golden, value):
+    vector = golden["vectors"][0].copy()
+    vector[43] = value
+    with pytest.raises(InputError, match="sample 3 of contact_area is not finite"):
+        model.decide(vector)
+    answer = model.run(vector[None])
+    assert answer["object_label"].tolist() == [-1]
+    assert not answer["object_scores"].any()
+
+
+def test_a_value_beyond_any_distance_is_refused(model, golden):
+    vector = golden["vectors"][0].copy()
+    vector[39] = 1e300
+    with pytest.raises(InputError, match="too large"):
+        model.decide(vector)
+
+
+@pytest.mark.parametrize("shape", [(119,), (121,), (1, 120), ()])
+def test_a_vector_of_another_length_is_refused(model, shape):
+    with pytest.raises(InputError, match="takes 120 features"):
+        model.decide(np.zeros(shape))
+
+
+def test_a_missing_model_and_a_folder_are_named(tmp_path):
+    with pytest.raises(InputError, match="no such model; make one with `make export`"):
+        Model(tmp_path / "none.onnx")
+    with pytest.raises(InputError, match="cannot be read"):
+        Model(tmp_path)
+
+
+def external(proto):
+    tensor = proto.graph.initializer[0]
+    tensor.data_location = TensorProto.EXTERNAL
+    tensor.external_data.add(key="location", value="/etc/passwd")
+
+
+def external_in_a_node(proto):
+    tensor = helper.make_tensor("x", TensorProto.FLOAT, [1], [0.0])
+    tensor.data_location = TensorProto.EXTERNAL
+    proto.graph.node.append(helper.make_node("Constant", [], ["y"], value=tensor))
+
+
+def foreign(proto):
+    proto.graph.node[0].domain = "com.microsoft"
+
+
+def unknown(proto):
+    proto.graph.node[0].op_type = "Sinh"
+
+
+def unknown_in_a_branch(proto):
+    bad = helper.make_graph([helper.make_node("Loop", ["c"], ["o"])], "g", [], [])
+    proto.graph.node.append(helper.make_node("If", ["c"], ["o"], then_branch=bad, else_branch=bad))
+
+
+def functions(proto):
+    proto.functions.add(name="f", domain="d")
+
+
+def no_metadata(proto):
+    del proto.metadata_props[:]
+
+
+def meta(**changes):
+    def change(proto):
+        entry = meta_of(proto)
+        entry.value = json.dumps({**json.loads(entry.value), **changes})
+
+    return change
+
+
+def without(key):
+    def change(proto):
+        entry = meta_of(proto)
+        found = json.loads(entry.value)
+        del found[key]
+        entry.value = json.dumps(found)
+
+    return change
+
+
+def no_json(proto):
+    meta_of(proto).value = "{"
+
+
+def more_labels(proto):
+    entry = meta_of(proto)
+    found = json.loads(entry.value)
+    found["tasks"]["category"]["labels"].append("liquid")
+    entry.value = json.dumps(found)
+
+
+def another_task(proto):
+    entry = meta_of(proto)
+    found = json.loads(entry.value)
+    found["tasks"]["mobility"] = found["tasks"]["category"]
+    entry.value = json.dumps(found)
+
+
+REFUSED = {
+    external: "weights lie in another file",
+    external_in_a_node: "weights lie in another file",
+    foreign: "operator com.microsoft.",
+    unknown: "operator Sinh",
+    unknown_in_a_branch: "operator Loop",
+    functions: "functions of its own",
+    no_metadata: "no edge-classify metadata",
+    no_json: "metadata cannot be read",
+    meta(format=99): "its format is 99",
+    meta(samples=30): "takes .*120.* features, its metadata says 90",
+    meta(samples=-3): "make no sense",
+    meta(window_s="soon"): "metadata cannot be read",
+    meta(skin={"rows": 16}): "cols is missing",
+    meta(arm=None): "motion frame and its arm disagree",
+    meta(tasks={}): "no task",
+    meta(tasks=[]): "metadata cannot be read",
+    meta(tracking={"speed": 1}): "metadata cannot be read",
+    meta(features=["noise"]): "was made for the features noise",
+    without("window_s"): "lacks 'window_s'",
+    more_labels: "no output category_scores of width 3",
+    another_task: "no output mobility_label",
+}
+
+
+@pytest.mark.parametrize("change", REFUSED, ids=lambda c: getattr(c, "__name__", "meta"))
+def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
+    path = altered(change)
+    with pytest.raises(InputError, match=REFUSED[change]) as caught:
+        Model(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_graph_that_onnx_runtime_refuses_is_refused_in_one_sentence(altered):
+    def cut(proto):
+        del proto.graph.node[0]
+
+    with pytest.raises(InputError, match="ONNX Runtime refuses it"):
+        Model(altered(cut))
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_damaged_models_are_refused_or_run_but_never_crash(data, exported, tmp_path_factory):
+    """Bytes changed near the start or end, where structure and metadata lie, or cut short."""
+    damaged = bytearray((exported / "model.onnx").read_bytes())
+    for _ in range(data.draw(st.integers(0, 3))):
+        near = data.draw(st.integers(0, 1500))
+        damaged[data.draw(st.sampled_from([near, -1 - near]))] = data.draw(st.integers(0, 255))
+    damaged = damaged[: data.draw(st.sampled_from([len(damaged), len(damaged) // 2, 100, 0]))]
+    try:
+        onnxfile.check(bytes(damaged), "damaged.onnx")
+    except InputError as error:
+        assert str(error).startswith("damaged.onnx")
+
+
+def test_a_model_is_copied_alone(exported, tmp_path, golden):
+    """One self-describing file is all that goes to the board."""
+    shutil.copy(exported / "model.onnx", tmp_path / "copy.onnx")
+    assert Model(tmp_path / "copy.onnx").decide(golden["vectors"][0])["category"].label
+
+
+def test_what_the_walk_reads_is_what_onnx_reads(exported):
+    data = (exported / "model.onnx").read_bytes()
+    contents = onnxfile.read(data)
+    proto = onnx.load_from_string(data)
+    assert contents.metadata == {p.key: p.value for p in proto.metadata_props}
+    assert contents.opsets == {o.domain: o.version for o in proto.opset_import} == {"": 18}
+    assert contents.operators == {(n.domain, n.op_type) for n in proto.graph.node}
+
+
+def test_a_file_that_changes_between_its_check_and_its_use_is_refused(
+    exported, tmp_path, monkeypatch
+):
+    path = tmp_path / "model.onnx"
+    shutil.copy(exported / "model.onnx", path)
+    check = onnxfile.check
+
+    def check_then_change(data, name):
+        contents = check(data, name)
+        path.write_bytes(data + b"")
+        os.utime(path, ns=(1, 1))
+        return contents
+
+    monkeypatch.setattr(onnxfile, "check", check_then_change)
+    with pytest.raises(InputError, match="was changed while it was read"):
+        Model(path)

@@ -1,0 +1,197 @@
+"""Joint angles from outside: their own clock, and never a stale pose."""
+
+import json
+import os
+import socket
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.runtime.joint_stream import LONGEST_LINE, Joints, from_file, from_udp
+
+
+class Wire:
+    """Lines that arrive at times of our clock."""
+
+    def __init__(self, **options):
+        self.now, self.data = 0.0, b""
+        self.joints = Joints(self.take, dof=2, now=lambda: self.now, **options)
+
+    def take(self):
+        data, self.data = self.data, b""
+        return data
+
+    def send(self, t, q):
+        self.data += json.dumps({"t": t, "q": q}).encode() + b"\n"
+
+    def at(self, t=None):
+        q = self.joints.at(self.now if t is None else t)
+        return None if q is None else q.tolist()
+
+
+@pytest.fixture
+def wire():
+    return Wire()
+
+
+def stream(wire, *, ahead=1000.0, delay=0.002, n=10):
+    """Ten poses, 10 ms apart, from a sender whose clock is `ahead` of ours."""
+    for i in range(n):
+        sent = i * 0.01
+        wire.now = sent + delay
+        wire.send(sent + ahead, [sent, -sent])
+        wire.joints.at(wire.now)
+
+
+@pytest.mark.parametrize("ahead", [-50.0, 0.0, 1.7e9])
+def test_the_senders_clock_need_not_be_ours(wire, ahead):
+    stream(wire, ahead=ahead)
+    # A clock of 1.7e9 s resolves 0.24 us.
+    assert wire.at(0.087) == pytest.approx([0.085, -0.085], abs=1e-6)
+
+
+def test_an_angle_that_wraps_between_two_lines_goes_the_shorter_way(wire):
+    wire.send(5.0, [3.1, -3.0])
+    wire.send(5.01, [-3.1, 3.0])
+    wire.joints.at(0.0)
+    first, second = wire.at(-0.005)
+    assert first == pytest.approx(np.pi)
+    assert second == pytest.approx(-np.pi)
+
+
+def test_a_pose_between_two_lines_is_interpolated(wire):
+    stream(wire)
+    assert wire.at(0.0645) == pytest.approx([0.0625, -0.0625])
+
+
+def test_the_last_pose_holds_no_longer_than_allowed(wire):
+    stream(wire)
+    assert wire.at(0.092 + 0.049) == pytest.approx([0.09, -0.09])
+    assert wire.at(0.092 + 0.051) is None
+    assert wire.joints.missing == 1
+
+
+def test_a_line_that_comes_late_is_as_old_as_it_is(wire):
+    stream(wire)
+    wire.now = 0.2
+    wire.send(1000.1, [9.0, 9.0])  # sent at 0.1: 98 ms late
+    assert wire.at() is None
+    assert wire.at(0.102) == [9.0, 9.0]
+
+
+def test_a_gap_is_not_bridged(wire):
+    stream(wire)
+    wire.now = 0.402
+    wire.send(1000.4, [1.0, 1.0])
+    assert wire.at() == [1.0, 1.0]
+    assert wire.at(0.25) is None
+
+
+def test_before_the_first_line_nothing_is_known(wire):
+    assert wire.at() is None
+
+
+def test_a_shared_clock_takes_the_time_as_it_is():
+    wire = Wire(shared_clock=True)
+    wire.now = 5.0
+    wire.send(4.9, [1.0, 2.0])
+    assert wire.at(5.0) is None
+    wire.send(4.98, [3.0, 4.0])
+    assert wire.at(5.0) == [3.0, 4.0]
+
+
+def test_a_sender_that_starts_anew_is_believed(wire):
+    stream(wire, ahead=1000.0)
+    wire.now = 0.15
+    wire.send(3.0, [7.0, 7.0])
+    assert wire.at() == [7.0, 7.0]
+    assert wire.joints.malformed == 0
+
+
+def test_the_clocks_may_drift_apart(wire):
+    """A sender whose clock is slow by 100 ppm: after an hour it is off by 0.36 s."""
+    for i in range(36_000):
+        wire.now = i * 0.1
+        wire.send(wire.now * (1.0 - 1e-4), [wire.now, 0.0])
+        q = wire.at()
+        # In the window of 20 s the drift is 2 ms.
+        assert q is not None
+        assert abs(q[0] - wire.now) < 0.0021
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        (b"not json", "is not"),
+        (b"[1, 2]", "is not"),
+        (b'{"t": 1.0}', "is not"),
+        (b'{"t": 1.0, "q": 3}', "not a number"),
+        (b'{"t": "1", "q": [1, 2]}', "not a number"),
+        (b'{"t": 1.0, "q": [1, true]}', "not a number"),
+        (b'{"t": 1.0, "q": [1, null]}', "not a number"),
+        (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm 2"),
+        (b'{"t": 1.0, "q": [1, NaN]}', "not finite"),
+        (b'{"t": Infinity, "q": [1, 2]}', "not finite"),
+        (b'{"t": 1e400, "q": [1, 2]}', "not finite"),
+        (b'{"t": 1' + b"0" * 400 + b', "q": [1, 2]}', "not finite"),
+        (b"[" * 100_000, "longer than"),
+        (b"\xff\xfe", "is not"),
+        (b'{"t": 0.995, "q": [1, 2]}', "goes back"),
+    ],
+)
+def test_a_malformed_line_is_counted_and_changes_nothing(wire, line, problem):
+    wire.send(1.0, [0.5, 0.5])
+    assert wire.at() == [0.5, 0.5]
+    wire.data += line + b"\n" * (len(line) < LONGEST_LINE)
+    assert wire.at() == [0.5, 0.5]
+    assert wire.joints.malformed == 1
+    assert problem in wire.joints.problem
+
+
+def test_a_line_may_come_in_pieces(wire):
+    line = b'{"t": 1.0, "q": [0.25, 0.5]}\n'
+    for byte in line[:-1]:
+        wire.data = bytes([byte])
+        assert wire.at() is None
+    wire.data = line[-1:]
+    assert wire.at() == [0.25, 0.5]
+
+
+def test_a_flood_does_not_stop_the_loop():
+    joints = Joints(lambda: b'{"t": 1.0, "q": [0.0]}\n', dof=1, now=lambda: 0.0)
+    assert joints.at(0.0).tolist() == [0.0]
+
+
+def test_a_pipe_is_read_without_waiting_and_its_end_is_noticed():
+    reader, writer = os.pipe()
+    source = from_file(reader)
+    assert source() == b""
+    os.write(writer, b"abc")
+    assert source() == b"abc"
+    os.close(writer)
+    assert source() is None
+    os.close(reader)
+
+
+def test_udp_is_bound_to_loopback_unless_told_otherwise():
+    source, listener = from_udp("0")
+    host, port = listener.getsockname()
+    assert host == "127.0.0.1"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        assert source() == b""
+        sender.sendto(b'{"t": 1.0, "q": [2.0]}', (host, port))
+        joints = Joints(source, dof=1, now=lambda: 1.0)
+        q = None
+        for _ in range(1000):
+            q = joints.at(1.0)
+            if q is not None:
+                break
+    listener.close()
+    np.testing.assert_array_equal(q, [2.0])
+
+
+@pytest.mark.parametrize("address", ["", "port", "70000", "host:x", "999.1.1.1:5000"])
+def test_an_address_that_cannot_be_bound_is_one_sentence(address):
+    with pytest.raises(InputError, match=f"joints udp:{address}: "):
+        from_udp(address)

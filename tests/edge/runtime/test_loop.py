@@ -1,0 +1,138 @@
+"""Ticks that do not drift, periods counted in constant memory, a clean stop."""
+
+import gc
+import signal
+import sys
+
+import numpy as np
+import pytest
+
+from edge.fake.clock import VirtualClock
+from edge.fake.player import fake_skin, still
+from edge.runtime.loop import Loop, Periods, Schedule, Stop, garbage_aside, stop_on
+from edge.skin import file as skinfile
+
+CODY = skinfile.load(skinfile.shipped("cody"))
+
+
+def test_ticks_stay_on_the_grid_however_long_the_work_takes():
+    clock = VirtualClock(start=5.0)
+    schedule = Schedule(clock, 0.01)
+    draw = np.random.default_rng(0)
+    for k in range(1000):
+        assert schedule.wait() == 5.0 + k * 0.01
+        clock.sleep_until(clock.now() + draw.uniform(0.0, 0.0099))
+    assert schedule.missed == 0
+
+
+def test_a_late_tick_moves_no_other_and_those_gone_by_are_counted():
+    clock = VirtualClock()
+    schedule = Schedule(clock, 0.01)
+    due = []
+    for k in range(6):
+        due.append(round(schedule.wait(), 9))
+        clock.sleep_until(clock.now() + (0.025 if k == 1 else 0.004))
+    assert due == [0.0, 0.01, 0.03, 0.04, 0.05, 0.06]
+    assert schedule.missed == 1
+    assert schedule.periods.longest == pytest.approx(0.025)
+
+
+def test_a_tick_that_is_late_by_less_than_a_period_is_not_left_out():
+    clock = VirtualClock()
+    schedule = Schedule(clock, 0.01)
+    schedule.wait()
+    clock.sleep_until(0.015)
+    assert schedule.wait() == 0.01
+    assert schedule.late_s == pytest.approx(0.005)
+    assert schedule.wait() == 0.02
+    assert schedule.missed == 0
+
+
+def test_percentiles_are_those_of_the_sorted_periods_to_a_bin():
+    draw = np.random.default_rng(1).gamma(4.0, 0.0025, 5000)
+    periods = Periods()
+    for period in draw:
+        periods.add(float(period))
+    for percent in (50, 99, 99.9):
+        exact = np.sort(draw)[int(np.ceil(5000 * percent / 100)) - 1]
+        assert 0.0 < periods.percentile(percent) - exact <= Periods.BIN_S
+    assert periods.longest == draw.max()
+
+
+def test_no_garbage_is_collected_inside_the_loop_but_between_its_ticks(monkeypatch):
+    collected = []
+    monkeypatch.setattr(gc, "collect", lambda generation=2: collected.append(generation))
+    with garbage_aside():
+        assert not gc.isenabled()
+        clock = VirtualClock()
+        schedule = Schedule(clock, 0.01)
+        for _ in range(350):
+            schedule.wait()
+    assert gc.isenabled()
+    assert collected == [2, 1, 1, 1]
+
+
+def test_garbage_is_back_to_normal_after_an_error():
+    with pytest.raises(KeyError), garbage_aside():
+        raise KeyError
+    assert gc.isenabled()
+
+
+def test_a_loop_ends_with_its_time():
+    with still(CODY) as skin:
+        loop = Loop(skin, lasts_s=0.3)
+        t = [frame.t for frame in loop.frames()]
+    np.testing.assert_allclose(t, np.arange(30) * 0.01, atol=1e-12)
+
+
+def test_a_loop_ends_when_asked_after_the_frame_at_hand():
+    stop = Stop()
+    seen = 0
+    with still(CODY) as skin:
+        for _ in Loop(skin, stop=stop).frames():
+            seen += 1
+            stop.asked = seen == 7
+    assert seen == 7
+
+
+@pytest.fixture
+def interruptible():
+    """A shell that runs the tests in the background lets them ignore SIGINT."""
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield signal.default_int_handler
+    signal.signal(signal.SIGINT, inherited)
+
+
+def test_a_signal_asks_once_and_is_itself_again_afterwards(interruptible):
+    with stop_on(signal.SIGINT) as stop:
+        signal.raise_signal(signal.SIGINT)
+        assert stop.asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is interruptible
+
+
+def test_joints_are_asked_for_at_the_frames_own_time():
+    class Source:
+        def at(self, t):
+            return np.array([t, -t])
+
+    with still(CODY) as skin:
+        for frame in Loop(skin, joints=Source(), lasts_s=0.05).frames():
+            assert frame.joints.tolist() == [frame.t, -frame.t]
+
+
+def test_a_long_run_neither_grows_nor_drifts():
+    """20 s of a small skin here; `python -m bench.soak` runs ten minutes of Cody's."""
+    pad = skinfile.load(skinfile.shipped("mpr121"))
+    quiet = np.zeros(pad.layout.shape, dtype=np.uint16)
+    with fake_skin(pad, lambda t: quiet, timed=True) as skin:
+        loop = Loop(skin, lasts_s=20.0)
+        start, blocks = skin.clock.now(), []
+        for k, frame in enumerate(loop.frames()):
+            assert abs(frame.t - start - k * 0.01) < 1e-9
+            if k in (500, 1999):
+                gc.collect()
+                blocks.append(sys.getallocatedblocks())
+    assert (k, loop.schedule.missed) == (1999, 0)
+    assert abs(blocks[1] - blocks[0]) < 100

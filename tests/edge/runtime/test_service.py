@@ -1,0 +1,114 @@
+"""`edge-classify run` as a service: under a stand-in for systemd's socket, and the unit itself."""
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from configparser import ConfigParser
+from pathlib import Path
+
+import pytest
+
+from edge import demo
+from edge.cli import parser
+from edge.runtime import touch_map as touchmap
+
+ROOT = Path(__file__).parents[3]
+UNIT = ROOT / "board" / "edge-classify.service"
+TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
+
+
+@pytest.fixture
+def manager(tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.settimeout(60.0)
+        yield listener
+
+
+def start(manager, tmp_path, *arguments):
+    fake = ("--fake", str(TOUCH), "--loop")
+    return subprocess.Popen(
+        [sys.executable, "-m", "edge.cli", "run", "--model", str(demo.MODEL), *fake, *arguments],
+        cwd=ROOT,
+        env={**os.environ, "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "200000"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(manager, tmp_path):
+    place = tmp_path / "map.jsonl"
+    with start(manager, tmp_path, "--map", str(place)) as process:
+        assert manager.recv(4096) == f"READY=1\nSTATUS=reading fake {TOUCH}".encode()
+        for _ in range(3):
+            assert manager.recv(4096) == b"WATCHDOG=1"
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+        said = {manager.recv(4096)}
+        while b"STOPPING=1" not in said:
+            said.add(manager.recv(4096))
+    assert said <= {b"WATCHDOG=1", b"STOPPING=1"}
+    assert (process.returncode, err) == (0, "")
+    assert out.endswith("\n")
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert lines[-1]["event"] == "end"
+    assert len(touchmap.load(place).touches) == len(
+        {line["contact"] for line in lines if line["event"] == "decision"}
+    )
+
+
+def test_its_lines_go_out_by_udp_as_they_are_printed(manager, tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(60.0)
+        with start(manager, tmp_path, "--udp", f"127.0.0.1:{listener.getsockname()[1]}") as process:
+            received = [listener.recv(65536).decode() for _ in range(4)]
+            process.terminate()
+            out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert out.splitlines(keepends=True)[:4] == received
+    assert [json.loads(line)["event"] for line in received] == ["onset"] + ["decision"] * 3
+
+
+@pytest.fixture
+def unit():
+    config = ConfigParser(interpolation=None, delimiters=("=",))
+    config.optionxform = str
+    config.read(UNIT)
+    return config
+
+
+def test_the_units_command_is_one_that_edge_classify_takes(unit):
+    program, *words = shlex.split(unit["Service"]["ExecStart"])
+    assert Path(program).name == "edge-classify"
+    arguments = parser().parse_args(words)
+    assert arguments.udp == "127.0.0.1:47400"
+    assert arguments.map == f"/var/lib/{unit['Service']['StateDirectory']}/map.jsonl"
+
+
+def test_the_unit_waits_for_word_watches_and_restarts(unit):
+    service = unit["Service"]
+    assert service["Type"] == "notify"
+    assert int(service["WatchdogSec"]) > 2  # a stuck adapter's time-out of 1 s is no dead loop
+    assert service["Restart"] == "always"
+
+
+def test_the_unit_runs_as_nobody_in_particular_who_may_use_i2c(unit):
+    service = unit["Service"]
+    assert service["DynamicUser"] == "yes"
+    assert service["SupplementaryGroups"] == "i2c"
+    assert service["DeviceAllow"] == "char-i2c rw"
+    assert service["CapabilityBoundingSet"] == ""
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+def test_systemd_finds_the_unit_little_exposed():
+    command = ["systemd-analyze", "security", "--offline=true", "--threshold=25", str(UNIT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-500:]

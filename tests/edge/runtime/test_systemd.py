@@ -1,0 +1,102 @@
+"""sd_notify(3) as its receiver sees it."""
+
+import os
+import socket
+
+import pytest
+
+from edge.runtime.systemd import Notifier
+
+
+class Clock:
+    t = 100.0
+
+    def __call__(self):
+        return self.t
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def manager(tmp_path):
+    """A stand-in for systemd's socket, and its address."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.setblocking(False)
+        yield listener, str(tmp_path / "notify")
+
+
+def said(listener):
+    lines = []
+    while True:
+        try:
+            lines.append(listener.recv(4096).decode())
+        except BlockingIOError:
+            return lines
+
+
+def test_ready_and_stopping_are_one_datagram_each(manager, clock):
+    listener, address = manager
+    with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:
+        notifier.ready("reading skin.toml")
+        notifier.stopping()
+    assert said(listener) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
+
+
+def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_given(
+    manager, clock
+):
+    listener, address = manager
+    environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "10000000"}
+    environment["WATCHDOG_PID"] = str(os.getpid())
+    with Notifier(environment, now=clock) as notifier:
+        for tick in range(2001):  # 20 s at 100 Hz
+            clock.t = 100.0 + tick / 100
+            notifier.alive()
+    assert said(listener) == ["WATCHDOG=1"] * 5
+
+
+def test_a_name_in_the_abstract_namespace(clock):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        name = f"edge-classify-{os.getpid()}"
+        listener.bind("\0" + name)
+        Notifier({"NOTIFY_SOCKET": "@" + name}, now=clock).ready()
+        assert listener.recv(64) == b"READY=1"
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"WATCHDOG_USEC": "0"},
+        {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"},
+    ],
+)
+def test_nobody_watches(manager, clock, environment):
+    listener, address = manager
+    with Notifier({**environment, "NOTIFY_SOCKET": address}, now=clock) as notifier:
+        notifier.alive()
+        clock.t += 1000.0
+        notifier.alive()
+    assert said(listener) == []
+
+
+@pytest.mark.parametrize("address", ["", "relative", "/nowhere/at/all"])
+def test_without_a_manager_nothing_happens(clock, address):
+    with Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1"}, now=clock) as notifier:
+        notifier.ready()
+        notifier.alive()
+        notifier.stopping()
+    notifier.close()
+
+
+def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, clock):
+    listener, address = manager
+    with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:
+        for _ in range(10_000):  # far more than a socket's queue takes
+            notifier.stopping()
+    assert 1 <= len(said(listener)) < 10_000

@@ -1,0 +1,70 @@
+"""Counts above a baseline that follows slow drift, bounded, in whole numbers."""
+
+import numpy as np
+
+from edge.skin.baseline import Baseline
+
+EVERY = np.ones(3, dtype=bool)
+
+
+def raw(*values):
+    return np.array(values, dtype=np.uint16)
+
+
+def test_counts_are_above_the_baseline_by_sign():
+    rising = Baseline([1000, 1000, 1000])
+    falling = Baseline([1000, 1000, 1000], sign=-1)
+    assert rising.above(raw(1500, 1000, 400)).tolist() == [500, 0, 0]
+    assert falling.above(raw(1500, 1000, 400)).tolist() == [0, 0, 600]
+
+
+def test_counts_in_the_dead_band_are_zero():
+    band = Baseline([1000, 1000, 1000], dead_band=[20, 1, 0])
+    assert band.above(raw(1019, 1001, 1000)).tolist() == [0, 1, 0]
+    assert band.above(raw(1020, 1000, 999)).tolist() == [20, 0, 0]
+
+
+def test_the_whole_range_fits():
+    assert Baseline([0]).above(raw(65535)).tolist() == [65535]
+    assert Baseline([65535], sign=-1).above(raw(0)).tolist() == [65535]
+
+
+def test_it_follows_by_no_more_than_its_rate():
+    baseline = Baseline([1000, 1000, 1000], step_counts=0.25, limit=500)
+    for _ in range(100):
+        baseline.follow(raw(1400, 600, 1000), EVERY)
+    assert baseline.counts.tolist() == [1025, 975, 1000]
+
+
+def test_it_stops_at_its_limit():
+    baseline = Baseline([1000, 1000, 1000], step_counts=4.0, limit=50)
+    for _ in range(1000):
+        baseline.follow(raw(3000, 0, 1010), EVERY)
+    assert baseline.counts.tolist() == [1050, 950, 1010]
+
+
+def test_a_taxel_that_is_not_fresh_is_left_alone():
+    baseline = Baseline([1000, 1000, 1000], step_counts=1.0, limit=50)
+    for _ in range(64):
+        baseline.follow(raw(1200, 1200, 1200), np.array([True, False, True]))
+    assert baseline.counts.tolist() == [1050, 1000, 1050]
+
+
+def test_drift_slower_than_a_count_a_frame_is_followed_exactly():
+    """0.01 counts a frame over 10,000 frames: 100 counts, none lost to rounding."""
+    baseline = Baseline([1000] * 3, step_counts=0.2, limit=500)
+    worst = 0
+    for i in range(10_000):
+        baseline.follow(raw(*[1000 + i // 100] * 3), EVERY)
+        worst = max(worst, abs(int(baseline.counts[0]) - (1000 + i // 100)))
+    assert worst <= 2
+
+
+def test_noise_does_not_carry_it_away():
+    draw = np.random.default_rng(7)
+    baseline = Baseline([1000] * 400, step_counts=0.2, limit=500)
+    for _ in range(2000):
+        noisy = np.rint(1000 + 10 * draw.standard_normal(400)).astype(np.uint16)
+        baseline.follow(noisy, np.ones(400, dtype=bool))
+    assert np.abs(baseline.counts - 1000).max() <= 5
+    assert abs(float(np.mean(baseline.counts - 1000))) < 0.5

@@ -1,0 +1,125 @@
+"""The fault campaign in short (`python -m bench.faults` runs all of it and prints the table)."""
+
+import errno
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.faults import Fault, positions, run, scripts
+from edge.classifier import Watcher
+from edge.commands.run import chip_event
+from edge.fake.player import Playback, fake_skin
+from edge.model.model import Model
+from edge.recording import load
+from edge.runtime.loop import Loop
+from edge.skin import file as skinfile
+
+ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
+UNKNOWABLE = [name for name in ROWS if name.endswith("*")]
+"""The protocol has nothing that would tell these."""
+TIMEOUT_TICKS = 3
+"""Ticks that one timeout of 20 ms can cost at 100 Hz."""
+
+
+@pytest.mark.parametrize("name", [n for n in ROWS if n not in UNKNOWABLE])
+def test_a_fault_loses_no_more_than_it_must(name):
+    file, faults, more = ROWS[name]
+    outcome = run(name, file, faults, seconds=2.2, **more)
+    assert outcome.escaped == ""
+    assert outcome.met > 0
+    assert outcome.wrong == 0
+    assert outcome.others == 0
+    hangs = [f for f in faults if f.code == errno.ETIMEDOUT and f.kind == "error"]
+    if not hangs:
+        assert (outcome.missed, outcome.late_s) == (0, pytest.approx(0.0, abs=1e-9))
+        assert outcome.recovery_s < 0.15
+    else:
+        assert outcome.missed <= TIMEOUT_TICKS * outcome.met
+        assert outcome.recovery_s < 1.05
+
+
+@pytest.mark.parametrize("name", ["NACK on one chip", "EIO on one chip", "a hung chip (ETIMEDOUT)"])
+def test_one_bad_chip_costs_its_own_taxels_only(name):
+    file, faults, more = ROWS[name]
+    assert run(name, file, faults, seconds=1.2, **more).missing == 12
+
+
+def test_a_hung_chip_costs_its_timeout_and_is_then_tried_less_and_less():
+    file, faults, more = ROWS["a hung chip (ETIMEDOUT)"]
+    outcome = run("", file, faults, seconds=1.2, **more)
+    assert outcome.met <= 4
+    assert outcome.missed <= 2 * outcome.met
+
+
+@pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.EIO, errno.EAGAIN])
+def test_a_passing_error_anywhere_in_a_frame_is_made_good_within_it(code):
+    outcome = positions(code, skinfile.load(skinfile.shipped("cody")), every=31)
+    assert (outcome.wrong, outcome.missing, outcome.missed, outcome.escaped) == (0, 0, 0, "")
+
+
+@pytest.mark.parametrize(("code", "most"), [(errno.ETIMEDOUT, 12), (errno.ENODEV, 144)])
+def test_an_error_that_lasts_costs_one_chip_or_one_bus(code, most):
+    outcome = positions(code, skinfile.load(skinfile.shipped("cody")), every=47)
+    assert (outcome.wrong, outcome.missing, outcome.escaped) == (0, most, "")
+
+
+def test_without_reading_back_a_wrong_channel_gives_wrong_values():
+    """The campaign can see them: the 20 bits of reading back are not for nothing."""
+    name = "the same without reading back *"
+    file, faults, more = ROWS[name]
+    assert run(name, file, faults, seconds=1.2, **more).wrong > 100
+
+
+def test_the_same_seed_gives_the_same_outcome():
+    file, faults, _ = ROWS["random errors, 1.0% of transactions"]
+    first, again, other = (run("", file, faults, seed=s, seconds=1.2) for s in (3, 3, 4))
+    assert first == again or (math.isnan(first.recovery_s) and first.met == again.met)
+    assert first.met != other.met
+
+
+def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):
+    """A chip far from the contact does not answer for half a second of it."""
+    trial = load(recordings / "hard_0.npz")
+    model = Model(exported / "model.onnx")
+    file = replace(skinfile.load(skinfile.shipped("cody")), layout=trial.layout)
+    lost = [Fault(bus=file.buses[0].device, channel=0, address=0x2C, during=(0.5, 1.0))]
+    for faults, flagged in (((), False), (lost, True)):
+        playback = Playback(trial)
+        with fake_skin(file, playback, faults=faults) as skin:
+            watcher = Watcher(model, skin.layout)
+            loop = Loop(skin, joints=playback, lasts_s=playback.ends)
+            events = [event for frame in loop.frames() for event in watcher.push(frame)]
+            changed = [status.state for status in skin.changes()]
+        decisions = [e for e in events if e["event"] == "decision"]
+        assert ["missing_taxels" in e["flags"] for e in decisions] == [flagged] * 2
+        assert decisions[0]["label"] == trial.labels["category"]
+        assert changed == []  # it came back before anyone asked
+
+
+def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
+    cody = skinfile.load(skinfile.shipped("cody"))
+    quiet = np.zeros((16, 24), dtype=np.uint16)
+    lost = Fault(bus=cody.buses[1].device, channel=1, address=0x2E, during=(0.1, 0.2))
+    heard = []
+    with fake_skin(cody, lambda t: quiet, faults=[lost]) as skin:
+        for frame in Loop(skin, lasts_s=0.5).frames():
+            heard += [chip_event(status, round(frame.t, 3)) for status in skin.changes()]
+    assert [(e["t"], e["state"], e["place"]) for e in heard] == [
+        (0.1, "down", "mux 0x70 channel 1 address 0x2e"),
+        (heard[1]["t"], "running", "mux 0x70 channel 1 address 0x2e"),
+    ]
+    assert heard[0]["error"].endswith(
+        "does not answer; check its power, wiring and address (EREMOTEIO)"
+    )
+    assert "error" not in heard[1]
+    assert 0.2 < heard[1]["t"] <= 0.3
+
+
+def test_a_chip_that_never_comes_back_stays_out_and_costs_nothing():
+    cody = skinfile.load(skinfile.shipped("cody"))
+    forever = Fault(bus=cody.buses[0].device, channel=0, address=0x2C)
+    outcome = run("", cody, [forever], seconds=1.5)
+    assert (outcome.missing, outcome.missed, outcome.escaped) == (12, 0, "")
+    assert math.isnan(outcome.recovery_s)

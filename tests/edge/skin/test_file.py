@@ -1,0 +1,192 @@
+"""skin.toml: what ships, what is refused and how it is said, and calibration written into it."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.skin import file as skinfile
+from edge.skin.calibration import calibration_text, dead_band, save_calibration, with_calibration
+from edge.skin.file import Calibration, Reading
+
+SMALL = """
+[skin]
+rows = 4
+cols = 6
+
+[signal]  # a comment that stays
+sign = -1
+
+[[bus]]
+device = 1
+kind = "ad7147"
+mux = 0x70
+block = [4, 3]
+chips = [
+  { channel = 0, address = 0x2C, first = [0, 0] },
+  { channel = 0, address = 0x2D, first = [0, 3] },
+]
+"""
+
+
+def test_cody_is_384_taxels_on_three_buses():
+    cody = skinfile.load(skinfile.shipped("cody"))
+    assert cody.layout.shape == (16, 24)
+    assert cody.layout.wraps
+    assert [len(bus.chips) for bus in cody.buses] == [12, 12, 8]
+    assert cody.uncovered == 0
+    assert {chip.kind for chip in cody.chips} == {"ad7147"}
+
+
+def test_the_mpr121_example_covers_its_pad():
+    pad = skinfile.load(skinfile.shipped("mpr121"))
+    assert (pad.layout.shape, pad.uncovered, len(pad.chips)) == ((8, 12), 0, 8)
+    assert {chip.sign for chip in pad.chips} == {-1}
+
+
+def test_first_and_block_number_the_stages_row_by_row():
+    chip = skinfile.parse(SMALL).buses[0].chips[1]
+    assert chip.taxels == (3, 4, 5, 9, 10, 11, 15, 16, 17, 21, 22, 23)
+    assert (chip.kind, chip.mux, chip.channel, chip.address) == ("ad7147", 0x70, 0, 0x2D)
+
+
+def test_taxels_name_each_stage_and_an_empty_one_is_none():
+    listed = ", ".join(f"[{i // 3}, {i % 3}]" for i in range(11)) + ", []"
+    text = SMALL.replace(
+        "{ channel = 0, address = 0x2C, first = [0, 0] }",
+        f"{{ channel = 0, address = 0x2C, taxels = [{listed}] }}",
+    )
+    file = skinfile.parse(text)
+    assert file.chips[0].taxels == (0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, skinfile.UNUSED)
+    assert file.uncovered == 1
+
+
+def test_what_is_not_said_has_a_default():
+    assert skinfile.parse(SMALL).reading == Reading()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("rows = 4", "rows = 0", "skin: 0 x 6 taxels"),
+        ("rows = 4", "", "skin.rows is missing"),
+        ("rows = 4", "rows = 4\nrwos = 3", "[skin] has an unknown key 'rwos'"),
+        ("sign = -1", "sign = 0", "[signal]: sign must be one of 1, -1, not 0"),
+        ("sign = -1", "dead = [[4, 0]]", "[signal]: dead names taxel [4, 0] outside of 4 x 6"),
+        ("sign = -1", "dead_band_sigma = -1", "dead_band_sigma must be a number of 0 to 100"),
+        ("sign = -1", "dead_band_sigma = nan", "dead_band_sigma must be a number of 0 to 100"),
+        ("[signal]", "[read]\nrate_hz = 0\n[signal]", "[read]: rate_hz must be a number of 0.1"),
+        ("[signal]", "[reed]\n[signal]", "unknown key 'reed'"),
+        ("device = 1", "", "bus 0: device must be a bus's number or its path"),
+        ("device = 1", "device = 1\nclock_hz = 1000000", "more than a TCA9548A carries, 400000"),
+        ('kind = "ad7147"', 'kind = "adxl"', "bus 0 chip 0: kind must be one of ad7147"),
+        ("mux = 0x70", "mux = 0x60", "bus 0 chip 0: mux must be 0x70 to 0x77, not 96"),
+        ("mux = 0x70", "", "bus 0 chip 0: channel needs mux"),
+        ("channel = 0, address = 0x2D", "channel = 8, address = 0x2D", "channel must be a whole"),
+        ("address = 0x2D", "address = 0x2C", "bus 0 chip 1 has the place of chip 0"),
+        ("address = 0x2D", "address = 0x5A", "bus 0 chip 1: address must be 0x2c to 0x2f, not 90"),
+        ("address = 0x2D, ", "", "bus 0 chip 1: address is missing"),
+        ("first = [0, 3]", "first = [0, 2]", "taxel [0, 2] is bus 0 chip 0's too"),
+        ("first = [0, 3]", "first = [0, 4]", "bus 0 chip 1: taxel [0, 6] lies outside of 4 x 6"),
+        ("first = [0, 3]", "first = 3", "bus 0 chip 1: first must be [row, col], not 3"),
+        ("block = [4, 3]", "block = [4, 2]", "names 8 taxels, an AD7147 has 12 stages"),
+        ("chips = [", "chip = [", "bus 0: chips are missing"),
+        ("[[bus]]", "[bus]", "no [[bus]] given"),
+        ("[skin]", "[skin", "not TOML"),
+    ],
+)
+def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, said):
+    assert old in SMALL
+    with pytest.raises(InputError) as caught:
+        skinfile.parse(SMALL.replace(old, new, 1), "my/skin.toml")
+    assert str(caught.value).startswith("my/skin.toml: ")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value).removeprefix("my/skin.toml: not TOML")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"skin.toml: cannot be read: No such file"):
+        skinfile.load(tmp_path / "skin.toml")
+
+
+def calibration(seed=0, taken=None):
+    draw = np.random.default_rng(seed)
+    return Calibration(
+        draw.integers(0, 65536, (4, 6)).astype(np.uint16),
+        np.round(draw.random((4, 6)) * 9, 3),
+        taken,
+    )
+
+
+def same(a, b):
+    return (
+        np.array_equal(a.baseline, b.baseline)
+        and np.array_equal(a.noise, b.noise)
+        and a.taken == b.taken
+    )
+
+
+@pytest.mark.parametrize("tail", ["", "\n[read]\nrate_hz = 50.0\n"])
+def test_a_calibration_is_written_replaced_and_read_back(tail):
+    first = calibration(1)
+    second = calibration(2, datetime(2026, 11, 21, 9, 0, 0, tzinfo=UTC))
+    once = with_calibration(SMALL + tail, first)
+    # As a user may move it: a calibration in the middle of the file.
+    middle = SMALL + calibration_text(first) + tail
+    for text in (once, middle):
+        assert same(skinfile.parse(text).calibration, first)
+        twice = with_calibration(text, second)
+        file = skinfile.parse(twice)
+        assert same(file.calibration, second)
+        assert twice.count("[calibration]") == 1
+        assert "# a comment that stays" in twice
+        assert file.buses == skinfile.parse(SMALL).buses
+        assert file.reading == skinfile.parse(SMALL + tail).reading
+
+
+def test_a_calibration_that_cannot_be_replaced_is_refused():
+    inline = "calibration.taken = 2026-01-01T00:00:00Z\n" + SMALL
+    with pytest.raises(InputError, match="calibration"):
+        with_calibration(inline, calibration())
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("baseline", "[[1, 2], [3, 4]]"),
+        ("baseline", "[" + "[0.5, 1, 1, 1, 1, 1]," * 4 + "]"),
+        ("baseline", "[" + "[-1, 1, 1, 1, 1, 1]," * 4 + "]"),
+        ("noise", "[" + "[nan, 1, 1, 1, 1, 1]," * 4 + "]"),
+    ],
+)
+def test_a_damaged_calibration_is_refused(key, value):
+    ones = "[" + "[1, 1, 1, 1, 1, 1]," * 4 + "]"
+    rows = {"baseline": ones, "noise": ones, key: value}
+    text = SMALL + "[calibration]\n" + "".join(f"{k} = {v}\n" for k, v in rows.items())
+    with pytest.raises(InputError, match=rf"\[calibration\]: {key}"):
+        skinfile.parse(text)
+
+
+def test_saving_a_calibration_keeps_the_old_file(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text(SMALL)
+    backup = save_calibration(path, calibration(3))
+    assert backup.read_text() == SMALL
+    assert same(skinfile.load(path).calibration, calibration(3))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["skin.toml", "skin.toml.bak"]
+
+
+def test_a_file_that_is_wrong_is_left_alone(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text(SMALL.replace("sign = -1", "sign = 2"))
+    with pytest.raises(InputError):
+        save_calibration(path, calibration())
+    assert [p.name for p in tmp_path.iterdir()] == ["skin.toml"]
+
+
+def test_the_dead_band_is_six_sigma_and_never_less_than_one_count():
+    file = skinfile.parse(SMALL + calibration_text(calibration(4)))
+    noise = file.calibration.noise.ravel()
+    expected = np.maximum(1, np.ceil(6 * noise)).astype(int)
+    assert dead_band(file).tolist() == expected.tolist()

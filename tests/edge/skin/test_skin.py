@@ -1,0 +1,260 @@
+"""The skin over the fake: frames put together from buses, chips and stages."""
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from edge.errors import EdgeError
+from edge.fake.clock import VirtualClock
+from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.skin import file as skinfile
+from edge.skin.buffers import SEQUENCE_FRAMES
+from edge.skin.file import BusSpec, Reading
+from edge.skin.skin import Skin
+
+CODY = skinfile.load(skinfile.shipped("cody"))
+PAD = skinfile.load(skinfile.shipped("mpr121"))
+PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
+
+
+def on_buses(n, *, kind="ad7147", verify=False, recheck=100_000):
+    """The 32 chips of Cody's skin shared out over n buses, as the notes count them."""
+    base = 0x5A if kind == "mpr121" else 0x2C
+    channels = [CODY.chips[4 * i : 4 * i + 4] for i in range(8)]
+    share = [channels[i::n] for i in range(n)]
+    buses = tuple(
+        BusSpec(
+            f"bus {b}",
+            tuple(
+                replace(chip, kind=kind, channel=c, address=base + a)
+                for c, chips in enumerate(part)
+                for a, chip in enumerate(chips)
+            ),
+        )
+        for b, part in enumerate(share)
+    )
+    reading = Reading(verify_mux=verify, recheck_frames=recheck)
+    return replace(CODY, buses=buses, reading=reading)
+
+
+@pytest.mark.parametrize(
+    ("kind", "buses", "hz_100", "hz_400"),
+    [
+        ("ad7147", 1, 12.0, 48.1),
+        ("ad7147", 2, 24.0, 96.2),
+        ("ad7147", 3, 32.1, 128.2),
+        ("ad7147", 4, 48.1, 192.3),
+        ("mpr121", 1, 12.5, 49.8),
+        ("mpr121", 2, 24.9, 99.6),
+        ("mpr121", 3, 33.2, 132.8),
+        ("mpr121", 4, 49.8, 199.2),
+    ],
+)
+def test_the_wire_carries_the_frame_rates_of_the_notes(kind, buses, hz_100, hz_400):
+    bits = frame_bits(on_buses(buses, kind=kind))
+    for clock_hz, hz in ((100_000, hz_100), (400_000, hz_400)):
+        rate = skinfile.frame_rate(bits, [clock_hz] * buses)
+        assert abs(rate - hz) <= 0.0501
+
+
+def test_one_bus_of_32_chips_takes_8320_bits_and_160_more_to_verify():
+    assert frame_bits(on_buses(1)) == [8320]
+    assert frame_bits(on_buses(1, verify=True)) == [8480]
+
+
+def test_all_checks_together_cost_at_most_3_percent_of_the_wire():
+    frames = 400
+    assert sum(frame_bits(CODY, frames)) / frames <= 1.03 * 8320
+    one = replace(on_buses(1, verify=True), reading=CODY.reading)
+    assert frame_bits(one, frames)[0] / frames <= 1.03 * 8320
+
+
+@pytest.mark.parametrize("file", [CODY, PAD], ids=["cody", "mpr121"])
+def test_every_taxel_is_where_the_file_says(file):
+    picture = PICTURE[: file.layout.rows, : file.layout.cols] % 400
+    floor = file.signal.dead_band_counts
+    with fake_skin(file, lambda t: picture) as skin:
+        frame = skin.read()
+    assert frame.valid.all()
+    np.testing.assert_array_equal(frame.counts, np.where(picture < max(floor, 1), 0, picture))
+
+
+def test_block_chips_of_each_width_serve_a_whole_skin():
+    for bits in (8, 12, 16):
+        chip = replace(
+            CODY.chips[0], kind="block", address=0x28, mux=None, channel=None, bits=bits,
+            taxels=tuple(range(384)),
+        )  # fmt: skip
+        file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
+        picture = PICTURE % 100
+        with fake_skin(file, lambda t, p=picture: p) as skin:
+            frame = skin.read()
+        np.testing.assert_array_equal(frame.counts, picture)
+        assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
+
+
+def test_a_microcontroller_that_hangs_is_told_by_its_sequence_number():
+    chip = replace(
+        CODY.chips[0], kind="block", address=0x28, mux=None, channel=None,
+        taxels=tuple(range(384)),
+    )  # fmt: skip
+    file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
+    with fake_skin(file, lambda t: PICTURE) as skin:
+        valid = []
+        for k in range(100):
+            if k < 50:
+                skin.clock.sleep_until(k * 0.01)  # then its time stands still
+            valid.append(bool(skin.read().valid.all()))
+    assert valid.index(False) == 49 + SEQUENCE_FRAMES
+    assert not any(valid[49 + SEQUENCE_FRAMES :])
+
+
+def test_chips_of_different_kinds_make_one_skin():
+    ad, mpr, mcu = CODY.chips[0], CODY.chips[1], CODY.chips[2:]
+    block = replace(
+        ad, kind="block", address=0x28, mux=None, channel=None,
+        taxels=tuple(t for chip in mcu for t in chip.taxels),
+    )  # fmt: skip
+    file = replace(
+        CODY,
+        buses=(
+            BusSpec("a", (ad, replace(mpr, kind="mpr121", address=0x5B))),
+            BusSpec("b", (block,)),
+        ),
+    )
+    picture = PICTURE % 400
+    with fake_skin(file, lambda t: picture) as skin:
+        np.testing.assert_array_equal(skin.read().counts, picture)
+
+
+def test_the_sign_is_turned_back():
+    file = replace(
+        CODY,
+        buses=tuple(
+            replace(b, chips=tuple(replace(c, sign=-1) for c in b.chips)) for b in CODY.buses
+        ),
+    )
+    with fake_skin(file, lambda t: PICTURE) as skin:
+        np.testing.assert_array_equal(skin.read().counts, PICTURE)
+        assert skin.raw()[0][3, 5] == 20946 - PICTURE[3, 5]
+
+
+def test_dead_and_uncovered_taxels_are_never_valid():
+    first = CODY.buses[0]
+    signal = replace(CODY.signal, dead=((2, 3),))
+    bare = replace(CODY, buses=(replace(first, chips=first.chips[:1]),), signal=signal)
+    with fake_skin(bare, lambda t: PICTURE) as skin:
+        frame = skin.read()
+    expected = np.zeros((16, 24), dtype=bool)
+    expected[:4, :3] = True
+    np.testing.assert_array_equal(frame.valid, expected)
+    assert (frame.counts[~expected] == 0).all()
+    assert np.isfinite(frame.times).all()
+    dead_inside = replace(bare, signal=replace(signal, dead=((1, 1),)))
+    with fake_skin(dead_inside, lambda t: PICTURE) as skin:
+        assert not skin.read().valid[1, 1]
+
+
+def test_each_bus_has_a_thread_of_its_own():
+    with still(CODY) as skin:
+        skin.clock.sleep_until(1.0)
+        for reader in skin.readers:
+            reader.bus.threads.clear()
+        for _ in range(5):
+            skin.read()
+        threads = [reader.bus.threads for reader in skin.readers]
+    assert [len(t) for t in threads] == [1, 1, 1]
+    assert len(set.union(*threads)) == 3
+    assert threading.get_ident() in threads[0]
+
+
+def test_a_frame_is_a_rolling_shutter_and_says_so():
+    """On one bus at 400 kHz the last chip is read 20 ms after the first, in wire order."""
+    file = on_buses(1)
+    with fake_skin(file, lambda t: PICTURE, timed=True) as skin:
+        frame = skin.read()
+        again = skin.read()
+    times = np.array([frame.times.reshape(-1)[chip.taxels[0]] for chip in file.chips])
+    assert (np.diff(times) > 0).all()
+    assert times[0] - frame.t == pytest.approx((20 + 255) / 400e3)
+    assert times[-1] - times[0] == pytest.approx((31 * 255 + 7 * 20) / 400e3)
+    assert again.t - frame.t == pytest.approx(8320 / 400e3)
+    assert len(np.unique(frame.times)) == 32
+
+
+def test_buses_are_read_side_by_side():
+    with fake_skin(replace(CODY, reading=Reading(verify_mux=False)), lambda t: PICTURE,
+                   timed=True) as skin:  # fmt: skip
+        began = skin.clock.now()
+        skin.read()
+        assert skin.clock.now() - began == pytest.approx(3120 / 400e3)
+
+
+def test_the_baseline_follows_drift_until_something_touches():
+    """15 counts a second of drift, then a contact on top of it, held for two seconds."""
+    contact = np.zeros((16, 24), dtype=np.uint16)
+    contact[4:8, 5:9] = 3000
+
+    def scene(t):
+        drift = np.uint16(15.0 * t)
+        return drift + (contact if 4.0 <= t < 6.0 else np.uint16(0) * contact)
+
+    with fake_skin(CODY, scene) as skin:
+        quiet, held = [], []
+        for i in range(650):
+            skin.clock.sleep_until(i * 0.01)
+            frame = skin.read()
+            if 4.0 <= frame.t < 6.0:
+                held.append(int(frame.counts[5, 6]))
+            elif frame.t < 4.0:
+                quiet.append(int(frame.counts.max()))
+    assert max(quiet) <= 4
+    # Frozen: what drifts meanwhile adds to the contact, and nothing of the contact is lost.
+    assert held[0] in range(2999, 3005)
+    assert held[-1] - held[0] in range(28, 32)
+
+
+def test_drift_is_not_followed_beyond_its_limit():
+    signal = replace(CODY.signal, drift_limit_counts=10, drift_counts_per_s=1000.0)
+    file = replace(CODY, signal=signal)
+    level = np.full((16, 24), 30, dtype=np.uint16)
+    with fake_skin(file, lambda t: level) as skin:
+        for i in range(300):
+            skin.clock.sleep_until(i * 0.01)
+            frame = skin.read()
+    assert (frame.counts == 20).all()
+
+
+def test_a_skin_without_a_single_chip_says_so():
+    file = calibrated(PAD)
+    clock = VirtualClock()
+    from edge.fake.bus import FakeBus
+
+    skin = Skin(file, [FakeBus("fake", clock=clock)], clock=clock)
+    with skin, pytest.raises(EdgeError, match="no chip of the skin 'mpr121 pad' answers: fake"):
+        skin.start()
+
+
+def test_closing_twice_is_fine_and_ends_the_threads():
+    before = threading.active_count()
+    skin = still(CODY)
+    skin.read()
+    assert threading.active_count() == before + 2
+    skin.close()
+    skin.close()
+    assert threading.active_count() == before
+
+
+def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
+    noise = np.full((16, 24), 4.0)
+    file = calibrated(CODY)
+    file = replace(file, calibration=replace(file.calibration, noise=noise))
+    quiet = np.zeros((16, 24), dtype=np.uint16)
+    with fake_skin(file, lambda t: quiet, noise_counts=4.0, seed=1) as skin:
+        for _ in range(150):
+            assert skin.read().valid.all()
+    with fake_skin(file, lambda t: quiet) as skin:
+        valid = [bool(skin.read().valid.all()) for _ in range(150)]
+    assert valid.index(False) == file.reading.stuck_frames

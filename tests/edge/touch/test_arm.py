@@ -1,0 +1,158 @@
+"""Kinematics against yourdfpy, and against angles that turn exactly."""
+
+import math
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.touch.arm import Chain, Joint
+
+URDF = """<robot name="arm">
+  <link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+  <link name="hand"/><link name="elsewhere"/>
+  <joint name="pan" type="revolute"><parent link="base"/><child link="a"/>
+    <origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 0.6"/><axis xyz="0 0.6 0.8"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="bracket" type="fixed"><parent link="a"/><child link="b"/>
+    <origin xyz="0 0 0.25" rpy="0 1.5707963267948966 0"/></joint>
+  <joint name="slide" type="prismatic"><parent link="b"/><child link="c"/>
+    <origin xyz="0.05 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>
+  <joint name="roll" type="continuous"><parent link="c"/><child link="d"/>
+    <origin rpy="0 0 1"/></joint>
+  <joint name="tool" type="fixed"><parent link="d"/><child link="hand"/>
+    <origin xyz="0 0.02 0.01" rpy="3 2 1"/></joint>
+</robot>"""
+
+
+@pytest.fixture
+def urdf(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF)
+    return path
+
+
+def test_a_urdf_chain_agrees_with_yourdfpy(urdf):
+    chain = Chain.from_urdf(urdf, "base", "hand")
+    assert chain.names == ("pan", "slide", "roll")
+    assert chain.limits == ((-2.0, 2.0), (0.0, 0.5), None)
+    yourdfpy = pytest.importorskip("yourdfpy", reason="a workstation's package")
+    robot = yourdfpy.URDF.load(str(urdf), build_scene_graph=True, load_meshes=False)
+    rng = np.random.default_rng(0)
+    for q in rng.uniform(-3, 3, (50, 3)):
+        robot.update_cfg(dict(zip(chain.names, q, strict=True)))
+        expected = robot.get_transform("hand", "base")
+        assert np.abs(chain.pose(q) - expected).max() < 1e-14
+
+
+def test_a_part_of_a_urdf_chain(urdf):
+    assert Chain.from_urdf(urdf, "a", "c").names == ("slide",)
+
+
+def test_cody_at_zero_and_with_a_bent_elbow():
+    chain = Chain.cody()
+    assert chain.pose([0] * 5)[:3, 3] == pytest.approx([0.00635, -0.21668, -0.55648], abs=1e-15)
+    bent = chain.pose([0, 0, 0, math.pi / 2, 0])[:3, 3]
+    # The elbow is at z = -0.27795; turned about -y, the forearm points forward.
+    assert bent == pytest.approx([0.00635 + 0.27853, -0.21668, -0.27795], abs=1e-15)
+
+
+def test_many_poses_at_once_are_the_single_ones():
+    chain = Chain.cody()
+    q = np.random.default_rng(1).uniform(-2, 2, (7, 3, 5))
+    poses = chain.pose(q)
+    assert poses.shape == (7, 3, 4, 4)
+    for i in np.ndindex(7, 3):
+        assert np.abs(poses[i] - chain.pose(q[i])).max() < 1e-15
+
+
+def test_a_chain_survives_json_and_toml(tmp_path, urdf):
+    for chain in (Chain.cody(), Chain.from_urdf(urdf, "base", "hand")):
+        again = Chain.from_dict(chain.to_dict())
+        q = np.linspace(-1, 1, chain.dof)
+        assert (again.pose(q) == chain.pose(q)).all()
+        assert again.names == chain.names
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-300, 0.5 * math.pi, 1e6 * math.pi + 0.25])
+def test_rotations_stay_orthonormal_and_keep_small_angles(angle):
+    chain = Chain([Joint("j", (1.0, 2.0, -2.0))])
+    turn = chain.pose([angle])[:3, :3]
+    assert np.abs(turn @ turn.T - np.eye(3)).max() < 5e-16
+    if angle < 1e-3:
+        assert turn[2, 1] == pytest.approx(angle / 3, rel=1e-15)
+
+
+def test_an_angle_and_a_full_turn_more_give_the_same_pose():
+    chain = Chain.cody()
+    q = np.array([0.3, -0.2, 0.5, 1.0, 0.1])
+    assert np.abs(chain.pose(q + 2 * math.pi) - chain.pose(q)).max() < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("q", "word"),
+    [
+        ([0, 0], "5 joint angles .* not 2"),
+        ([], "not 0"),
+        (1.0, "not a single number"),
+        ([0, 0, math.nan, 0, 0], "upper_arm_roll is not finite"),
+        ([0, 0, 0, 0, math.inf], "forearm_roll is not finite"),
+        (["a"] * 5, "must be numbers"),
+        ([None] * 5, "not finite|must be numbers"),
+    ],
+)
+def test_missing_extra_and_non_finite_angles_are_named(q, word):
+    with pytest.raises(InputError, match=word):
+        Chain.cody().pose(q)
+
+
+def test_what_a_urdf_lacks_is_named(urdf, tmp_path):
+    with pytest.raises(InputError, match="no link 'foot'; it has base, a"):
+        Chain.from_urdf(urdf, "base", "foot")
+    with pytest.raises(InputError, match="no chain of joints leads from 'hand' to 'base'"):
+        Chain.from_urdf(urdf, "hand", "base")
+    with pytest.raises(InputError, match="no chain"):
+        Chain.from_urdf(urdf, "base", "elsewhere")
+    with pytest.raises(InputError, match="cannot be read"):
+        Chain.from_urdf(tmp_path / "none.urdf", "base", "hand")
+    other = tmp_path / "other.xml"
+    other.write_text("<sdf/>")
+    with pytest.raises(InputError, match="not <robot>"):
+        Chain.from_urdf(other, "base", "hand")
+    other.write_text("<robot")
+    with pytest.raises(InputError, match="not a URDF file"):
+        Chain.from_urdf(other, "base", "hand")
+
+
+def test_a_urdf_whose_links_go_round_in_a_loop_ends(tmp_path):
+    path = tmp_path / "loop.urdf"
+    path.write_text(
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
+        '<joint name="x" type="fixed"><parent link="a"/><child link="b"/></joint>'
+        '<joint name="y" type="fixed"><parent link="b"/><child link="a"/></joint></robot>'
+    )
+    with pytest.raises(InputError, match="no chain"):
+        Chain.from_urdf(path, "c", "b")
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("x = ", "not TOML"),
+        ("", r"no \[\[joint\]\]"),
+        ("speed = 1\n[[joint]]\naxis = [0, 0, 1]", "unknown key 'speed'"),
+        ("[[joint]]\nname = 'j'", "axis is missing"),
+        ("[[joint]]\naxis = [0, 0]", "three numbers"),
+        ("[[joint]]\naxis = [0, 0, 0]", "axis is zero"),
+        ("[[joint]]\naxis = [0, 0, inf]", "not finite"),
+        ("[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]", "turned round"),
+        ("[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'", "'ball' is not one of"),
+        ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "unknown key 'offset'; allowed: name"),
+    ],
+)
+def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=word):
+        Chain.from_toml(path)

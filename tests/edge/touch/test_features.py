@@ -1,0 +1,104 @@
+"""Sampling uniform in time, whatever the frames' times were."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from edge.touch.features import feature_vector
+from edge.touch.track import FeatureSeries
+
+
+def series(t, peak, area=None, motion=None, scale=None, ended=False):
+    n = len(t)
+    return FeatureSeries(
+        t=np.array(t, dtype=float),
+        peak=np.array(peak, dtype=np.int64),
+        area=np.array(area if area is not None else [1] * n, dtype=np.int64),
+        sums=np.zeros((n, 2), dtype=np.int64),
+        motion=np.array(motion if motion is not None else [0.0] * n),
+        counts_per_newton=scale,
+        ended=ended,
+    )
+
+
+def test_forty_samples_of_each_feature_from_onset_to_the_end_of_the_window():
+    t = np.linspace(0, 2, 201)
+    vector = feature_vector(series(t, 1000 * t, 10 * t, 0.1 * t, scale=500.0), 1.2)
+    times = np.linspace(0, 1.2, 40)
+    assert vector.shape == (120,)
+    assert vector.dtype == np.float64
+    force = np.floor(1000 * t) / 500.0
+    assert vector[:40] == pytest.approx(np.interp(times, t, force), abs=1e-15)
+    assert vector[40:80] == pytest.approx(np.interp(times, t, np.floor(10 * t)), abs=1e-13)
+    assert vector[80:] == pytest.approx(0.1 * times, abs=1e-16)
+
+
+def test_dropped_frames_and_jitter_do_not_shift_the_samples():
+    """On a straight line any choice of frames gives the same samples."""
+    rng = np.random.default_rng(0)
+    even = np.arange(0, 130) / 100
+    kept = np.sort(rng.choice(even[1:-1], 70, replace=False))
+    jittered = np.concatenate([[0.0], kept, [1.29]])
+    full = feature_vector(series(even, 0 * even, motion=0.3 * even), 1.2)
+    fewer = feature_vector(series(jittered, 0 * jittered, motion=0.3 * jittered), 1.2)
+    assert np.abs(full - fewer).max() < 1e-16
+
+
+def test_a_stream_that_ends_inside_the_window_holds_its_last_values():
+    vector = feature_vector(series([0.0, 0.3], [10, 20], [3, 4], [0.0, 0.5]), 1.2)
+    assert vector[10:40].tolist() == [20.0] * 30
+    assert vector[50:80].tolist() == [4.0] * 30
+    assert vector[90:].tolist() == [0.5] * 30
+
+
+def test_one_frame_holds_for_the_whole_window():
+    assert feature_vector(series([0.0], [10]), 1.2)[:40].tolist() == [10.0] * 40
+
+
+def test_motion_is_interpolated_over_frames_without_a_pose():
+    motion = [0.0, np.nan, 0.2, np.nan]
+    vector = feature_vector(series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion), 1.2, samples=4)
+    assert vector[8:] == pytest.approx([0.0, 0.1, 0.2, 0.2])
+    none = feature_vector(series([0.0, 1.2], [1, 1], motion=[np.nan] * 2), 1.2, samples=4)
+    assert none[8:].tolist() == [0.0] * 4
+
+
+@given(
+    steps=st.lists(st.floats(1e-300, 1.0), min_size=1, max_size=30),
+    seed=st.integers(0, 1000),
+)
+def test_samples_agree_with_exact_interpolation_and_never_overshoot(steps, seed):
+    t = np.cumsum([0.0, *steps])
+    t = np.unique(t)
+    rng = np.random.default_rng(seed)
+    peak = rng.integers(0, 65536, len(t))
+    vector = feature_vector(series(t, peak), 1.2)[:40]
+    times = np.arange(40) * (1.2 / 39)
+    for sample, time in zip(vector, times, strict=True):
+        if time >= t[-1]:
+            assert sample == peak[-1]
+            continue
+        i = int(np.searchsorted(t, time, side="right")) - 1
+        t0, t1 = Fraction(t[i]), Fraction(t[i + 1])
+        exact = peak[i] + (Fraction(time) - t0) / (t1 - t0) * int(peak[i + 1] - peak[i])
+        # A subtraction of times loses up to half an ulp of each, a share of the step.
+        lost = 4 * np.finfo(float).eps * (1 + t[i + 1] / (t[i + 1] - t[i]))
+        assert abs(Fraction(float(sample)) - exact) <= 65536 * lost
+        assert min(peak[i], peak[i + 1]) <= sample <= max(peak[i], peak[i + 1])
+
+
+@pytest.mark.parametrize("window", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_window_that_makes_no_sense_is_refused(window):
+    with pytest.raises(InputError, match="window"):
+        feature_vector(series([0.0], [1]), window)
+
+
+def test_too_few_samples_and_an_empty_series_are_refused():
+    with pytest.raises(InputError, match="at least 2 samples"):
+        feature_vector(series([0.0], [1]), 1.2, samples=1)
+    with pytest.raises(InputError, match="no frame"):
+        feature_vector(series([], []), 1.2)

@@ -1,0 +1,355 @@
+"""Feature types by name: whole numbers against sums in plain Python, values against fractions."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import edge.touch.measures
+from edge.errors import InputError
+from edge.touch.arm import Chain
+from edge.touch.features import FEATURES, feature_vector
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import PLACES, QUANTITIES, Measurer, feature, features, names
+from edge.touch.region import find_regions, largest_region
+from edge.touch.track import Tracker
+
+FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
+ROUND = replace(FLAT, wraps=True)
+ALL = names()
+
+
+def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[int]:
+    """What `edge.touch.measures` promises for a place, by plain sums; the best of all cuts of a turn."""
+    candidates = []
+    for cut in range(turn or 1):
+        moved = {(r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()}
+        force = sum(moved.values())
+        cols = sum(f * c for (_, c), f in moved.items())
+        cols_cols = sum(f * c * c for (_, c), f in moved.items())
+        candidates.append(
+            (
+                force * cols_cols - cols * cols,
+                cut,
+                [
+                    max(moved.values(), default=0),
+                    len(moved),
+                    force,
+                    sum(f * r for (r, _), f in moved.items()),
+                    cols,
+                    sum(f * r * r for (r, _), f in moved.items()),
+                    sum(f * r * c for (r, c), f in moved.items()),
+                    cols_cols,
+                ],
+            )
+        )
+    return min(candidates)[2]
+
+
+def taxels_of(counts, mask) -> dict[tuple[int, int], int]:
+    return {(int(r), int(c)): int(counts[r, c]) for r, c in np.argwhere(mask)}
+
+
+def expected(layout: SkinLayout, frame: Frame) -> dict[str, list[int]]:
+    counts = frame.counts
+    active = (counts > layout.threshold_counts) & (True if frame.valid is None else frame.valid)
+    regions = find_regions(
+        counts, layout.threshold_counts, valid=frame.valid, wraps=layout.wraps, connectivity=4
+    )
+    empty = np.zeros(layout.shape, dtype=bool)
+    left = empty.copy()
+    left[:, : layout.cols // 2] = True
+    turn = layout.cols if layout.wraps else None
+    return {
+        "contact": weighted_sums(taxels_of(counts, regions[0].mask), turn),
+        "second": weighted_sums(taxels_of(counts, regions[1].mask if regions[1:] else empty), turn),
+        "skin": weighted_sums(taxels_of(counts, active), turn),
+        "left": weighted_sums(taxels_of(counts, active & left), None),
+        "right": weighted_sums(taxels_of(counts, active & ~left), None),
+    }
+
+
+def frame_of(seed: int, shape, density=0.4, high=65535) -> Frame:
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(0, high, shape, endpoint=True) * (rng.random(shape) < density)
+    return Frame(0.0, counts.astype(np.uint16), valid=rng.random(shape) < 0.9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 1 << 32),
+    density=st.sampled_from([0.05, 0.3, 0.6, 1.0]),
+    high=st.sampled_from([12, 500, 65535]),
+    wraps=st.booleans(),
+    shape=st.sampled_from([(5, 7), (1, 1), (1, 6), (6, 1), (16, 24)]),
+)
+def test_whole_numbers_of_every_place_are_those_of_plain_sums(seed, density, high, wraps, shape):
+    layout = SkinLayout(*shape, wraps=wraps, threshold_counts=10)
+    frame = frame_of(seed, shape, density, high)
+    contact = largest_region(
+        frame.counts, layout.threshold_counts, valid=frame.valid, wraps=wraps, connectivity=4
+    )
+    measurer = Measurer(layout, ALL)
+    assert measurer.places == PLACES
+    row = measurer.measure(frame, contact)
+    if contact is None:
+        assert row == [0] * 41
+        return
+    seen = {place: row[8 * i : 8 * i + 8] for i, place in enumerate(PLACES)}
+    assert seen == expected(layout, frame)
+    regions = find_regions(frame.counts, 10, valid=frame.valid, wraps=wraps, connectivity=4)
+    assert row[-1] == len(regions)
+
+
+@pytest.mark.parametrize("wraps", [False, True])
+def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
+    rows, cols = 1024, 1024
+    layout = SkinLayout(rows, cols, wraps=wraps)
+    frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
+    row = Measurer(layout, ["skin_length"]).measure(frame, largest_region(frame.counts, 0))
+    line = sum(range(cols))
+    squares = sum(c * c for c in range(cols))
+    assert row[2:] == [
+        65535 * v
+        for v in (
+            rows * cols,
+            rows * line,
+            rows * line,
+            rows * squares,
+            line * line,
+            rows * squares,
+        )
+    ]
+    tracker = Tracker(layout, features=["skin_spread_along", "skin_slant"])
+    tracker.push(frame)
+    contact = tracker.push(replace(frame, t=1.0))
+    vector = feature_vector(contact.series(), 1.0, 2, ["skin_spread_along", "skin_slant"])
+    assert vector[0] == pytest.approx(np.sqrt((rows**2 - 1) / 12), rel=1e-15)
+    assert vector[2] == 0.0
+
+
+def series_of(layout: SkinLayout, frames: list[Frame], wanted, chain=None):
+    tracker = Tracker(layout, features=wanted, chain=chain)
+    contact = None
+    for frame in frames:
+        contact = tracker.push(frame) or contact
+    return contact.series()
+
+
+def value(layout: SkinLayout, counts, name: str) -> float:
+    """A feature of a contact whose frames are all the same."""
+    frames = [Frame(t, np.asarray(counts, dtype=np.uint16)) for t in (0.0, 0.5, 1.0)]
+    vector = feature_vector(series_of(layout, frames, [name]), 1.0, 3, [name])
+    assert len(set(vector)) == 1
+    return vector[0]
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 1 << 32), density=st.sampled_from([0.1, 0.5, 1.0]))
+def test_moments_are_those_of_exact_arithmetic(seed, density):
+    counts = frame_of(seed, FLAT.shape, density).counts.astype(int)
+    counts[2, 3] = 40000
+    taxels = taxels_of(counts, counts > 10)
+    force = sum(taxels.values())
+
+    def mean(of) -> Fraction:
+        return Fraction(sum(f * of(r, c) for (r, c), f in taxels.items()), force)
+
+    row, col = mean(lambda r, c: r), mean(lambda r, c: c)
+    rr, cc = mean(lambda r, c: (r - row) ** 2), mean(lambda r, c: (c - col) ** 2)
+    rc = mean(lambda r, c: (r - row) * (c - col))
+    with mpmath.workdps(60):
+        a, b, m = (mpmath.mpf(x.numerator) / x.denominator for x in (rr, cc, rc))
+        root = mpmath.sqrt((a - b) ** 2 + 4 * m * m)
+        # Of taxels in a line the difference is 0 but for its sixtieth digit.
+        longer, shorter = (mpmath.sqrt(max(v, 0) / 2) for v in (a + b + root, a + b - root))
+    exact = {
+        "force": Fraction(force, 100),
+        "along": row,
+        "around": col,
+        "slant": rc,
+        "spread_along": mpmath.sqrt(a),
+        "spread_around": mpmath.sqrt(b),
+        "length": longer,
+    }
+    for quantity, truth in exact.items():
+        assert value(FLAT, counts, f"skin_{quantity}") == pytest.approx(
+            float(truth), rel=4e-15, abs=1e-14
+        )
+    # The determinant of a thin contact cancels: see edge.touch.features._Place.width.
+    assert value(FLAT, counts, "skin_width") == pytest.approx(float(shorter), abs=7 * 2.0**-25)
+
+
+def test_a_perfect_line_has_no_width():
+    for line in (np.eye(5, 7), np.eye(5, 7)[::-1], np.ones((1, 7)), np.ones((5, 1))):
+        counts = np.zeros((5, 7))
+        counts[: line.shape[0], : line.shape[1]] = 77 * line
+        assert value(FLAT, counts, "skin_width") == 0.0
+    assert value(FLAT, 99 * np.eye(5, 7), "skin_length") == pytest.approx(2.0)
+
+
+def test_a_slant_has_the_sign_of_its_direction():
+    falling = np.where(np.eye(5, 7) > 0, 50, 0)
+    assert value(FLAT, falling, "skin_slant") == pytest.approx(2.0)
+    assert value(FLAT, falling[::-1], "skin_slant") == pytest.approx(-2.0)
+
+
+def test_places_on_a_seam_are_measured_on_the_circle():
+    counts = np.zeros((5, 7), dtype=int)
+    counts[2, [6, 0]] = 50
+    assert value(ROUND, counts, "contact_around") == pytest.approx(6.5)
+    assert value(ROUND, counts, "contact_spread_around") == pytest.approx(0.5)
+    assert value(FLAT, counts, "skin_spread_around") == pytest.approx(3.0)
+
+
+def test_a_contact_is_followed_across_the_seam_and_does_not_jump():
+    frames = []
+    for i in range(5):
+        counts = np.zeros((5, 7), dtype=np.uint16)
+        counts[2, (5 + i) % 7] = 50
+        frames.append(Frame(i / 4, counts))
+    vector = feature_vector(
+        series_of(ROUND, frames, ["contact_around"]), 1.0, 5, ["contact_around"]
+    )
+    assert vector.tolist() == [5.0, 6.0, 7.0, 8.0, 9.0]
+
+
+def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
+    """The right half is touched from the third of five frames on, and the contact ends."""
+    frames = []
+    for i, right in enumerate([0, 0, 40, 80, 0, 0, 0, 0, 0, 0]):
+        counts = np.zeros((5, 7), dtype=np.uint16)
+        counts[1, 1] = 60 if i < 4 else 0
+        counts[i % 4, 5] = right
+        frames.append(Frame(i / 4, counts))
+    wanted = ["right_along", "right_force", "second_area"]
+    vector = feature_vector(series_of(FLAT, frames, wanted), 1.25, 6, wanted).reshape(3, 6)
+    assert vector[0].tolist() == [2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
+    assert vector[1].tolist() == [0.0, 0.0, 0.4, 0.8, 0.0, 0.0]
+    assert vector[2].tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
+    never = feature_vector(series_of(FLAT, frames[:2], wanted), 1.0, 2, ["right_along"])
+    assert never.tolist() == [0.0, 0.0]
+
+
+def test_a_rate_is_the_change_a_second_of_the_sampled_values():
+    frames = []
+    for i in range(11):
+        counts = np.zeros((5, 7), dtype=np.uint16)
+        counts[1, 1] = 100 + 20 * i
+        frames.append(Frame(i / 10, counts))
+    wanted = ["max_force", "max_force_rate", "regions", "regions_rate"]
+    vector = feature_vector(series_of(FLAT, frames, wanted), 1.0, 5, wanted).reshape(4, 5)
+    assert vector[0] == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0])
+    assert vector[1] == pytest.approx([2.0] * 5)
+    assert vector[2].tolist() == [1.0] * 5
+    assert vector[3].tolist() == [0.0] * 5
+
+
+def test_force_motion_follows_the_force_where_the_area_stays():
+    layout = replace(FLAT, pitch_m=0.01)
+    frames = []
+    for t, forces in ((0.0, (50, 50)), (0.5, (50, 150)), (1.0, (50, 50))):
+        counts = np.zeros((5, 7), dtype=np.uint16)
+        counts[1, 1:3] = forces
+        frames.append(Frame(t, counts))
+    wanted = ["contact_motion", "force_motion"]
+    vector = feature_vector(series_of(layout, frames, wanted), 1.0, 3, wanted)
+    assert vector == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0025, 0.0], abs=1e-17)
+
+
+def test_force_motion_without_a_pose_is_flagged_and_interpolated():
+    chain = Chain.cody()
+    joints = np.array([0.2, 0.1, 0.0, 1.2, 0.0])
+    layout = replace(ROUND, pitch_m=0.01, radius_m=0.05)
+    counts = np.zeros((5, 7), dtype=np.uint16)
+    counts[1, 1] = 50
+    tracker = Tracker(layout, features=["force_motion"], chain=chain)
+    for t, known in ((0.0, joints), (0.5, None), (1.0, joints)):
+        contact = tracker.push(Frame(t, counts, joints=known))
+    assert contact.missing_pose
+    assert np.isnan(contact.series().force_motion).tolist() == [False, True, False]
+    assert feature_vector(contact.series(), 1.0, 3, ["force_motion"]).tolist() == [0.0] * 3
+
+
+def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
+    first, second = np.zeros((2, 5, 7), dtype=np.uint16)
+    first[1, 1], second[1, 1:3] = 50, 70
+    frames = [Frame(0.0, first), Frame(0.1, first), Frame(0.1, second)]
+    wanted = [*ALL[:3], "skin_force", "force_motion", "regions"]
+    series = series_of(FLAT, frames, wanted)
+    assert series.integers.shape == (2, 4 + 8 * 2 + 1)
+    assert series.places["skin"][:, 2].tolist() == [50, 140]
+    assert series.force_motion.shape == series.motion.shape == (2,)
+
+
+def refuse(*_, **__):
+    raise AssertionError("measured, though no feature called for it")
+
+
+def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
+    counts = np.zeros((5, 7), dtype=np.uint16)
+    counts[1, 1] = 50
+    frames = [Frame(t, counts, joints=np.zeros(5)) for t in (0.0, 0.5)]
+    monkeypatch.setattr(edge.touch.measures, "find_regions", refuse)
+    series_of(FLAT, frames, ["skin_force", "left_length"])
+    monkeypatch.setattr(Chain, "pose", refuse)
+    series = series_of(FLAT, frames, ["skin_force"], chain=Chain.cody())
+    assert list(series.places) == ["skin"]
+    monkeypatch.setattr(Measurer, "_moments", refuse)
+    series_of(FLAT, frames, ["right_max_force", "left_area"])
+    monkeypatch.setattr(Measurer, "measure", refuse)
+    series = series_of(FLAT, frames, ["max_force", "contact_area", "contact_motion"])
+    assert series.places == {}
+    with pytest.raises(AssertionError, match="no feature called"):
+        series_of(FLAT, frames, ["skin_force"])
+
+
+def test_the_papers_three_are_the_default_and_come_first():
+    assert FEATURES == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
+    assert len(ALL) == len(set(ALL)) == len(PLACES) * len(QUANTITIES) + 3
+    assert [feature(name).name for name in ALL] == ALL
+
+
+def test_units_are_those_of_the_skin():
+    metric = replace(FLAT, pitch_m=0.01)
+    units = {
+        "max_force": "newton",
+        "left_force_rate": "newton/s",
+        "second_area": "taxel",
+        "skin_slant": "taxel^2",
+        "regions": "region",
+        "force_motion": "metre",
+    }
+    assert {name: feature(name).unit(metric) for name in units} == units
+    assert feature("skin_force").unit(replace(metric, counts_per_newton=None)) == "count"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "sentence"),
+    [
+        (["skin_forse"], "no feature 'skin_forse'; the nearest are skin_force"),
+        (["contact_max_force"], "no feature 'contact_max_force'"),
+        (["max_force_rate_rate"], "no feature"),
+        ([""], "no feature ''"),
+        ([], "no feature named"),
+        (["max_force", "regions", "max_force"], "max_force is named twice"),
+    ],
+)
+def test_a_wrong_name_is_one_sentence(wanted, sentence):
+    with pytest.raises(InputError, match=sentence) as caught:
+        features(tuple(wanted))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_feature_that_was_not_measured_is_one_sentence():
+    counts = np.zeros((5, 7), dtype=np.uint16)
+    counts[1, 1] = 50
+    series = series_of(FLAT, [Frame(t, counts) for t in (0.0, 0.5)], ["max_force"])
+    for name in ("skin_force", "regions", "force_motion"):
+        with pytest.raises(InputError, match=f"{name} was not measured"):
+            feature_vector(series, 1.0, 2, [name])

@@ -1,0 +1,229 @@
+"""Regions against scipy.ndimage.label, with the seam joined by hand where the skin wraps."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import scipy.ndimage
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from edge.errors import InputError
+from edge.touch.region import find_regions, largest_region
+
+CROSS = scipy.ndimage.generate_binary_structure(2, 1)
+SQUARE = scipy.ndimage.generate_binary_structure(2, 2)
+
+
+def frame(*taxels: tuple[int, int], shape=(16, 24), value=100) -> np.ndarray:
+    out = np.zeros(shape, dtype=np.uint16)
+    for row, col in taxels:
+        out[row, col] = value
+    return out
+
+
+def reference_masks(active: np.ndarray, wraps: bool, connectivity: int) -> list[np.ndarray]:
+    """scipy's components; where the skin wraps, those that meet across the seam are joined."""
+    structure = CROSS if connectivity == 4 else SQUARE
+    if not wraps:
+        labels, n = scipy.ndimage.label(active, structure)
+        return [labels == i + 1 for i in range(n)]
+    cols = active.shape[1]
+    labels, n = scipy.ndimage.label(np.hstack([active, active]), structure)
+    masks: list[np.ndarray] = []
+    for i in range(n):
+        mask = (labels[:, :cols] == i + 1) | (labels[:, cols:] == i + 1)
+        overlapping = [m for m in masks if (m & mask).any()]
+        masks = [m for m in masks if not (m & mask).any()]
+        masks.append(np.logical_or.reduce([mask, *overlapping]))
+    return masks
+
+
+def spiral(rows: int, cols: int) -> np.ndarray:
+    """A path one taxel wide that winds inwards with one taxel between its turns."""
+    out = np.zeros((rows, cols), dtype=np.uint16)
+    inside = np.pad(out, 2).astype(bool)
+    y, x, dy, dx = 2, 2, 0, 1
+    inside[y, x] = True
+    turned = False
+    while True:
+        ahead, beyond = (y + dy, x + dx), (y + 2 * dy, x + 2 * dx)
+        free = 2 <= ahead[0] < rows + 2 and 2 <= ahead[1] < cols + 2 and not inside[ahead]
+        if free and not inside[beyond]:
+            y, x = ahead
+            inside[y, x] = True
+            turned = False
+        elif turned:
+            return inside[2:-2, 2:-2].astype(np.uint16) * 100
+        else:
+            dy, dx, turned = dx, -dy, True
+
+
+def serpentine(rows: int, cols: int) -> np.ndarray:
+    out = np.zeros((rows, cols), dtype=np.uint16)
+    out[::2] = 100
+    out[1::4, -1] = 100
+    out[3::4, 0] = 100
+    return out
+
+
+SHAPES = {
+    "checkerboard": (np.indices((16, 24)).sum(0) % 2 * 100).astype(np.uint16),
+    "spiral": spiral(16, 24),
+    "serpentine": serpentine(16, 24),
+    "upright serpentine": np.ascontiguousarray(serpentine(24, 16).T),
+    "full": np.full((16, 24), 65535, dtype=np.uint16),
+    "empty": np.zeros((16, 24), dtype=np.uint16),
+    "seam": frame((3, 23), (3, 0), (4, 23), (4, 22), (9, 0)),
+    "ring": frame(*[(5, col) for col in range(24)]),
+    "dominoes": np.tile(np.array([[100, 100, 0], [0, 0, 0]], dtype=np.uint16), (8, 8)),
+}
+
+
+def check_against_reference(counts, threshold, valid, wraps, connectivity):
+    active = counts > threshold
+    if valid is not None:
+        active &= valid
+    expected = reference_masks(active, wraps, connectivity)
+    found = find_regions(counts, threshold, valid=valid, wraps=wraps, connectivity=connectivity)
+    assert {r.mask.tobytes() for r in found} == {m.tobytes() for m in expected}
+    assert len(found) == len(expected)
+    for region in found:
+        assert region.area == int(region.mask.sum())
+        assert region.peak == int(counts[region.mask].max())
+        assert region.index == int(np.flatnonzero(region.mask.ravel())[0])
+        assert region.sums[0] == int(np.nonzero(region.mask)[0].sum())
+    keys = [(-r.area, -r.peak, r.index) for r in found]
+    assert keys == sorted(keys)
+    largest = largest_region(counts, threshold, valid=valid, wraps=wraps, connectivity=connectivity)
+    if not expected:
+        assert largest is None
+    else:
+        assert largest is not None
+        assert (largest.area, largest.peak, largest.index) == (
+            found[0].area,
+            found[0].peak,
+            found[0].index,
+        )
+        assert (largest.mask == found[0].mask).all()
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+@pytest.mark.parametrize("wraps", [False, True])
+@pytest.mark.parametrize("name", SHAPES)
+def test_adversarial_frames_agree_with_scipy(name, wraps, connectivity):
+    check_against_reference(SHAPES[name], 50, None, wraps, connectivity)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data(), st.integers(1, 18), st.integers(1, 26), st.booleans(), st.sampled_from([4, 8]))
+def test_random_frames_agree_with_scipy(data, rows, cols, wraps, connectivity):
+    seed = data.draw(st.integers(0, 2**32 - 1))
+    density = data.draw(st.sampled_from([0.05, 0.3, 0.5, 0.6, 0.7, 0.95]))
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(51, 54, (rows, cols)) * (rng.random((rows, cols)) < density)
+    valid = rng.random((rows, cols)) < 0.9 if data.draw(st.booleans()) else None
+    check_against_reference(counts.astype(np.uint16), 50, valid, wraps, connectivity)
+
+
+def test_a_taxel_at_the_threshold_is_not_active():
+    counts = frame((2, 2), value=50)
+    assert largest_region(counts, 50) is None
+    assert largest_region(counts, 49).area == 1
+
+
+def test_a_threshold_for_each_taxel():
+    counts = frame((2, 2), (2, 3))
+    threshold = np.full((16, 24), 99)
+    threshold[2, 3] = 100
+    assert largest_region(counts, threshold).mask.nonzero() == (np.array([2]), np.array([2]))
+
+
+def test_a_taxel_that_is_not_valid_is_never_active_and_splits_a_region():
+    counts = frame(*[(4, col) for col in range(3, 10)])
+    counts[4, 5] = 60000
+    valid = np.ones((16, 24), dtype=bool)
+    valid[4, 5] = False
+    largest = largest_region(counts, 50, valid=valid)
+    assert (largest.area, largest.peak, largest.centroid) == (4, 100, (4.0, 7.5))
+
+
+def test_a_region_across_the_seam_has_its_centroid_on_the_seam():
+    counts = frame((3, 22), (3, 23), (3, 0), (3, 1))
+    assert largest_region(counts, 50).centroid == (3.0, 23.5)
+    assert len(find_regions(counts, 50, wraps=False)) == 2
+
+
+@given(hnp.arrays(bool, (5, 9), elements=st.booleans()), st.integers(0, 8))
+def test_turning_the_cylinder_turns_the_centroid(active, turn):
+    """Wherever the seam lies, unless two cuts are exactly equal (a full ring)."""
+    counts = active.astype(np.uint16) * 7
+    region = largest_region(counts, 0)
+    if region is None:
+        return
+    columns = np.nonzero(region.mask)[1]
+    variances = []
+    for cut in range(9):
+        unrolled = (columns - cut) % 9
+        n = len(columns)
+        variances.append(n * int((unrolled**2).sum()) - int(unrolled.sum()) ** 2)
+    centres = {
+        Fraction(int(((columns - cut) % 9).sum()), len(columns)) + cut
+        for cut in range(9)
+        if variances[cut] == min(variances)
+    }
+    centres = {centre % 9 for centre in centres}
+    assert Fraction(region.sums[1], region.area) in centres
+    if len(centres) > 1:
+        return
+    turned = np.roll(region.mask, turn, axis=1).astype(np.uint16)
+    rolled = largest_region(turned, 0)
+    assert Fraction(rolled.sums[1], rolled.area) == (centres.pop() + turn) % 9
+
+
+def test_equal_areas_go_to_the_overlap_then_the_peak_then_the_lowest_index():
+    counts = frame((1, 3), (1, 4), (8, 3), (8, 4), (12, 10), (12, 11))
+    assert largest_region(counts, 50).index == 1 * 24 + 3
+    counts[8, 4] = 200
+    counts[12, 11] = 200
+    assert largest_region(counts, 50).index == 8 * 24 + 3
+    before = largest_region(frame((12, 11), (12, 12)), 50)
+    assert largest_region(counts, 50, previous=before).index == 12 * 24 + 10
+
+
+def test_equal_single_taxels_follow_the_same_rule():
+    counts = frame((1, 3), (5, 9), (9, 20))
+    counts[5, 9] = counts[9, 20] = 101
+    assert largest_region(counts, 50).index == 5 * 24 + 9
+    before = largest_region(frame((1, 3), (1, 4)), 50)
+    assert largest_region(counts, 50, previous=before).index == 1 * 24 + 3
+    elsewhere = largest_region(frame((15, 0)), 50)
+    assert largest_region(counts, 50, previous=elsewhere).index == 5 * 24 + 9
+
+
+def test_full_scale_counts_everywhere_do_not_overflow():
+    region = largest_region(SHAPES["full"], 65534)
+    assert (region.area, region.peak) == (384, 65535)
+    assert region.sums == (24 * sum(range(16)), 16 * sum(range(24)))
+
+
+@pytest.mark.parametrize(
+    ("counts", "keywords", "word"),
+    [
+        (np.zeros((2, 2)), {}, "whole numbers"),
+        (np.zeros(4, dtype=np.uint16), {}, "whole numbers"),
+        (np.zeros((2, 2), np.uint16), {"valid": np.ones((2, 3), bool)}, "valid"),
+        (np.ones((2, 2), np.uint16), {"connectivity": 6}, "connectivity"),
+    ],
+)
+def test_bad_arguments_are_named(counts, keywords, word):
+    with pytest.raises(InputError, match=word):
+        largest_region(counts, 0, **keywords)
+    with pytest.raises(InputError, match=word):
+        find_regions(counts, 0, **keywords)
+
+
+def test_a_threshold_of_another_shape_is_named():
+    with pytest.raises(InputError, match="threshold"):
+        find_regions(np.ones((2, 2), np.uint16), np.zeros((3, 3)))

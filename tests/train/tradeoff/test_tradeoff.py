@@ -1,0 +1,334 @@
+"""What accuracy costs in time: wires, boards, nested accuracy, deals, and early stopping."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.model.model import Model
+from edge.skin import file as skinfile
+from edge.touch.layout import SkinLayout
+from edge.touch.track import FeatureSeries
+from export.__main__ import main as export
+from train import operating_points as pick
+from train.__main__ import main as train
+from train.study.score import Result
+from train.tradeoff import accuracy, board, early
+from train.tradeoff.accuracy import Point, front, nearest, nested, thinned
+from train.tradeoff.run import tradeoff
+from train.tradeoff.wires import count, spread, wires
+
+SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
+
+
+class TestWires:
+    def test_cody_s_chips_over_three_buses_cost_what_the_shipped_file_costs(self):
+        file = skinfile.load(skinfile.shipped("cody"))
+        ours = count("ours", spread(file.layout, 3))
+        shipped = count("shipped", file)
+        assert ours.frame_s == pytest.approx(shipped.frame_s, rel=0.1)
+
+    def test_more_buses_share_the_same_bits(self, forearm):
+        one, two, three = (count("w", spread(forearm, n)) for n in (1, 2, 3))
+        assert one.bits == pytest.approx(three.bits, rel=0.03)
+        assert one.frame_s == pytest.approx(2 * two.frame_s, rel=0.02)
+        assert one.every(100.0) == 3
+        assert three.every(100.0) == 1
+
+    def test_a_single_taxel_is_one_chip_on_one_bus(self):
+        names = [wire.name for wire in wires(SkinLayout(rows=1, cols=1, wraps=False))]
+        assert names == ["AD7147, 1 bus at 400 kHz", "microcontroller, 1 bus at 1 MHz"]
+
+    def test_a_skin_is_wired_with_every_chip_that_serves_it(self, forearm):
+        assert [wire.name.split(",")[0] for wire in wires(forearm)] == [
+            *["AD7147"] * 3,
+            "microcontroller",
+        ]
+        quarter = SkinLayout(rows=8, cols=12, wraps=True)
+        assert "MPR121" in {wire.name.split(",")[0] for wire in wires(quarter)}
+
+
+def series(n):
+    t = np.arange(n) / 100.0
+    counts = np.arange(n)
+    return FeatureSeries(t, counts, counts, np.stack([counts, counts], axis=1), t * 0.1)
+
+
+def test_a_slower_wire_brings_every_so_manieth_frame():
+    thin = thinned(series(9), 4)
+    assert thin.t.tolist() == [0.0, 0.04, 0.08]
+    assert thin.peak.tolist() == thin.sums[:, 1].tolist() == [0, 4, 8]
+
+
+def test_the_nearest_are_in_order_and_equal_ones_in_theirs():
+    squares = np.array([[4.0, 1.0, 9.0, 1.0, 0.0]])
+    assert nearest(squares, 4).tolist() == [[4, 1, 3, 0]]
+
+
+def test_nested_accuracy_of_labels_by_chance_is_chance():
+    """Choosing among 78 cells on the score that is reported would flatter it."""
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(80, 30)), rng.choice(["a", "b"], 80)
+    found = nested(X, {"t": y}, "none", ("max_force",))["t"]
+    assert abs(found.accuracy - 0.5) < 0.15
+
+
+def test_nested_accuracy_of_what_is_plain_is_one():
+    rng = np.random.default_rng(0)
+    y = np.repeat(["a", "b", "c"], 20)
+    X = rng.normal(size=(60, 30)) + 20.0 * (y == "a")[:, None] - 20.0 * (y == "b")[:, None]
+    found = nested(X, {"t": y}, "IV", ("max_force", "contact_area", "contact_motion"))["t"]
+    assert (found.right, found.total) == (60, 60)
+    assert (found.components, found.k) == (1, 1)
+
+
+def point(seconds, right, **changes):
+    given = {
+        "task": "t",
+        "taxels": 384,
+        "wire": "w",
+        "features": ("max_force",),
+        "scaling": "IV",
+        "components": 1,
+        "k": 1,
+        "window_s": seconds,
+        "wire_s": 0.0,
+        "arithmetic_s": 0.0,
+        "result": Result(right, 100),
+        "whole": True,
+    }
+    return Point(**{**given, **changes})
+
+
+def test_the_front_is_what_no_other_beats_in_both():
+    a, b, c, d = point(0.2, 50), point(0.4, 70), point(0.6, 70), point(0.8, 90)
+    assert front([d, c, b, a]) == [a, b, d]
+    assert front([point(0.2, 50), point(0.2, 60)]) == [point(0.2, 60)]
+
+
+def test_a_point_s_time_is_the_sum_of_its_three_parts():
+    assert point(0.2, 1, wire_s=0.01, arithmetic_s=0.001).seconds == pytest.approx(0.211)
+
+
+class TestPick:
+    DEALS = tuple(
+        pick.Deal(ms / 1000, ("max_force",), "IV", ms, accuracy)
+        for ms, accuracy in ((200.0, 0.5), (400.0, 0.8), (1200.0, 0.9))
+    )
+
+    @pytest.mark.parametrize(
+        ("wanted", "milliseconds"),
+        [
+            ("fast", 200),
+            ("balanced", 400),
+            ("accurate", 1200),
+            ("399", 200),
+            ("5000", 1200),
+            ("0.8", 400),
+            ("0.81", 1200),
+        ],
+    )
+    def test_by_name_by_time_and_by_accuracy(self, wanted, milliseconds):
+        assert pick.pick(list(self.DEALS), wanted).milliseconds == milliseconds
+
+    @pytest.mark.parametrize(
+        ("wanted", "sentence"),
+        [
+            ("quick", "--front must be fast, balanced, accurate, milliseconds"),
+            ("-3", "--front must be"),
+            ("nan", "--front must be"),
+            ("150", "the fastest point takes 200 ms"),
+            ("0.95", "the most accurate point reaches 0.900"),
+        ],
+    )
+    def test_what_cannot_be_had_is_one_sentence(self, wanted, sentence):
+        with pytest.raises(InputError, match=sentence):
+            pick.pick(list(self.DEALS), wanted)
+
+    def test_the_shipped_front_rises(self):
+        task, deals = pick.read(pick.SHIPPED)
+        assert task == "category"
+        assert [d.accuracy for d in deals] == sorted(d.accuracy for d in deals)
+        assert len(deals) >= 3
+
+    def test_a_file_that_is_no_front_is_one_sentence(self, tmp_path):
+        with pytest.raises(InputError, match="cannot be read"):
+            pick.read(tmp_path / "none.json")
+        (tmp_path / "front.json").write_text('{"task": "t", "points": []}')
+        with pytest.raises(InputError, match="has no point"):
+            pick.read(tmp_path / "front.json")
+
+
+def test_export_takes_window_features_and_scaling_of_a_point(recordings, tmp_path, capsys):
+    fronts = {
+        "task": "category",
+        "points": [
+            {
+                "window_s": 0.4,
+                "features": ["max_force", "contact_area"],
+                "scaling": "IV",
+                "milliseconds": 410.0,
+                "accuracy": 0.8,
+            }
+        ],
+    }
+    (tmp_path / "front.json").write_text(json.dumps(fronts))
+    given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1"]
+    assert export([*given, "--front", "fast", "--fronts", str(tmp_path / "front.json")]) == 0
+    info = Model(tmp_path / "model.onnx").info
+    assert info.window_s == 0.4
+    assert info.features == ("max_force", "contact_area")
+    assert info.tasks["category"].scaling == "IV"
+    assert "category 80.0% in 410 ms there" in capsys.readouterr().err
+    assert export([*given, "--front", "0.99", "--fronts", str(tmp_path / "front.json")]) == 2
+
+
+class TestEarly:
+    def found(self, fixed):
+        return early.Beside((0.2, 0.6, 1.0), np.array(fixed), [], 100, 0.5)
+
+    def test_the_fixed_window_that_is_as_accurate_is_interpolated(self):
+        found = self.found([0.5, 0.3, 0.1])
+        assert early.fixed_time(found, 0.1) == pytest.approx(1.0)
+        assert early.fixed_time(found, 0.2) == pytest.approx(0.8)
+        assert early.fixed_time(found, 0.9) == pytest.approx(0.2)
+        assert early.fixed_time(found, 0.05) is None
+
+    def test_a_longer_window_that_is_worse_is_no_excuse(self):
+        assert early.fixed_time(self.found([0.5, 0.1, 0.3]), 0.1) == pytest.approx(0.6)
+
+    def test_time_saved_is_against_that_window(self):
+        one = early.Early(0.1, 0.1, 0.2, 0.1, 0.1, 0.0, mean_s=0.4)
+        assert early.saved(self.found([0.5, 0.3, 0.1]), one) == pytest.approx(0.5)
+
+    def test_what_beats_every_fixed_window_is_set_against_the_full_one(self):
+        one = early.Early(0.1, 0.1, 0.2, 0.1, 0.1, 0.0, mean_s=0.4)
+        assert early.saved(self.found([0.5, 0.3, 0.25]), one) == pytest.approx(0.6)
+
+    def test_the_time_saved_at_the_full_window_s_accuracy_is_of_the_quickest_that_has_it(self):
+        found = self.found([0.5, 0.1, 0.3])
+        assert early.at_full_accuracy(found) is None
+        for wrong, mean_s in ((0.25, 0.9), (0.3, 0.7), (0.31, 0.2)):
+            found.early.append(early.Early(0.1, 0.1, wrong, 0.1, 0.1, 0.0, mean_s))
+        gain, one = early.at_full_accuracy(found)
+        assert (gain, one.wrong) == (pytest.approx(0.3), 0.3)
+
+    def test_hindsight_stops_each_trial_once_its_answer_stays_as_it_ends(self):
+        right = np.array([[1, 0, 1, 0], [1, 1, 0, 1], [1, 1, 1, 0]], dtype=bool)
+        # From the first look on, the second, the last, and the last.
+        expected = np.mean([0.2, 0.6, 1.0, 1.0])
+        assert early.hindsight(right, (0.2, 0.6, 1.0)) == pytest.approx(expected)
+
+    def test_what_is_plain_from_the_second_look_on_is_decided_then(self):
+        """Before it the labels are told apart by nothing; an asked error decides there at once."""
+        rng = np.random.default_rng(6)
+        labels = np.repeat(["a", "b"], 60)
+        X = rng.normal(size=(3, 120, 12))
+        X[1:, :, 0] += 200.0 * (labels == "a")
+        found = early.beside(X, labels, (0.2, 0.6, 1.0), ("max_force",), "none")
+        assert found.fixed[0] > 0.3
+        assert found.fixed[1:].tolist() == [0.0, 0.0]
+        assert 0.2 < found.hindsight_s <= 0.6
+        one = next(e for e in found.early if e.asked == 0.1)
+        assert one.struck <= 0.1 + 1.96 * np.sqrt(0.1 * 0.9 * (1 / 96 + 1 / 120))
+        assert 0.4 < one.mean_s < 0.75
+        assert one.wrong == pytest.approx(one.sure_wrong)
+
+    def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
+        from train.simulate.scene import load
+
+        floors = early.floors(load(SCENE))
+        # mu_s m g / (k v): equal arms, so the ratio of two objects is that of mu_s m.
+        assert floors["plastic bin"] / floors["cardboard box"] == pytest.approx(0.28 / 0.6)
+        # The chair tips: 0.4 / (2 * 0.7) instead of 0.6.
+        assert floors["chair"] / floors["cardboard box"] == pytest.approx((4 * 0.4 / 1.4) / 0.6)
+        assert 0.3 < floors["cardboard box"] < 0.5
+
+
+class TestBoard:
+    def test_a_file_that_is_none_is_one_sentence(self, tmp_path):
+        with pytest.raises(InputError, match="cannot be read"):
+            board.read(tmp_path / "none.json")
+        path = board_file(tmp_path / "board.json", "0" * 64)
+        whole = path.read_text()
+        assert board.read(path).memory_mb == 61.5
+        for wrong in (
+            "",
+            "{}",
+            "[]",
+            "[" * 100_000,
+            whole[: len(whole) // 2],
+            whole.replace("decision", "something"),
+            whole.replace("cold_start_ms", "start"),
+            whole.replace('"median_us": 100.0', '"median_us": NaN'),
+            whole.replace('"median_us": 100.0', '"median_us": "soon"'),
+            whole.replace('["a", "b", "c"]', "[]"),
+        ):
+            path.write_text(wrong)
+            with pytest.raises(InputError, match="not a board file; make one with"):
+                board.read(path)
+
+    def test_arithmetic_follows_the_number_of_features(self):
+        stages = {"track": (1e6, 2e6), "features": (3e6, 4e6), "decision": (10e6, 11e6)}
+        one = board.Board("b", "d", stages, 60.0, 500.0, 3, "m")
+        assert one.arithmetic_s(3) == pytest.approx(14.0)
+        assert one.arithmetic_s(1) == pytest.approx(12.0)
+
+
+def board_file(path, digest):
+    stage = {"median_us": 100.0, "p99_us": 200.0, "n": 40}
+    board_ = {
+        "machine": {"kind": "a board", "name": "here"},
+        "model": {"sha256": "ab" * 32, "data_digest": digest, "features": ["a", "b", "c"]},
+        "stages": dict.fromkeys(("track", "features", "decision"), stage),
+        "memory_mb": 61.5,
+        "cold_start_ms": 812.0,
+    }
+    path.write_text(json.dumps(board_))
+    return path
+
+
+def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, capsys):
+    path = board_file(tmp_path / "board.json", "0" * 64)
+    given = ["--data", str(recordings), "--board", str(path), "--out", str(tmp_path / "out")]
+    assert train(["tradeoff", *given]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert "was made with a model of other recordings" in last
+    assert not (tmp_path / "out").exists()
+
+
+def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, monkeypatch):
+    from edge.recording import save
+    from train.dataset import load_trials
+    from train.tradeoff import run as whole
+
+    for kind in ("hard", "soft"):
+        for seed in range(20):
+            save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
+    monkeypatch.setattr(accuracy, "LEAVE_ONE_OUT_UP_TO", 0)
+    monkeypatch.setattr(whole, "WINDOWS", (1.2,))
+    monkeypatch.setattr(whole, "LOOKS", (0.4, 1.2))
+    digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
+    path = board_file(tmp_path / "board.json", digest)
+    out = tmp_path / "out"
+    report = tradeoff([str(tmp_path / "data")], out, str(path), scene_path=str(SCENE))
+    text = report.read_text()
+    assert "http" not in text.replace("http-equiv", "")
+    assert "a board (here)" in text
+    assert "62 MB of memory, 812 ms from starting Python" in text
+    again = tradeoff([str(tmp_path / "data")], tmp_path / "2", str(path), scene_path=str(SCENE))
+    assert again.read_bytes() == report.read_bytes()
+    for name in ("tradeoff.png", "early_category.png", "early_object.png"):
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+    rows = list(csv.DictReader((out / "points.csv").read_text().splitlines()))
+    for cells in rows:
+        parts = [float(cells[f"{part} ms"]) for part in ("window", "wire", "arithmetic")]
+        assert float(cells["time ms"]) == pytest.approx(sum(parts), abs=0.1)
+        assert float(cells["low %"]) <= float(cells["accuracy %"]) <= float(cells["high %"])
+    assert sum(cells["paper's point"] == "yes" for cells in rows) == 2  # once a task
+    task, deals = pick.read(out / "front.json")
+    assert task == "category"
+    assert deals[-1].accuracy > 0.9

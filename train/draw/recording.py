@@ -1,0 +1,241 @@
+"""A recording as a picture: frames, the region found on them, the three features, the arm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from edge.errors import InputError
+from edge.files import write_whole
+from edge.model.verify import first_contact
+from edge.recording import Recording
+from edge.touch.arm import Chain
+from edge.touch.features import WINDOW_S
+from edge.touch.layout import SkinLayout
+from edge.touch.region import largest_region
+from edge.touch.track import FeatureSeries, Tracker
+from train.dataset import arm_of
+
+FRAMES = 6
+HORIZON_S = 2.0
+
+
+def draw(
+    recording: Recording,
+    out: Path,
+    *,
+    where: str = "recording",
+    scene: bool = False,
+    threshold: int | None = None,
+) -> None:
+    """Draw a recording into a PNG.
+
+    Args:
+        where: names the recording in errors.
+        scene: add the arm and the contact's path, seen from the side.
+        threshold: counts above which a taxel is in contact, in place of the skin's.
+
+    Raises:
+        InputError: the sketch is asked for and the arm is not known, or `out` cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    layout = recording.layout
+    if threshold is not None:
+        layout = replace(
+            layout, threshold_counts=threshold, onset_counts=max(threshold, layout.onset)
+        )
+    chain = arm_of(recording, where)
+    if scene and chain is None:
+        raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
+    found = first_contact(recording, Tracker(layout, chain=chain, horizon_s=HORIZON_S))
+    rows = 3 if scene else 2
+    heights = [1.7, 3.2, 4.0][:rows]
+    figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
+    figure.suptitle(_title(recording))
+    grid = figure.add_gridspec(rows, FRAMES, height_ratios=heights)
+    onset = found[0] if found is not None else float(recording.t[0])
+    shown = np.linspace(0.0, min(WINDOW_S, float(recording.t[-1]) - onset), FRAMES - 1)
+    times = [max(onset - 0.05, float(recording.t[0])), *(onset + shown)]
+    shown_frames = recording.frames[
+        np.searchsorted(recording.t, times).clip(0, len(recording.t) - 1)
+    ]
+    top = max(int(shown_frames.max()), 1)
+    axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
+    image = None
+    for axis, t in zip(axes, times, strict=True):
+        image = _frame(axis, recording, layout, float(t), onset, top)
+        axis.label_outer()
+    if image is not None:
+        bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
+        bar.set_label(f"{layout.force_unit} a taxel")
+    series = None if found is None else found[1]
+    third = FRAMES // 3
+    for i, (name, unit) in enumerate(
+        (
+            ("max_force", layout.force_unit),
+            ("contact_area", "taxel"),
+            ("contact_motion", layout.length_unit),
+        )
+    ):
+        _feature(figure.add_subplot(grid[1, third * i : third * (i + 1)]), series, name, unit)
+    if scene and chain is not None:
+        side = figure.add_subplot(grid[2, : FRAMES // 2])
+        _side(side, recording, chain, layout, onset, series)
+        _path(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, layout, onset)
+    with write_whole(out) as file:
+        figure.savefig(file, format="png", dpi=110)
+
+
+def _title(recording: Recording) -> str:
+    labels = ", ".join(f"{task}: {label}" for task, label in sorted(recording.labels.items()))
+    return f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
+
+
+def _frame(
+    axis: Any, recording: Recording, layout: SkinLayout, t: float, onset: float, top: int
+) -> Any:
+    k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
+    counts = recording.frames[k]
+    valid = recording.valid
+    if valid is not None and valid.ndim == 3:
+        valid = valid[k]
+    scale = layout.counts_per_newton or 1.0
+    shown = np.ma.masked_array(counts / scale, mask=False if valid is None else ~valid)
+    image = axis.imshow(shown, vmin=0.0, vmax=top / scale, cmap="viridis", aspect="equal")
+    region = largest_region(counts, layout.threshold_counts, valid=valid, wraps=layout.wraps)
+    title = f"{recording.t[k] - onset:+.2f} s"
+    if region is not None:
+        axis.contour(region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2)
+        row, col = region.centroid
+        axis.plot(col % layout.cols, row, "r+", markersize=9)
+        title += f", {region.area} taxels"
+    axis.set_title(title, fontsize=10)
+    axis.set_xlabel("column (around)")
+    axis.set_ylabel("row, from elbow")
+    return image
+
+
+def _feature(axis: Any, series: FeatureSeries | None, name: str, unit: str) -> None:
+    axis.set_title(name)
+    axis.set_xlabel("seconds from onset")
+    axis.set_ylabel(unit)
+    if series is None:
+        axis.text(0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes)
+        return
+    axis.plot(series.t, getattr(series, name))
+    axis.axvspan(0.0, WINDOW_S, color="tab:green", alpha=0.08)
+    axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
+    axis.set_ylim(bottom=0.0)
+
+
+def _links(chain: Chain, q: Any) -> np.ndarray:
+    """(links, 3) places of the chain's joints and its tip, metres."""
+    points = []
+    moving = 0
+    for i in range(len(chain.joints)):
+        part = Chain(chain.joints[: i + 1])
+        moving = part.dof
+        points.append(part.pose(q[:moving])[:3, 3])
+    return np.vstack([np.zeros(3), *points])
+
+
+def _side(
+    axis: Any,
+    recording: Recording,
+    chain: Chain,
+    layout: SkinLayout,
+    onset: float,
+    series: FeatureSeries | None,
+) -> None:
+    """The arm at the onset and at the window's end, in the torso's x-z plane."""
+    joints = recording.joints
+    assert joints is not None
+    simulated = recording.meta.get("simulation")
+    told = simulated if isinstance(simulated, dict) else {}
+    width, radius, mass = (_size(told, key) for key in ("width_m", "radius_m", "mass_kg"))
+    for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
+        k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
+        points = _links(chain, joints[k])
+        axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
+        found = _contact(recording, chain, layout, k)
+        if found is not None:
+            place, outward = found
+            axis.plot(place[0], place[2], "*", color=style, markersize=13)
+            if width is not None:
+                outline = _outline(place, outward, width, radius)
+                axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
+    if told:
+        effects = told.get("effects")
+        names = ", ".join(map(str, effects)) if isinstance(effects, list) else ""
+        what = str(told.get("family", "")) + (f", {mass:.2g} kg" if mass is not None else "")
+        axis.set_title(f"seen from the side: {what}\n{names}", fontsize=9)
+    else:
+        axis.set_title("seen from the side", fontsize=9)
+    axis.set_xlabel("x, metres forward of the torso")
+    axis.set_ylabel("z, metres up")
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.legend(fontsize=8)
+
+
+def _size(simulated: dict[str, Any], key: str) -> float | None:
+    """A size that the simulation was drawn with, where the recording tells one that makes sense."""
+    values = simulated.get("values")
+    size = values.get(key) if isinstance(values, dict) else None
+    if isinstance(size, bool) or not isinstance(size, int | float):
+        return None
+    return float(size) if 0 < size < 1e9 else None
+
+
+DEPTH_M = 0.08
+"""How much of an object is sketched behind its face."""
+
+
+def _outline(place: Any, outward: Any, width_m: float, radius_m: float | None) -> np.ndarray:
+    """(points, 2) x and z of the object's face, with what is behind it."""
+    normal = np.array([outward[0], outward[2]])
+    normal /= np.linalg.norm(normal) or 1.0
+    along = np.array([-normal[1], normal[0]])
+    radius = max(radius_m or math.inf, width_m / 2)
+    s = np.linspace(-width_m / 2, width_m / 2, 33)
+    back = 0.0 * s if radius > 1e3 else radius - np.sqrt(radius**2 - s**2)
+    depth = max(float(back.max()), DEPTH_M)
+    centre = np.array([place[0], place[2]])
+    face = centre + s[:, None] * along + back[:, None] * normal
+    ends = centre + np.array([s[-1], s[0]])[:, None] * along + depth * normal
+    return np.vstack([face, ends])
+
+
+def _contact(
+    recording: Recording, chain: Chain, layout: SkinLayout, k: int
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """World place of the region's centroid on frame k, and the way out of the skin there."""
+    region = largest_region(recording.frames[k], layout.threshold_counts, wraps=layout.wraps)
+    if region is None or recording.joints is None:
+        return None
+    pose = chain.pose(recording.joints[k])
+    place = layout.position(*region.centroid)
+    out = place * [1.0, 1.0, 0.0]
+    return pose[:3, :3] @ place + pose[:3, 3], pose[:3, :3] @ out
+
+
+def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:
+    """Push and joint angles over time."""
+    t = recording.t - onset
+    scale = layout.counts_per_newton or 1.0
+    push = recording.frames.reshape(len(t), -1).sum(axis=1, dtype=np.int64) / scale
+    axis.plot(t, push, color="black", lw=2)
+    axis.set_ylabel(f"sum of all taxels, {layout.force_unit} (black)")
+    axis.set_xlabel("seconds from onset")
+    axis.set_title("push and joint angles")
+    joints = recording.joints
+    if joints is not None:
+        other = axis.twinx()
+        for j in range(joints.shape[1]):
+            other.plot(t, np.degrees(joints[:, j] - joints[0, j]), lw=1, label=f"j{j}")
+        other.set_ylabel("joint angles from their start, degrees")
+        other.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=5)
