@@ -150,7 +150,7 @@ demo-data: $(READY)
 	rm -rf $(DEMODATA)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
-	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --looks none
+	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --decision-points none
 	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
 
 HARD := $(OUT)/hard-cases

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load
@@ -38,9 +38,9 @@ def bench_frame_in_contact(against, note, built):
     frames = list(recording)[: round(1.2 / FRAME_S)]
 
     def watch():
-        watcher = Watcher(model, recording.layout)
+        classifier = Classifier(model, recording.layout)
         for frame in frames:
-            watcher.push(frame)
+            classifier.push(frame)
 
     share = against(watch, {}, calls=1) / len(frames) / FRAME_S
     note("a 10 ms frame", share, "at most 0.01")

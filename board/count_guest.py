@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load
@@ -39,17 +39,17 @@ def main() -> None:
         mark()
         names += ["nothing", "feature vector", "model"]
     for _ in range(2):  # caches fill in the first round
-        watcher = Watcher(model, recording.layout)
+        classifier = Classifier(model, recording.layout)
         for frame in recording:
             mark()
-            events = watcher.push(frame)
+            events = classifier.push(frame)
             mark()
             kinds = {event["event"] for event in events}
             if "decision" in kinds:
                 names.append("frame that decides")
             elif kinds:
                 names.append("frame with another event")
-            elif watcher.tracker.region is not None:
+            elif classifier.tracker.region is not None:
                 names.append("frame in contact")
             else:
                 names.append("frame without contact")

@@ -8,7 +8,7 @@ from typing import Any
 
 from edge.errors import InputError
 from edge.model.model import Decision, Model
-from edge.model.prediction_set import ALARMS, UNKNOWN, Candidates, check_rate
+from edge.model.prediction_set import NOVELTY_RATE, UNKNOWN, PredictionSet, check_rate
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -29,14 +29,14 @@ class _Waiting:
 
     contact: Contact
     number: int
-    look: int
-    """The next of the model's looks."""
+    decision_point: int
+    """The next of the model's decision points."""
     tasks: list[str]
-    candidates: dict[str, Candidates] = field(default_factory=dict)
+    candidates: dict[str, PredictionSet] = field(default_factory=dict)
     """By task, where an error rate was asked for."""
 
 
-class Watcher:
+class Classifier:
     """Watches a stream of frames and decides what each contact touches.
 
     `push` and `finish` return events in the order in which they came about:
@@ -46,8 +46,10 @@ class Watcher:
       `latency_ms` (from the frame that completed the window to the decision) and `flags`;
     - `release`: `onset_s`, `release_s`.
 
-    With an error rate, a task is decided at the first of the model's looks that leaves one
-    label, else at the full window. `window_s` is then that look's, `confidence` is one less the
+    With an error rate, a task is decided at the first of the model's decision points that leaves
+    one
+    label, else at the full window. `window_s` is then that decision point's, `confidence` is one
+    less the
     smallest error at which another label would be left, and a decision also has `error` (asked
     for) and `left` (labels that were not struck out). The further flags are `unknown` (`label`
     is "unknown": no label is left, or the contact lies too far from all that was trained) and
@@ -71,7 +73,7 @@ class Watcher:
         layout: SkinLayout | None = None,
         *,
         error: float | None = None,
-        alarms: float = ALARMS,
+        novelty_rate: float = NOVELTY_RATE,
         several: bool = False,
     ) -> None:
         """Watch with a model.
@@ -81,7 +83,7 @@ class Watcher:
             layout: the skin that gives the frames; the model's own where None.
             error: how often a label may be wrong, in (0, 1), to decide as soon as that allows;
                 None decides at the full window.
-            alarms: how often a trained thing may be called unknown for lying far from all.
+            novelty_rate: how often a trained thing may be called unknown for lying far from all.
             several: follow every region, not the largest alone.
 
         Raises:
@@ -91,11 +93,11 @@ class Watcher:
         info = model.info
         if error is not None:
             check_rate(error, "the error rate")
-            check_rate(alarms, "the rate of false alarms")
-            if not info.looks_s:
+            check_rate(novelty_rate, "the rate of false alarms")
+            if not info.decision_points_s:
                 raise InputError(
                     f"{model.path}: has no calibration to hold an error rate with; "
-                    "export it with --looks"
+                    "export it with --decision-points"
                 )
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
@@ -107,7 +109,7 @@ class Watcher:
             horizon_s=info.window_s,
             features=info.features,
         )
-        self.error, self.alarms = error, alarms
+        self.error, self.novelty_rate = error, novelty_rate
         self._waiting: list[_Waiting] = []
         self._current: dict[int, Contact] = {}
         """Contacts under way by their number."""
@@ -116,9 +118,9 @@ class Watcher:
     def _begin(self, contact: Contact, number: int) -> _Waiting:
         tasks = self.model.info.tasks
         if self.error is None:
-            return _Waiting(contact, number, len(self.model.looks_s) - 1, list(tasks))
+            return _Waiting(contact, number, len(self.model.decision_points_s) - 1, list(tasks))
         left = {
-            name: Candidates(len(task.labels), self.error, self.alarms)
+            name: PredictionSet(len(task.labels), self.error, self.novelty_rate)
             for name, task in tasks.items()
         }
         return _Waiting(contact, number, 0, list(tasks), left)
@@ -151,8 +153,8 @@ class Watcher:
                 )
         for waiting in list(self._waiting):
             age = frame.t - waiting.contact.onset_s
-            while waiting.tasks and age >= self.model.looks_s[waiting.look]:
-                events += self._look(waiting, began)
+            while waiting.tasks and age >= self.model.decision_points_s[waiting.decision_point]:
+                events += self._ask(waiting, began)
             if not waiting.tasks:
                 self._waiting.remove(waiting)
         return events
@@ -170,14 +172,14 @@ class Watcher:
         """The stream has ended: decide what is still waiting, flagged `short`."""
         began = time.perf_counter()
         waiting, self._waiting = self._waiting, []
-        return [event for one in waiting for event in self._look(one, began, short=True)]
+        return [event for one in waiting for event in self._ask(one, began, short=True)]
 
-    def _look(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Event]:
+    def _ask(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Event]:
         """Look at a contact; what is decided no longer waits."""
         info = self.model.info
-        last = len(self.model.looks_s) - 1
-        look = last if short else waiting.look
-        window = self.model.looks_s[look]
+        last = len(self.model.decision_points_s) - 1
+        decision_point = last if short else waiting.decision_point
+        window = self.model.decision_points_s[decision_point]
         contact = waiting.contact
         vector = feature_vector(contact.series(), window, info.samples, info.features)
         common: Event = {
@@ -200,7 +202,7 @@ class Watcher:
             if raised
         ]
         try:
-            decisions = self.model.decide(vector, None if self.error is None else look)
+            decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
             answers = {
                 task: {"label": None, "confidence": 0.0, "flags": [*flags, "out_of_range"]}
@@ -210,9 +212,13 @@ class Watcher:
             answers = {
                 task: answer
                 for task in waiting.tasks
-                if (answer := self._answer(waiting, task, decisions[task], flags, look == last))
+                if (
+                    answer := self._answer(
+                        waiting, task, decisions[task], flags, decision_point == last
+                    )
+                )
             }
-        waiting.look += 1
+        waiting.decision_point += 1
         waiting.tasks = [task for task in waiting.tasks if task not in answers]
         latency = round((time.perf_counter() - began) * 1e3, 3)
         return [
@@ -241,7 +247,7 @@ class Watcher:
                 "flags": [*flags, "tie"] if decision.tie else list(flags),
             }
         if decision.pvalues is not None and "short" not in flags:
-            candidates.look(decision.pvalues)
+            candidates.update(decision.pvalues)
         if not (candidates.settled or last):
             return None
         labels = self.model.info.tasks[task].labels
@@ -255,21 +261,3 @@ class Watcher:
             "left": [labels[i] for i in candidates.left],
             "flags": flags + more,
         }
-
-
-def require_joints(model: Model, dof: int | None, where: str) -> None:
-    """Refuse a source whose joint angles are not what the model's motion is measured with.
-
-    Raises:
-        InputError: the sentence names `where`.
-    """
-    chain = model.info.chain
-    if chain is None:
-        return
-    if dof is None:
-        raise InputError(
-            f"{where}: has no joint angles, the model measures motion with {chain.dof}; "
-            "record them, or export a model without joints"
-        )
-    if dof != chain.dof:
-        raise InputError(f"{where}: has {dof} joint angles, the model's arm has {chain.dof}")

@@ -28,7 +28,7 @@ from train.dataset import DataSet, load_trials
 from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier, check_columns
 
 FRONTS = Path("build/tradeoff/front.json")
-LOOKS = "0.2:1.2:0.2"
+DECISION_POINTS = "0.2:1.2:0.2"
 """Twice as many decide no sooner on the simulated set, and take twice the memory."""
 MOST_TRIALS = 2000
 """Beyond them calibration takes minutes, and must be asked for."""
@@ -53,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
         default=list(FEATURES),
         metavar="NAME",
         help="what is measured on a contact (the paper's max_force contact_area contact_motion); "
-        f"others: PLACE_QUANTITY, of {', '.join(measures.PLACES)} and "
+        f"others: PLACE_QUANTITY, of {', '.join(measures.ZONES)} and "
         f"{', '.join(measures.QUANTITIES)}; regions, force_motion; with _rate: a second's change",
     )
     top.add_argument(
@@ -64,10 +64,10 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("-k", "--k", type=int, help="fix the number of neighbours")
     top.add_argument("--window", type=float, default=WINDOW_S, help="seconds from onset (1.2)")
     top.add_argument(
-        "--looks",
+        "--decision-points",
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
-        f"seconds from onset or at a list a,b,c; `none` for none (default: {LOOKS} with "
+        f"seconds from onset or at a list a,b,c; `none` for none (default: {DECISION_POINTS} with "
         f"{FEWEST * FOLDS} to {MOST_TRIALS} trials, else none)",
     )
     top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
@@ -119,11 +119,15 @@ def run(arguments: argparse.Namespace) -> int:
         progress=True,
     )
     choices = {task: found.choice for task, found in chosen.items()}
-    looks = _looks(arguments, len(dataset.trials))
-    if looks:
-        at_looks = np.stack([dataset.features(s, arguments.samples) for s in looks])
-        sequential = SequentialClassifier(choices, looks, dataset.names).fit(at_looks, y)
-        classifier = sequential.looks_[-1]
+    decision_points = _decision_points(arguments, len(dataset.trials))
+    if decision_points:
+        at_decision_points = np.stack(
+            [dataset.features(s, arguments.samples) for s in decision_points]
+        )
+        sequential = SequentialClassifier(choices, decision_points, dataset.names).fit(
+            at_decision_points, y
+        )
+        classifier = sequential.decision_points_[-1]
     else:
         sequential = None
         classifier = ContactClassifier(choices, dataset.names).fit(X, y)
@@ -171,21 +175,21 @@ def _check_fixed(arguments: argparse.Namespace) -> None:
         raise InputError(f"--window must be above 0 and at most 60 seconds, not {arguments.window}")
 
 
-def _looks(arguments: argparse.Namespace, trials: int) -> tuple[float, ...]:
-    """The looks asked for, or the default ones where they can be calibrated."""
-    if arguments.looks is not None:
-        return parse_looks(arguments.looks, arguments.window)
+def _decision_points(arguments: argparse.Namespace, trials: int) -> tuple[float, ...]:
+    """The decision points asked for, or the default ones where they can be calibrated."""
+    if arguments.decision_points is not None:
+        return parse_decision_points(arguments.decision_points, arguments.window)
     if FEWEST * FOLDS <= trials <= MOST_TRIALS:
-        return parse_looks(LOOKS, arguments.window)
+        return parse_decision_points(DECISION_POINTS, arguments.window)
     print(
-        f"no looks before the full window: {trials} trials are not the {FEWEST * FOLDS} to "
-        f"{MOST_TRIALS} that --looks takes by default",
+        f"no decision points before the full window: {trials} trials are not the {FEWEST * FOLDS} "
+        f"to {MOST_TRIALS} that --decision-points takes by default",
         file=sys.stderr,
     )
     return ()
 
 
-def parse_looks(text: str, window_s: float) -> tuple[float, ...]:
+def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:
     """Seconds from onset out of `a:b:step`, `a,b,c` or `none`; the full window comes last.
 
     Raises:
@@ -194,7 +198,8 @@ def parse_looks(text: str, window_s: float) -> tuple[float, ...]:
     if text == "none":
         return ()
     wrong = InputError(
-        f"--looks must be like {LOOKS} or 0.3,0.6,1.2 (seconds above 0) or none, not {text!r}"
+        f"--decision-points must be like {DECISION_POINTS} or 0.3,0.6,1.2 (seconds above 0) "
+        f"or none, not {text!r}"
     )
     try:
         if ":" in text:
@@ -202,14 +207,17 @@ def parse_looks(text: str, window_s: float) -> tuple[float, ...]:
             if not (0.0 < first <= last <= 60.0 and step >= 0.01):
                 raise wrong
             count = int((last - first) / step + 1e-9) + 1
-            looks = {round(first + i * step, 9) for i in range(count)}
+            decision_points = {round(first + i * step, 9) for i in range(count)}
         else:
-            looks = {float(part) for part in text.split(",")}
+            decision_points = {float(part) for part in text.split(",")}
     except ValueError:
         raise wrong from None
-    if not all(0.0 < look <= 60.0 for look in looks):
+    if not all(0.0 < decision_point <= 60.0 for decision_point in decision_points):
         raise wrong
-    return (*sorted(look for look in looks if look < window_s), window_s)
+    return (
+        *sorted(decision_point for decision_point in decision_points if decision_point < window_s),
+        window_s,
+    )
 
 
 def _tasks(dataset: DataSet, wanted: list[str] | None) -> tuple[str, ...]:
@@ -258,7 +266,7 @@ def describe(
             "python": platform.python_version(),
             **{name: version(name) for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")},
         },
-        looks_s=() if sequential is None else tuple(sequential.looks_s),
+        decision_points_s=() if sequential is None else tuple(sequential.decision_points_s),
         folds=() if sequential is None else sequential.sizes_,
     )
 

@@ -17,12 +17,13 @@ class Builder:
     """Nodes and constants of a graph under construction, either the main one or a branch.
 
     Attributes:
-        look: name of the scalar that says which look is asked for; unused without looks.
+        decision_point: name of the scalar that says which decision point is asked for; unused
+            without decision points.
     """
 
-    def __init__(self, scope: Any, container: Any, look: str = "") -> None:
+    def __init__(self, scope: Any, container: Any, decision_point: str = "") -> None:
         self._scope, self._container = scope, container
-        self.look = look
+        self.decision_point = decision_point
         self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
         self._branch: list[onnx.NodeProto] | None = None
 
@@ -41,18 +42,18 @@ class Builder:
         """Name of a constant (n,) of axes, places or counts."""
         return self.constant(values, np.int64)
 
-    def by_look(self, values: Sequence[Any], dtype: Any = np.float64) -> str:
-        """Name of the value of the look that is asked for: one of the stacked constants."""
+    def by_decision_point(self, values: Sequence[Any], dtype: Any = np.float64) -> str:
+        """Name of the stacked constants' value at the decision point that is asked for."""
         if len(values) == 1:
             return self.constant(values[0], dtype)
         stack = self.constant(np.stack(values), dtype)
-        return self.node("Gather", [stack, self.look], axis=0)
+        return self.node("Gather", [stack, self.decision_point], axis=0)
 
-    def by_look_small(self, values: Sequence[Any]) -> str:
-        """As `by_look` in float64, of numbers that float32 holds exactly: half the memory."""
+    def by_decision_point_small(self, values: Sequence[Any]) -> str:
+        """As `by_decision_point`, of numbers that float32 holds exactly: half the memory."""
         small = [np.asarray(value).astype(np.float32) for value in values]
         assert all((a == b).all() for a, b in zip(small, values, strict=True))
-        return self.node("Cast", [self.by_look(small, np.float32)], to=TensorProto.DOUBLE)
+        return self.node("Cast", [self.by_decision_point(small, np.float32)], to=TensorProto.DOUBLE)
 
     def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
         """Add an operator of one output and return its name."""
@@ -102,21 +103,28 @@ class Affine(Protocol):
     weights: NDArray[np.float64]
 
 
-def project(build: Builder, x: str, looks: Sequence[Affine]) -> str:
+def project(build: Builder, x: str, decision_points: Sequence[Affine]) -> str:
     """Features (n, p) to coordinates (n, c); see `train.pipeline.Projection`."""
-    d = build.node("Sub", [x, build.by_look([p.mean for p in looks])])
-    if not all((p.gain == 1.0).all() for p in looks):
-        d = build.node("Mul", [d, build.by_look([p.gain for p in looks])])
-    grids = [build.by_look([p.high for p in looks]), build.by_look([p.low for p in looks])]
+    d = build.node("Sub", [x, build.by_decision_point([p.mean for p in decision_points])])
+    if not all((p.gain == 1.0).all() for p in decision_points):
+        d = build.node("Mul", [d, build.by_decision_point([p.gain for p in decision_points])])
+    grids = [
+        build.by_decision_point([p.high for p in decision_points]),
+        build.by_decision_point([p.low for p in decision_points]),
+    ]
     halves = []
     for step in grids:
         half = build.node("Sub", [build.node("Add", [d, step]), step])
         halves.append(half)
         if step == grids[0]:
             d = build.node("Sub", [d, half])
-    weights = widened([p.weights for p in looks])
+    weights = widened([p.weights for p in decision_points])
     # Components are multiples of 2^-WEIGHT_BITS, which float32 holds.
-    weighing = build.by_look(weights) if len(weights) == 1 else build.by_look_small(weights)
+    weighing = (
+        build.by_decision_point(weights)
+        if len(weights) == 1
+        else build.by_decision_point_small(weights)
+    )
     high, low = (build.node("MatMul", [half, weighing]) for half in halves)
     return build.node("Add", [high, low])
 

@@ -109,19 +109,26 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
     answers = outputs(model, vectors)
     arrays |= {f"{task}_{what}": answers[f"{task}_{what}"] for task, what in wanted(model)}
-    if info.looks_s:
-        arrays["look_vectors"] = at_looks = np.stack(
+    if info.decision_points_s:
+        arrays["decision_point_vectors"] = at_decision_points = np.stack(
             [
                 np.stack([feature_vector(s, window, info.samples, info.features) for _, s in found])
-                for window in info.looks_s
+                for window in info.decision_points_s
             ]
         )
         # Besides the trials, which were trained with, points between them.
-        between = 0.5 * (at_looks + np.roll(at_looks, 1, axis=1))
-        arrays["look_vectors"] = at_looks = np.concatenate([at_looks, between], axis=1)
-        seen = [outputs(model, rows, look) for look, rows in enumerate(at_looks)]
+        between = 0.5 * (at_decision_points + np.roll(at_decision_points, 1, axis=1))
+        arrays["decision_point_vectors"] = at_decision_points = np.concatenate(
+            [at_decision_points, between], axis=1
+        )
+        seen = [
+            outputs(model, rows, decision_point)
+            for decision_point, rows in enumerate(at_decision_points)
+        ]
         for task, what in wanted(model):
-            arrays[f"{task}_look_{what}"] = np.stack([one[f"{task}_{what}"] for one in seen])
-    bounds = {key: BOUNDS[key] for key in BOUNDS if info.looks_s or key != "pvalues"}
+            arrays[f"{task}_decision_point_{what}"] = np.stack(
+                [one[f"{task}_{what}"] for one in seen]
+            )
+    bounds = {key: BOUNDS[key] for key in BOUNDS if info.decision_points_s or key != "pvalues"}
     meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays, meta, compress=True)

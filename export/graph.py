@@ -37,7 +37,9 @@ FLOAT32_FIT = (2.0**-16, 2.0**16)
 
 def _gaps(build: Builder, z: str, rows: Sequence[NDArray[np.float64]]) -> str:
     """Differences (n, c, rows) of the training rows (rows, c) from points (n, c)."""
-    columns = build.by_look([r.T for r in rows])  # (c, rows): sums over c then run along memory
+    columns = build.by_decision_point(
+        [r.T for r in rows]
+    )  # (c, rows): sums over c then run along memory
     return build.node("Sub", [columns, build.node("Unsqueeze", [z, build.ints(2)])])
 
 
@@ -81,7 +83,7 @@ def _shortlisted(
     scaled = any(unit != 1.0 for unit in units)
     if scaled:
         rows = [r * unit for r, unit in zip(rows, units, strict=True)]
-        z = build.node("Mul", [z, build.by_look(units)])
+        z = build.node("Mul", [z, build.by_decision_point(units)])
     lengths = [(r**2).sum(axis=1) for r in rows]
     u = (c + 8) * 2.0**-23
     slack = [2.0 * u * float(of.max()) for of in lengths]
@@ -89,12 +91,14 @@ def _shortlisted(
 
     ints = build.ints
     single = build.node("Cast", [z], to=TensorProto.FLOAT)
-    product = build.node("MatMul", [single, build.by_look([-2.0 * r.T for r in rows], np.float32)])
-    rough = build.node("Add", [product, build.by_look(lengths, np.float32)])
+    product = build.node(
+        "MatMul", [single, build.by_decision_point([-2.0 * r.T for r in rows], np.float32)]
+    )
+    rough = build.node("Add", [product, build.by_decision_point(lengths, np.float32)])
     values, picked = build.nodes("TopK", [rough, ints(count)], ["", ""], largest=0, sorted=1)
     # In the order of the rows, so that equal distances go to the earlier one.
     ordered, _ = build.nodes("TopK", [picked, ints(count)], ["", ""], largest=0, sorted=1)
-    near = build.node("Gather", [build.by_look(rows), ordered], axis=0)
+    near = build.node("Gather", [build.by_decision_point(rows), ordered], axis=0)
     gaps = build.node("Sub", [near, build.node("Unsqueeze", [z, ints(1)])])
     squares = build.node("ReduceSumSquare", [gaps, ints(2)], keepdims=0)
     short, places = build.nodes("TopK", [squares, ints(k)], ["", ""], largest=0, sorted=1)
@@ -109,7 +113,7 @@ def _shortlisted(
             build.node("Mul", [length, build.constant(1.0 - u)]),
         ],
     )
-    sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])
+    sure = build.node("Less", [build.node("Add", [kth, build.by_decision_point(slack)]), reach])
     flags = build.node("Cast", [sure], to=TensorProto.FLOAT)
     all_sure = build.node("ReduceMin", [flags, ints(0, 1)], keepdims=0)
     kinds = {"squares": (TensorProto.DOUBLE, 2), "rows": (TensorProto.INT64, 2)}
@@ -123,7 +127,9 @@ def _shortlisted(
         else_branch=other,
     )
     if scaled:
-        near_squares = build.node("Mul", [near_squares, build.by_look([u**-2 for u in units])])
+        near_squares = build.node(
+            "Mul", [near_squares, build.by_decision_point([u**-2 for u in units])]
+        )
     return [near_squares, near_rows]
 
 
@@ -167,31 +173,37 @@ def _decide(
     build.node("Squeeze", [label, axis], f"{task}_label")
 
 
-def _looks(model: ContactClassifier | SequentialClassifier) -> list[ContactClassifier]:
-    return model.looks_ if isinstance(model, SequentialClassifier) else [model]
+def _decision_points(model: ContactClassifier | SequentialClassifier) -> list[ContactClassifier]:
+    return model.decision_points_ if isinstance(model, SequentialClassifier) else [model]
 
 
 def _convert(scope: Any, operator: Any, container: Any) -> None:
     model: ContactClassifier | SequentialClassifier = operator.raw_operator
-    looks = _looks(model)
-    last = looks[-1]
+    decision_points = _decision_points(model)
+    last = decision_points[-1]
     build = Builder(scope, container)
     names = {output.raw_name: output.full_name for output in operator.outputs}
     x = operator.inputs[0].full_name
     if len(operator.inputs) > 1:
-        build.look = build.node("Squeeze", [operator.inputs[1].full_name])
-    kept = {task: max(look.components_[task] for look in looks) for task in model.choices}
+        build.decision_point = build.node("Squeeze", [operator.inputs[1].full_name])
+    kept = {
+        task: max(decision_point.components_[task] for decision_point in decision_points)
+        for task in model.choices
+    }
     groups: dict[tuple[str, int], str] = {}
     for task, choice in model.choices.items():
         key = (choice.scaling, kept[task])
         if key not in groups or choice.k > model.choices[groups[key]].k:
             groups[key] = task
-    points = {s: project(build, x, [m.projections_[s] for m in looks]) for s in last.projections_}
+    points = {
+        s: project(build, x, [m.projections_[s] for m in decision_points])
+        for s in last.projections_
+    }
     tasks = {task: names[f"{task}_label"].removesuffix("_label") for task in model.choices}
     near: dict[tuple[str, int], list[str]] = {}
     gaps: dict[str, str] = {}
     for (scaling, components), most in groups.items():
-        rows = widened([m.rows_[scaling] for m in looks])
+        rows = widened([m.rows_[scaling] for m in decision_points])
         have, k = rows[0].shape[1], model.choices[most].k
         # The rows of the task that asks for most neighbours are its output as they are.
         outputs = ("", f"{tasks[most]}_neighbours")
@@ -220,7 +232,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for task, choice in model.choices.items():
-        classes = len(_looks(model)[-1].classes_[task])
+        classes = len(_decision_points(model)[-1].classes_[task])
         found += [
             (f"{task}_label", Int64TensorType([None])),
             (f"{task}_scores", DoubleTensorType([None, classes])),
@@ -279,8 +291,8 @@ def _in_order(nodes: list[onnx.NodeProto], known: set[str]) -> list[onnx.NodePro
 def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
-    A `SequentialClassifier` gives a second input, `look` int64 (1,), and for each task the
-    output `<task>_pvalues` (n, folds, labels + 1); see `train.conformal`.
+    A `SequentialClassifier` gives a second input, `decision point` int64 (1,), and for each task
+    the output `<task>_pvalues` (n, folds, labels + 1); see `train.conformal`.
     """
     kind = type(model)
     update_registered_converter(
@@ -288,7 +300,7 @@ def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) ->
     )
     inputs: list[tuple[str, Any]] = [("features", DoubleTensorType([None, info.width]))]
     if isinstance(model, SequentialClassifier):
-        inputs.append(("look", Int64TensorType([1])))
+        inputs.append(("decision_point", Int64TensorType([1])))
     proto = convert_sklearn(
         model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
     )

@@ -17,7 +17,7 @@ from train.pipeline import Projection
 
 @dataclass
 class Folds:
-    """The projections of all folds at one look, stacked for `export.build.project`."""
+    """The projections of all folds at one decision point, stacked for `export.build.project`."""
 
     mean: NDArray[np.float64]
     gain: NDArray[np.float64]
@@ -50,9 +50,9 @@ def pvalues(
     all are 1, which strikes out no label, where it is -1.
 
     Args:
-        build: of the graph, which knows the look.
+        build: of the graph, which knows the decision point.
         x: name of the features.
-        asked: name of the look (1,).
+        asked: name of the decision point (1,).
         model: fitted.
         names: of the outputs in the graph.
     """
@@ -113,7 +113,9 @@ def _gaps(build: Builder, wide: str, model: SequentialClassifier, scaling: str) 
         z = build.node("Slice", [z, *(build.ints(i) for i in (0, c, 3))])
     # (n, folds, c, 1), against rows (folds, c, rows): sums then run along memory.
     z = build.node("Unsqueeze", [build.node("Squeeze", [z, build.ints(2)]), build.ints(3)])
-    rows = build.by_look_small([look.transpose(0, 2, 1) for look in widest.rows])
+    rows = build.by_decision_point_small(
+        [decision_point.transpose(0, 2, 1) for decision_point in widest.rows]
+    )
     return build.node("Sub", [rows, z]), c
 
 
@@ -153,14 +155,14 @@ def _pvalues(build: Builder, scores: str, calibrations: list[Calibration]) -> st
     for i, calibration in enumerate(calibrations):
         kinds += [2 * i] * calibration.classes + [2 * i + 1]
     columns = build.ints(*kinds)
-    looks = range(len(calibrations[0].rankings))
+    decision_points = range(len(calibrations[0].rankings))
     folds = range(len(calibrations[0].sizes))
 
     def stacked(part: Callable[[Ranking], Any]) -> list[NDArray[np.float64]]:
-        """(folds, kinds, ...) of each look."""
+        """(folds, kinds, ...) of each decision point."""
         return [
             np.array([[part(r) for c in calibrations for r in c.rankings[i][k]] for k in folds])
-            for i in looks
+            for i in decision_points
         ]
 
     def counted(flags: str) -> str:
@@ -168,7 +170,7 @@ def _pvalues(build: Builder, scores: str, calibrations: list[Calibration]) -> st
         return build.node("ReduceSum", [numbers, last], keepdims=0)
 
     def spread(values: list[NDArray[np.float64]]) -> str:
-        return build.node("Gather", [build.by_look(values), columns], axis=1)
+        return build.node("Gather", [build.by_decision_point(values), columns], axis=1)
 
     limits, scale = spread(stacked(lambda r: r.limits)), spread(stacked(lambda r: r.scale))
     maxima = np.concatenate([c.maxima for c in calibrations])[kinds].transpose(1, 0, 2)

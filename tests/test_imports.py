@@ -42,14 +42,30 @@ def test_nothing_pickles(package):
         assert not imported(path) & FORBIDDEN, path
 
 
-ORDER = ["frame", "region", "track", "features", "model", "live"]
+FRAME = ["i2c", "skin", "touch", "model", "classifier", "runtime", "commands"]
+"""The way of one frame through `edge/`: each stage knows those before it."""
+OF_A_FRAME = {"edge.touch.frame", "edge.touch.layout"}
+"""What the stages hand on; the skin makes them."""
 
 
-@pytest.mark.parametrize("name", ORDER)
-def test_no_room_of_the_path_reaches_back(name):
+@pytest.mark.parametrize("stage", FRAME)
+def test_no_stage_reaches_back(stage):
     """bus, chip, skin, region, track, features, model, decision: each knows those before it."""
-    later = {f"edge.{room}" for room in ORDER[ORDER.index(name) + 1 :]}
-    assert not imported(ROOT / "edge" / f"{name}.py") & later
+    later = FRAME[FRAME.index(stage) + 1 :]
+    path = ROOT / "edge" / stage
+    for module in sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]:
+        for name in imported(module) - OF_A_FRAME:
+            assert name.split(".")[1:2] not in [[room] for room in later], f"{module}: {name}"
+
+
+TOUCH = ["frame", "layout", "region", "measures", "track", "features"]
+
+
+@pytest.mark.parametrize("name", TOUCH)
+def test_no_room_of_a_touch_reaches_back(name):
+    """A frame becomes a region, a contact, a vector, in this order."""
+    later = {f"edge.touch.{room}" for room in TOUCH[TOUCH.index(name) + 1 :]}
+    assert not imported(ROOT / "edge" / "touch" / f"{name}.py") & later
 
 
 def test_importing_the_path_does_not_load_onnxruntime():

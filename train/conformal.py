@@ -2,8 +2,9 @@
 
 What is guaranteed. The trials are dealt into K folds without regard to their labels. For fold k
 the scaling, the components and the neighbours come from the other folds alone, and so does the
-rank g_k of a score at a look. With s(look, y) the score of a trial for a label y, m_k =
-max over the looks of g_k(s(look, y)) is then one fixed function of a trial and a label, and the
+rank g_k of a score at a look. With s(decision point, y) the score of a trial for a label y, m_k =
+max over the decision points of g_k(s(decision point, y)) is then one fixed function of a trial and
+a label, and the
 fold's trials with their own labels and a new trial with its own are exchangeable as far as all
 are drawn alike. So
 
@@ -11,8 +12,9 @@ are drawn alike. So
 
 is a valid p-value of the true label: P(p_k <= a) <= a, for every a (split conformal prediction;
 Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005). As the largest over a
-part of the looks is at most that over all, this holds at every look at once: the true label,
-struck out at the first look at which p_k <= a, survives all looks with probability 1 - a.
+part of the decision points is at most that over all, this holds at every look at once: the true
+label,
+struck out at the first look at which p_k <= a, survives all decision points with probability 1 - a.
 
 The mean of K valid p-values is at most a with probability at most 2 a, however they depend on
 each other (Rüschendorf 1982; Vovk and Wang, Combining p-values via averaging, 2020). So striking
@@ -113,16 +115,17 @@ class Ranking:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the p-values of one task are made of; L looks, K folds, R rows, M trials a fold.
+    """What the p-values of one task are made of; L decision points, K folds, R rows, M trials a
+    fold.
 
     Attributes:
-        projections: [look][fold], fitted on the other folds.
+        projections: [decision point][fold], fitted on the other folds.
         rows: (L, K, R, c) projected trials of the other folds, rounded to float32 (a board's
             memory is small), `FAR` beyond their number.
         labels: (K, R) their classes, -1 beyond their number.
-        rankings: [look][fold] of the ratio, and of the distance to the nearest.
-        maxima: (2, K, M) largest rank over the looks of each of the fold's own trials, by ratio
-            and by distance; -1 beyond their number.
+        rankings: [decision point][fold] of the ratio, and of the distance to the nearest.
+        maxima: (2, K, M) largest rank over the decision points of each of the fold's own trials,
+            by ratio and by distance; -1 beyond their number.
         sizes: (K,) trials of the fold.
         classes: number of labels.
     """
@@ -135,15 +138,15 @@ class Calibration:
     sizes: NDArray[np.int64]
     classes: int
 
-    def pvalues(self, look: int, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, K, classes + 1) at one look; the last is that of lying far from all."""
+    def pvalues(self, decision_point: int, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, K, classes + 1) at one decision point; the last is that of lying far from all."""
         out = np.empty((len(X), len(self.sizes), self.classes + 1))
         for k, size in enumerate(self.sizes):
             c = self.rows.shape[-1]
-            points = _padded(self.projections[look][k](X), c)
-            squares = squares_between(points, self.rows[look, k].astype(np.float64))
+            points = _padded(self.projections[decision_point][k](X), c)
+            squares = squares_between(points, self.rows[decision_point, k].astype(np.float64))
             nearest = nearest_by_label(squares, self.labels[k], self.classes)
-            ratio, far = self.rankings[look][k]
+            ratio, far = self.rankings[decision_point][k]
             ranks = np.column_stack([ratio(ratios(nearest)), far(nearest.min(axis=1))])
             own = np.stack([self.maxima[0, k]] * self.classes + [self.maxima[1, k]])
             out[:, k] = (1 + (ranks[..., None] <= own).sum(axis=-1)) / (1 + size)
@@ -176,37 +179,38 @@ def calibrate(
     """Calibrate one task.
 
     Args:
-        X: (L, n, p) feature vectors at each look.
+        X: (L, n, p) feature vectors at each decision point.
         labels: (n,) class indices.
         classes: number of labels.
         choice: scaling and components.
         features: names of the feature types.
         fold_of: (n,) from `deal`.
-        projections: [look][fold] fitted on the other folds with at least that many components.
+        projections: [decision point][fold] fitted on the other folds with at least that many
+            components.
     """
-    looks, n = X.shape[:2]
+    decision_points, n = X.shape[:2]
     folds = int(fold_of.max()) + 1
     sizes = np.bincount(fold_of, minlength=folds)
     c = min(choice.components, max(p.weights.shape[1] for row in projections for p in row))
-    rows = np.full((looks, folds, n - int(sizes.min()), c), FAR, dtype=np.float32)
+    rows = np.full((decision_points, folds, n - int(sizes.min()), c), FAR, dtype=np.float32)
     row_labels = np.full(rows.shape[1:3], -1, dtype=np.int64)
     maxima = np.full((2, folds, int(sizes.max())), -1.0)
-    rankings: list[list[tuple[Ranking, Ranking]]] = [[] for _ in range(looks)]
+    rankings: list[list[tuple[Ranking, Ranking]]] = [[] for _ in range(decision_points)]
     for k in range(folds):
         others, own = fold_of != k, fold_of == k
         count, size = int(others.sum()), int(own.sum())
         row_labels[k, :count] = labels[others]
         best = np.full((2, size), -np.inf)
-        for look in range(looks):
-            points = _padded(projections[look][k](X[look]), c)
-            rows[look, k, :count] = points[others]
-            known = rows[look, k, :count].astype(np.float64)
+        for decision_point in range(decision_points):
+            points = _padded(projections[decision_point][k](X[decision_point]), c)
+            rows[decision_point, k, :count] = points[others]
+            known = rows[decision_point, k, :count].astype(np.float64)
             among = squares_between(known, known)
             np.fill_diagonal(among, np.inf)
             seen = nearest_by_label(among, labels[others], classes)
             ratio = Ranking.of(ratios(seen)[np.arange(count), labels[others]])
             far = Ranking.of(seen.min(axis=1))
-            rankings[look].append((ratio, far))
+            rankings[decision_point].append((ratio, far))
             new = nearest_by_label(squares_between(points[own], known), labels[others], classes)
             best[0] = np.maximum(best[0], ratio(ratios(new)[np.arange(size), labels[own]]))
             best[1] = np.maximum(best[1], far(new.min(axis=1)))
@@ -218,14 +222,14 @@ class SequentialClassifier(BaseEstimator):
     """All tasks of a model at several windows, with calibrated p-values.
 
     Args:
-        choices: {task: Choice}, the same at every look.
-        looks_s: windows in seconds, increasing; the last is the full window.
+        choices: {task: Choice}, the same at every decision point.
+        decision_points_s: windows in seconds, increasing; the last is the full window.
         features: names of the feature types, in the order of the vectors.
         folds: of the calibration.
         seed: of the deal into folds.
 
     Attributes:
-        looks_: a fitted `ContactClassifier` a look.
+        decision_points_: a fitted `ContactClassifier` a look.
         calibrations_: {task: Calibration}.
         sizes_: trials of each fold.
     """
@@ -233,13 +237,13 @@ class SequentialClassifier(BaseEstimator):
     def __init__(
         self,
         choices: Mapping[str, Choice],
-        looks_s: Sequence[float],
+        decision_points_s: Sequence[float],
         features: Sequence[str] = FEATURES,
         folds: int = FOLDS,
         seed: int = 0,
     ) -> None:
         self.choices = choices
-        self.looks_s = looks_s
+        self.decision_points_s = decision_points_s
         self.features = features
         self.folds = folds
         self.seed = seed
@@ -247,7 +251,7 @@ class SequentialClassifier(BaseEstimator):
     def fit(
         self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
     ) -> SequentialClassifier:
-        """Fit on X (looks, n, p) and labels y[task] (n,).
+        """Fit on X (decision_points, n, p) and labels y[task] (n,).
 
         Raises:
             InputError: there are too few trials for the folds, or X is not finite.
@@ -256,7 +260,7 @@ class SequentialClassifier(BaseEstimator):
         if n < FEWEST * self.folds:
             raise InputError(
                 f"calibration in {self.folds} folds needs at least {FEWEST * self.folds} trials, "
-                f"not {n}; record more, or export without looks"
+                f"not {n}; record more, or export without decision points"
             )
         # Decompositions this small are slower on several threads, and far slower where those wait.
         with threadpool_limits(1):
@@ -265,10 +269,12 @@ class SequentialClassifier(BaseEstimator):
     def _fit(
         self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
     ) -> SequentialClassifier:
-        looks, n = X.shape[:2]
-        self.looks_ = [ContactClassifier(self.choices, self.features).fit(x, y) for x in X]
+        decision_points, n = X.shape[:2]
+        self.decision_points_ = [
+            ContactClassifier(self.choices, self.features).fit(x, y) for x in X
+        ]
         self.n_features_in_ = X.shape[2]
-        last = self.looks_[-1]
+        last = self.decision_points_[-1]
         fold_of = deal(n, self.folds, self.seed)
         most: dict[str, int] = {}
         for choice in self.choices.values():
@@ -276,10 +282,10 @@ class SequentialClassifier(BaseEstimator):
         fitted = {
             scaling: [
                 [
-                    Projection(X[look][fold_of != k], scaling, c, self.features)
+                    Projection(X[decision_point][fold_of != k], scaling, c, self.features)
                     for k in range(self.folds)
                 ]
-                for look in range(looks)
+                for decision_point in range(decision_points)
             ]
             for scaling, c in most.items()
         }

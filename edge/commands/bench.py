@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge import __version__
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.commands.check import FRAMES
 from edge.errors import EdgeError, InputError
 from edge.fake.player import frame_bits
@@ -35,8 +35,8 @@ from edge.touch.track import Tracker
 FORMAT = 1
 RATE_HZ = 100.0
 COLD_STARTS = 5
-COLD = "import sys; from edge.classifier import Watcher; from edge.model.model import Model; \
-Watcher(Model(sys.argv[1]))"
+COLD = "import sys; from edge.classifier import Classifier; from edge.model.model import Model; \
+Classifier(Model(sys.argv[1]))"
 Timings = dict[str, float | int]
 
 
@@ -110,7 +110,7 @@ def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
             "features": list(model.info.features),
             "samples": model.info.samples,
             "window_s": model.info.window_s,
-            "looks_s": list(model.info.looks_s),
+            "decision_points_s": list(model.info.decision_points_s),
             "tasks": {
                 name: {"components": task.components, "k": task.k, "scaling": task.scaling}
                 for name, task in model.info.tasks.items()
@@ -158,7 +158,7 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     """
     info = model.info
     frames = touch(model, info.window_s)
-    layout = Watcher(model).layout
+    layout = Classifier(model).layout
     inside = frames[1:-2]
     settings = {"threshold": layout.threshold_counts, "valid": None, "wraps": layout.wraps}
     tracker = Tracker(
@@ -195,10 +195,10 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     few = max(rounds // 10, 20)
     last: list[float] = []
     while len(last) < few:
-        watcher = Watcher(model)
+        classifier = Classifier(model)
         for i, frame in enumerate(frames[: deciding + 1]):
             began = time.perf_counter_ns()
-            watcher.push(frame)
+            classifier.push(frame)
             if i == deciding:
                 last.append((time.perf_counter_ns() - began) / 1e3)
     repeated = [frame.counts for frame in inside]
@@ -217,7 +217,7 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
             )
         ),
         "decision": summary(timed(lambda i: model.decide(vector), rounds)),
-        "frame": summary(pushed(lambda: Watcher(model), lambda times: times[1:-2])),
+        "frame": summary(pushed(lambda: Classifier(model), lambda times: times[1:-2])),
         "last": summary(last),
     }
 

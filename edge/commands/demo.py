@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from edge import demo
-from edge.classifier import Event, Watcher
+from edge.classifier import Classifier, Event
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import Recording, load
@@ -33,10 +33,10 @@ def events(model: Model, recording: Recording) -> Iterator[Event]:
     """What `edge-classify run` would say of a recording on fake chips."""
     skin, playback = play(skin_file(recording.layout), recording)
     with skin:
-        watcher = Watcher(model, skin.layout)
+        classifier = Classifier(model, skin.layout)
         for frame in Loop(skin, joints=playback, lasts_s=playback.ends).frames():
-            yield from watcher.push(frame)
-        yield from watcher.finish()
+            yield from classifier.push(frame)
+        yield from classifier.finish()
 
 
 def run(arguments: argparse.Namespace) -> int:

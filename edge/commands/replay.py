@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from edge.classifier import Event, Watcher, require_joints
+from edge.classifier import Classifier, Event
 from edge.commands.summary import Summary
 from edge.commands.sure import add_error, check_error
 from edge.errors import InputError
-from edge.model.model import Model
+from edge.model.model import Model, require_joints
 from edge.recording import Recording, find, load
 
 
@@ -47,9 +47,9 @@ def decide(
     joints = recording.joints
     require_joints(model, None if joints is None else joints.shape[1], name)
     try:
-        watcher = Watcher(model, recording.layout, error=error)
-        events = [event for frame in recording for event in watcher.push(frame)]
-        events += watcher.finish()
+        classifier = Classifier(model, recording.layout, error=error)
+        events = [event for frame in recording for event in classifier.push(frame)]
+        events += classifier.finish()
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     if not any(event["event"] == "onset" for event in events):

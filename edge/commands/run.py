@@ -9,7 +9,7 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from edge.classifier import Event, Watcher
+from edge.classifier import Classifier, Event
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
 from edge.commands.sure import add_error, check_error
 from edge.model.model import Model
@@ -90,14 +90,14 @@ def run(arguments: argparse.Namespace) -> int:
         skin = opened.skin
         dof = None if chain is None else chain.dof
         joints = stack.enter_context(open_joints(arguments, opened, dof))
-        watcher = Watcher(
+        classifier = Classifier(
             model, skin.layout, error=arguments.error, several=arguments.map is not None
         )
         touch_map = None
         if arguments.map is not None:
             touch_map = stack.enter_context(MapFile(arguments.map, model.info))
         # The model's threshold counts where it is the lower one.
-        skin.touch_counts = min(skin.touch_counts, watcher.layout.threshold_counts)
+        skin.touch_counts = min(skin.touch_counts, classifier.layout.threshold_counts)
         loop = Loop(
             skin,
             joints=joints if chain is not None else None,
@@ -118,10 +118,10 @@ def run(arguments: argparse.Namespace) -> int:
             emit([chip_event(status, frame.t) for status in skin.changes()])
             if on_skin:
                 # A contact keeps the chain that it finds at its first frame.
-                watcher.tracker.chain = None if frame.joints is None else chain
-            emit(watcher.push(frame))
+                classifier.tracker.chain = None if frame.joints is None else chain
+            emit(classifier.push(frame))
         notifier.stopping()
-        emit(watcher.finish())
+        emit(classifier.finish())
         emit([end_event(loop.schedule, frames)])
         if lines.lost:
             print(

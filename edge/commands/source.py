@@ -10,11 +10,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from edge.classifier import require_joints
 from edge.errors import InputError
 from edge.fake.clock import PacedClock, VirtualClock
 from edge.fake.player import Playback, play, skin_file
-from edge.model.model import Model
+from edge.model.model import Model, require_joints
 from edge.recording import load
 from edge.runtime import joint_stream as joints
 from edge.runtime.loop import JointSource

@@ -30,9 +30,10 @@ def check_error(model: Model, error: float | None) -> None:
     if error is None:
         return
     check_rate(error, "--error")
-    if not model.info.looks_s:
+    if not model.info.decision_points_s:
         raise InputError(
-            f"{model.path}: has no calibration, so --error cannot be held; export it with --looks"
+            f"{model.path}: has no calibration, so --error cannot be held; "
+            "export it with --decision-points"
         )
     smallest = model.info.smallest_error
     if error < smallest:

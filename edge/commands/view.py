@@ -7,7 +7,7 @@ import signal
 import sys
 from typing import Any
 
-from edge.classifier import Event, Watcher
+from edge.classifier import Classifier, Event
 from edge.commands import terminal
 from edge.commands.source import add_skin, check_joints, open_joints, open_skin
 from edge.errors import InputError
@@ -78,8 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace, skin: Any, model: Model | None, loop: Loop) -> None:
-    watcher = None if model is None else Watcher(model, skin.layout)
-    layout = skin.layout if watcher is None else watcher.layout
+    classifier = None if model is None else Classifier(model, skin.layout)
+    layout = skin.layout if classifier is None else classifier.layout
     tasks = () if model is None else tuple(model.info.tasks)
     decisions = dict.fromkeys(tasks, "no contact yet")
     due, before = -float("inf"), ""
@@ -87,7 +87,7 @@ def _show(arguments: argparse.Namespace, skin: Any, model: Model | None, loop: L
     out.write(terminal.HIDE + terminal.CLEAR)
     try:
         for frame in loop.frames():
-            for event in watcher.push(frame) if watcher is not None else ():
+            for event in classifier.push(frame) if classifier is not None else ():
                 if event["event"] == "onset":
                     decisions = dict.fromkeys(tasks, "touching ...")
                 elif event["event"] == "decision":

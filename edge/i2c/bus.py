@@ -140,7 +140,8 @@ def bus_error(code: int | None, bus: str, address: int | None = None) -> BusErro
 
     >>> raise bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
     Traceback (most recent call last):
-    edge.i2c.bus.BusTimeout: /dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)
+    edge.i2c.bus.BusTimeout: /dev/i2c-1, address 0x2c: the transfer hung until its timeout
+    (ETIMEDOUT)
     """
     code = code or errno.EIO
     place = bus if address is None else f"{bus}, address {address:#04x}"

@@ -18,9 +18,9 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 
 METADATA_KEY = "edge-classify"
-FORMAT = 1
+FORMAT = 2
 LARGEST_BYTES = 1 << 30
-NO_LOOK = -1
+NO_DECISION_POINT = -1
 """Asks the graph for the full window, and not for p-values."""
 
 
@@ -61,7 +61,7 @@ class ModelInfo:
     """Training trials."""
     data_digest: str
     versions: dict[str, str] = field(default_factory=dict)
-    looks_s: tuple[float, ...] = ()
+    decision_points_s: tuple[float, ...] = ()
     """Windows at which the model can be asked, the last the full one; none without calibration."""
     folds: tuple[int, ...] = ()
     """Trials in each fold of the calibration."""
@@ -78,7 +78,9 @@ class ModelInfo:
 
     def to_json(self) -> str:
         """As the model file carries it."""
-        calibration = {"looks_s": self.looks_s, "folds": self.folds} if self.looks_s else {}
+        calibration = {}
+        if self.decision_points_s:
+            calibration = {"decision_points_s": self.decision_points_s, "folds": self.folds}
         return json.dumps(
             {
                 **calibration,
@@ -137,7 +139,7 @@ class ModelInfo:
                 rows=int(meta["rows"]),
                 data_digest=str(meta["data_digest"]),
                 versions={str(k): str(v) for k, v in meta.get("versions", {}).items()},
-                looks_s=tuple(map(float, meta.get("looks_s", ()))),
+                decision_points_s=tuple(map(float, meta.get("decision_points_s", ()))),
                 folds=tuple(map(int, meta.get("folds", ()))),
             )
         except InputError:
@@ -161,11 +163,15 @@ class ModelInfo:
             raise InputError(f"{name}: its metadata names no task or no label; export it again")
         if not (0.0 < self.window_s <= 3600.0 and 2 <= self.samples <= 10000):
             raise InputError(f"{name}: its window or samples make no sense; export it again")
-        if self.looks_s:
-            before = (0.0, *self.looks_s[:-1])
-            rising = all(a < b for a, b in zip(before, self.looks_s, strict=True))
-            if not rising or self.looks_s[-1] != self.window_s or min(self.folds, default=0) < 1:
-                raise InputError(f"{name}: its looks make no sense; export it again")
+        if self.decision_points_s:
+            before = (0.0, *self.decision_points_s[:-1])
+            rising = all(a < b for a, b in zip(before, self.decision_points_s, strict=True))
+            if (
+                not rising
+                or self.decision_points_s[-1] != self.window_s
+                or min(self.folds, default=0) < 1
+            ):
+                raise InputError(f"{name}: its decision points make no sense; export it again")
         if (self.motion_frame == "world") != (self.chain is not None):
             raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
 
@@ -180,7 +186,8 @@ class Decision(NamedTuple):
         distances: (k,) of the neighbours, nearest first, in PCA space.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
-        pvalues: (folds, labels + 1) at the look that was asked for; see `edge.model.prediction_set`.
+        pvalues: (folds, labels + 1) at the decision point that was asked for; see
+            `edge.model.prediction_set`.
     """
 
     label: str
@@ -235,7 +242,7 @@ class Model:
         # decision then allocates next to nothing.
         self._shape = (self.info.width,)
         self._input = np.zeros((1, *self._shape))
-        self._look = np.full(1, NO_LOOK, dtype=np.int64)
+        self._decision_point = np.full(1, NO_DECISION_POINT, dtype=np.int64)
         outputs: dict[str, NDArray[Any]] = {
             output.name: np.zeros(
                 [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
@@ -245,8 +252,8 @@ class Model:
         self._binding = self._session.io_binding()
         value = runtime.OrtValue.ortvalue_from_numpy
         self._binding.bind_ortvalue_input("features", value(self._input))
-        if self.info.looks_s:
-            self._binding.bind_ortvalue_input("look", value(self._look))
+        if self.info.decision_points_s:
+            self._binding.bind_ortvalue_input("decision_point", value(self._decision_point))
         for output, array in outputs.items():
             self._binding.bind_ortvalue_output(output, value(array))
         self._answers = [
@@ -257,7 +264,7 @@ class Model:
                 outputs[f"{task}_scores"][0],
                 outputs[f"{task}_distances"][0],
                 outputs[f"{task}_neighbours"][0],
-                outputs[f"{task}_pvalues"][0] if self.info.looks_s else None,
+                outputs[f"{task}_pvalues"][0] if self.info.decision_points_s else None,
             )
             for task, entry in self.info.tasks.items()
         ]
@@ -268,8 +275,12 @@ class Model:
         if not inputs or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
             raise InputError(f"{name}: has no float64 input `features`; export it again")
         more = [(i.name, i.type, list(i.shape)) for i in inputs[1:]]
-        if more != ([("look", "tensor(int64)", [1])] if self.info.looks_s else []):
-            raise InputError(f"{name}: its inputs and its looks disagree; export it again")
+        if more != (
+            [("decision_point", "tensor(int64)", [1])] if self.info.decision_points_s else []
+        ):
+            raise InputError(
+                f"{name}: its inputs and its decision points disagree; export it again"
+            )
         if len(shape) != 2 or shape[1] != self.info.width:
             raise InputError(
                 f"{name}: takes {shape[1:]} features, its metadata says {self.info.width}; "
@@ -288,55 +299,66 @@ class Model:
                         "as its metadata says; export it again"
                     )
             folds = [len(self.info.folds), len(entry.labels) + 1]
-            if self.info.looks_s and list(outputs.get(f"{task}_pvalues", ()))[1:] != folds:
+            if (
+                self.info.decision_points_s
+                and list(outputs.get(f"{task}_pvalues", ()))[1:] != folds
+            ):
                 raise InputError(
                     f"{name}: has no output {task}_pvalues of shape {folds}, "
                     "as its metadata says; export it again"
                 )
 
     @property
-    def looks_s(self) -> tuple[float, ...]:
+    def decision_points_s(self) -> tuple[float, ...]:
         """Windows at which the model can be asked; the full one alone without calibration."""
-        return self.info.looks_s or (self.info.window_s,)
+        return self.info.decision_points_s or (self.info.window_s,)
 
-    def run(self, vectors: NDArray[np.float64], look: int | None = None) -> dict[str, NDArray[Any]]:
+    def run(
+        self, vectors: NDArray[np.float64], decision_point: int | None = None
+    ) -> dict[str, NDArray[Any]]:
         """The graph's outputs for vectors (n, width), unguarded; for checks and benchmarks.
 
         Args:
-            vectors: measured over the window of the look.
-            look: place in `looks_s`; the last where None.
+            vectors: measured over the window of the decision point.
+            decision_point: place in `decision_points_s`; the last where None.
         """
         given: dict[str, NDArray[Any]] = {"features": vectors}
-        if self.info.looks_s:
-            given["look"] = np.array([self._place(look)], dtype=np.int64)
+        if self.info.decision_points_s:
+            given["decision_point"] = np.array([self._place(decision_point)], dtype=np.int64)
         values = self._session.run(self._names, given)
         return dict(zip(self._names, values, strict=True))
 
-    def _place(self, look: int | None) -> int:
-        looks = len(self.looks_s)
-        if look is None:
-            return looks - 1
-        if not 0 <= look < looks:
-            raise InputError(f"{self.path}: has the looks 0 to {looks - 1}, not {look}")
-        return look
+    def _place(self, decision_point: int | None) -> int:
+        decision_points = len(self.decision_points_s)
+        if decision_point is None:
+            return decision_points - 1
+        if not 0 <= decision_point < decision_points:
+            raise InputError(
+                f"{self.path}: has the decision points 0 to {decision_points - 1}, "
+                f"not {decision_point}"
+            )
+        return decision_point
 
-    def decide(self, vector: ArrayLike, look: int | None = None) -> dict[str, Decision]:
+    def decide(self, vector: ArrayLike, decision_point: int | None = None) -> dict[str, Decision]:
         """Decide all tasks for one feature vector; not for several threads at once.
 
         Args:
-            vector: (width,) measured over the window of the look.
-            look: place in `looks_s`, to know the p-values there; the full window without them
-                where None.
+            vector: (width,) measured over the window of the decision point.
+            decision_point: place in `decision_points_s`, to know the p-values there; the full
+                window without them where None.
 
         Raises:
             InputError: the vector has another length, or a value that is not finite (or is so
-                large that no distance to the training rows is); the model has no such look.
+                large that no distance to the training rows is); the model has no such decision
+                point.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != self._shape:
             raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
         self._input[0] = x
-        self._look[0] = NO_LOOK if look is None else self._place(look)
+        self._decision_point[0] = (
+            NO_DECISION_POINT if decision_point is None else self._place(decision_point)
+        )
         self._session.run_with_iobinding(self._binding)
         decisions: dict[str, Decision] = {}
         for name, labels, label, scores, distances, neighbours, pvalues in self._answers:
@@ -351,7 +373,7 @@ class Model:
                 distances.copy(),
                 neighbours.copy(),
                 shares.count(shares[index]) > 1,
-                None if look is None or pvalues is None else pvalues.copy(),
+                None if decision_point is None or pvalues is None else pvalues.copy(),
             )
         return decisions
 
@@ -364,6 +386,24 @@ class Model:
         bad = int(np.argmin(np.isfinite(x)))
         feature = self.info.features[bad // self.info.samples]
         return InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
+
+
+def require_joints(model: Model, dof: int | None, where: str) -> None:
+    """Refuse a source whose joint angles are not what the model's motion is measured with.
+
+    Raises:
+        InputError: the sentence names `where`.
+    """
+    chain = model.info.chain
+    if chain is None:
+        return
+    if dof is None:
+        raise InputError(
+            f"{where}: has no joint angles, the model measures motion with {chain.dof}; "
+            "record them, or export a model without joints"
+        )
+    if dof != chain.dof:
+        raise InputError(f"{where}: has {dof} joint angles, the model's arm has {chain.dof}")
 
 
 class _Answer(NamedTuple):

@@ -1,4 +1,4 @@
-"""Which labels a contact can still have, look by look."""
+"""Which labels a contact can still have, decision point by decision point."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from edge.errors import InputError
 
 UNKNOWN = "unknown"
 """What a contact is called that no label fits."""
-ALARMS = 0.05
+NOVELTY_RATE = 0.05
 """How often a contact with a trained thing may be called unknown for lying far from all."""
 
 
@@ -24,33 +24,34 @@ def check_rate(value: float, what: str) -> float:
     return value
 
 
-class Candidates:
+class PredictionSet:
     """The labels of one task that a contact can still have.
 
-    A model with looks gives at every look, for each fold of its calibration, a p-value a label
+    A model with decision points gives at every decision point, for each fold of its calibration, a
+    p-value a label
     and one for its lying far from all that was trained (see `train.conformal`). A label keeps
-    the least p-value of its looks in each fold; it is struck out, for good, once their mean over
-    the folds is at most `error`.
+    the least p-value of its decision points in each fold; it is struck out, for good, once their
+    mean over the folds is at most `error`.
 
     Args:
         labels: how many there are.
         error: how often the true label may be struck out, in (0, 1).
-        alarms: how often a trained thing may be called unknown for lying far from all.
+        novelty_rate: how often a trained thing may be called unknown for lying far from all.
     """
 
-    def __init__(self, labels: int, error: float, alarms: float = ALARMS) -> None:
-        self.error, self.alarms = error, alarms
+    def __init__(self, labels: int, error: float, novelty_rate: float = NOVELTY_RATE) -> None:
+        self.error, self.novelty_rate = error, novelty_rate
         self._least: NDArray[np.float64] | None = None
         self._mean = np.ones(labels + 1)
 
-    def look(self, pvalues: NDArray[np.float64]) -> None:
+    def update(self, pvalues: NDArray[np.float64]) -> None:
         """Take in a look's p-values (folds, labels + 1)."""
         self._least = pvalues if self._least is None else np.minimum(self._least, pvalues)
         self._mean = self._least.mean(axis=0)
 
     @property
     def pvalues(self) -> NDArray[np.float64]:
-        """(labels,) over the looks so far."""
+        """(labels,) over the decision points so far."""
         return self._mean[:-1]
 
     @property
@@ -61,18 +62,18 @@ class Candidates:
     @property
     def unknown(self) -> bool:
         """No label is left, or the contact lies too far from all that was trained."""
-        return bool(self._mean[-1] <= self.alarms) or not self.left
+        return bool(self._mean[-1] <= self.novelty_rate) or not self.left
 
     @property
     def settled(self) -> bool:
-        """Further looks cannot change the answer: one label is left, or the contact is unknown."""
+        """No later decision point can change the answer: one label is left, or it is unknown."""
         return self.unknown or len(self.left) == 1
 
     def best(self, favourite: int) -> int:
         """The favourite (the vote's answer) where it is left, else the label likeliest to be.
 
         The vote at the full window is right oftener than the largest of p-values that account
-        for every look.
+        for every decision point.
         """
         if favourite in self.left:
             return favourite

@@ -10,9 +10,9 @@
 | `series_counts` | int64 (s, c) | `FeatureSeries.integers`: exact |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
-| `<task>_pvalues` | float64 (v, folds, labels + 1) | likewise, of a model with looks |
-| `look_vectors` | float64 (looks, w, width) | vectors for each look; the first m are the trials' |
-| `<task>_look_label`, ... | | the graph's outputs for `look_vectors`, each at its look |
+| `<task>_pvalues` | float64 (v, folds, labels + 1) | likewise, of a model with decision points |
+| `decision_point_vectors` | float64 (points, w, width) | likewise, for each decision point |
+| `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
 | `meta` | JSON text | `skin`, `bounds` {`scores`, `distances`, `features`, `time_s`} |
 
 A bound b allows abs(seen - expected) <= b * max(1, abs(expected)).
@@ -27,9 +27,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.classifier import require_joints
 from edge.errors import InputError
-from edge.model.model import Model
+from edge.model.model import Model, require_joints
 from edge.recording import Recording, load_arrays, load_meta
 from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
@@ -142,7 +141,7 @@ def _verify_path(
     info = model.info
     onsets = np.full(len(trials), np.nan)
     vectors = np.full((len(trials), info.width), np.nan)
-    look_vectors = np.full((len(info.looks_s), *vectors.shape), np.nan)
+    decision_point_vectors = np.full((len(info.decision_points_s), *vectors.shape), np.nan)
     starts = arrays["series_start"]
     counts: list[NDArray[np.int64]] = []
     wrong_length: Check | None = None
@@ -154,8 +153,10 @@ def _verify_path(
         if found is not None:
             onsets[i], series = found
             vectors[i] = feature_vector(series, info.window_s, info.samples, info.features)
-            for look, window in enumerate(info.looks_s):
-                look_vectors[look, i] = feature_vector(series, window, info.samples, info.features)
+            for decision_point, window in enumerate(info.decision_points_s):
+                decision_point_vectors[decision_point, i] = feature_vector(
+                    series, window, info.samples, info.features
+                )
             seen = series.integers
             if seen.shape == rows.shape:
                 rows = seen
@@ -165,16 +166,20 @@ def _verify_path(
                 )
         counts.append(rows)
     expected = arrays["vectors"][: len(trials)]
-    at_looks = []
-    if info.looks_s:
-        stored = arrays["look_vectors"][:, : len(trials)]
-        at_looks = [_close("features at looks", look_vectors, stored, bounds["features"])]
+    at_decision_points = []
+    if info.decision_points_s:
+        stored = arrays["decision_point_vectors"][:, : len(trials)]
+        at_decision_points = [
+            _close(
+                "features at decision points", decision_point_vectors, stored, bounds["features"]
+            )
+        ]
     return [
         wrong_length or Check("series length", len(trials), 0.0, None),
         _exact("series counts", np.concatenate(counts), arrays["series_counts"]),
         _close("onset", onsets, arrays["onset_s"], bounds["time_s"]),
         _close("features", vectors, expected, bounds["features"]),
-        *at_looks,
+        *at_decision_points,
     ]
 
 
@@ -190,7 +195,7 @@ def _verify_graph(
     tasks = sorted(
         key.removesuffix("_label")
         for key in arrays
-        if key.endswith("_label") and not key.endswith("_look_label")
+        if key.endswith("_label") and not key.endswith("_decision_point_label")
     )
     if tasks != sorted(model.info.tasks):
         raise InputError(
@@ -198,26 +203,33 @@ def _verify_graph(
             f"{', '.join(sorted(model.info.tasks))}; export both together"
         )
     checks = _compare(model, outputs(model, vectors), arrays, bounds, "")
-    if model.info.looks_s:
-        at_looks = np.ascontiguousarray(arrays["look_vectors"], dtype=np.float64)
-        if at_looks.shape[::2] != (len(model.info.looks_s), model.info.width):
-            raise InputError(f"{name}: has no vectors for the model's looks; export both together")
-        seen = [outputs(model, rows, look) for look, rows in enumerate(at_looks)]
+    if model.info.decision_points_s:
+        at_decision_points = np.ascontiguousarray(
+            arrays["decision_point_vectors"], dtype=np.float64
+        )
+        if at_decision_points.shape[::2] != (len(model.info.decision_points_s), model.info.width):
+            raise InputError(
+                f"{name}: has no vectors for the model's decision points; export both together"
+            )
+        seen = [
+            outputs(model, rows, decision_point)
+            for decision_point, rows in enumerate(at_decision_points)
+        ]
         stacked = {key: np.stack([one[key] for one in seen]) for key in seen[0]}
-        checks += _compare(model, stacked, arrays, bounds, "look_")
+        checks += _compare(model, stacked, arrays, bounds, "decision_point_")
     return checks
 
 
 def parts(model: Model) -> tuple[str, ...]:
     """What a model says of a task."""
-    return (*PARTS, "pvalues") if model.info.looks_s else PARTS
+    return (*PARTS, "pvalues") if model.info.decision_points_s else PARTS
 
 
 def outputs(
-    model: Model, vectors: NDArray[np.float64], look: int | None = None
+    model: Model, vectors: NDArray[np.float64], decision_point: int | None = None
 ) -> dict[str, NDArray[Any]]:
     """The graph's outputs for vectors (n, width), asked one by one as the board does."""
-    single = [model.run(vectors[i : i + 1], look) for i in range(len(vectors))]
+    single = [model.run(vectors[i : i + 1], decision_point) for i in range(len(vectors))]
     return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
 
 

@@ -50,7 +50,8 @@ class MapFile:
         """
         self._path = os.fspath(path)
         self._tasks = len(info.tasks)
-        # Tasks may be decided at different times (see `Watcher`): a contact's line is its last's.
+        # Tasks may be decided at different times (see `Classifier`): a contact's line is its
+        # last's.
         self._open: dict[int, dict[str, Any]] = {}
         before = Path(self._path)
         cut_short = False

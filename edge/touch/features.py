@@ -66,8 +66,8 @@ def feature_vector(
     wanted = measures.features(tuple(features))
     step = window_s / (samples - 1)
     times = np.arange(samples, dtype=np.float64) * step
-    places: dict[str, _Place] = {}
-    values = np.array([_measured(series, feature, places) for feature in wanted])
+    zones: dict[str, _Zone] = {}
+    values = np.array([_measured(series, feature, zones) for feature in wanted])
     known = np.isfinite(values)
     if known.all():
         vector = _resample(times, series.t, values)
@@ -83,10 +83,10 @@ def feature_vector(
 
 
 def _measured(
-    series: FeatureSeries, feature: Feature, places: dict[str, _Place]
+    series: FeatureSeries, feature: Feature, zones: dict[str, _Zone]
 ) -> NDArray[np.float64]:
     """(n,) the feature's value (not its rate) in every frame; NaN where it cannot be known."""
-    place, quantity = feature.place, feature.quantity
+    zone, quantity = feature.zone, feature.quantity
     values: NDArray[Any] | None = None
     if quantity == "motion":
         values = series.contact_motion
@@ -94,21 +94,21 @@ def _measured(
         values = series.force_motion
     elif quantity == "regions":
         values = series.regions
-    elif (place, quantity) == ("contact", "max_force"):
+    elif (zone, quantity) == ("contact", "max_force"):
         values = series.max_force
-    elif (place, quantity) == ("contact", "area"):
+    elif (zone, quantity) == ("contact", "area"):
         values = series.contact_area
-    elif place in series.places:
-        if place not in places:
-            places[place] = _Place(series.places[place], series)
-        values = getattr(places[place], quantity)()
+    elif zone in series.zones:
+        if zone not in zones:
+            zones[zone] = _Zone(series.zones[zone], series)
+        values = getattr(zones[zone], quantity)()
     if values is None:
         raise InputError(f"{feature.name} was not measured; name it where contacts are followed")
     return np.asarray(values, dtype=np.float64)
 
 
-class _Place:
-    """The quantities of one place, from the sums measured there (n, 8)."""
+class _Zone:
+    """The quantities of one zone, from the sums measured there (n, 8)."""
 
     def __init__(self, sums: NDArray[np.int64], series: FeatureSeries) -> None:
         self._sums, self._turn = sums, series.turn

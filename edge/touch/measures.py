@@ -1,6 +1,6 @@
 """What can be measured on a contact, by name, and the integers that each frame gives for it.
 
-A feature's name is a place and a quantity, `skin_force` or `left_width`; the paper's three keep
+A feature's name is a zone and a quantity, `skin_force` or `left_width`; the paper's three keep
 their own names. A frame is measured only where a feature asked for calls for it.
 
 Places: `contact` is the region that is followed, `second` the largest region besides it, `skin`
@@ -26,7 +26,7 @@ from edge.touch.region import Region, find_regions
 PAPER = ("max_force", "contact_area", "contact_motion")
 """The three features of the paper's section III-B, in its order."""
 
-PLACES = ("contact", "second", "skin", "left", "right")
+ZONES = ("contact", "second", "skin", "left", "right")
 QUANTITIES = {
     "max_force": "largest force of a taxel",
     "force": "sum of the taxels' forces",
@@ -45,11 +45,11 @@ ALONE = {
     "force_motion": ("contact", "force_motion"),
     "regions": ("skin", "regions"),
 }
-"""Names that are not a place and a quantity."""
+"""Names that are not a zone and a quantity."""
 RATE = "_rate"
 
 PEAK, AREA, FORCE, ROWS, COLS, ROWS_ROWS, ROWS_COLS, COLS_COLS = range(8)
-"""Columns of what is measured at a place: largest count, taxels, sum of counts, and the sums of
+"""Columns of what is measured at a zone: largest count, taxels, sum of counts, and the sums of
 counts times row, column, row squared, row times column, column squared."""
 WIDTH = 8
 NOTHING = (0,) * WIDTH
@@ -61,13 +61,13 @@ class Feature:
 
     Attributes:
         name: what users select it by.
-        place: one of `PLACES`.
+        zone: one of `ZONES`.
         quantity: one of `QUANTITIES`, or `motion`, `force_motion`, `regions`.
         rate: its change a second instead of its value.
     """
 
     name: str
-    place: str
+    zone: str
     quantity: str
     rate: bool = False
 
@@ -90,14 +90,14 @@ class Feature:
 
     @property
     def weighted(self) -> bool:
-        """It calls for sums over the taxels of its place."""
+        """It calls for sums over the taxels of its zone."""
         return self.quantity in QUANTITIES and self.quantity not in ("max_force", "area")
 
 
 def names() -> list[str]:
     """All feature types but rates, the paper's first."""
-    places = [f"{place}_{quantity}" for place in PLACES for quantity in QUANTITIES]
-    more = [name for name in (*ALONE, *places) if name not in PAPER]
+    zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in QUANTITIES]
+    more = [name for name in (*ALONE, *zones) if name not in PAPER]
     return [*PAPER, *(name for name in more if name != "contact_max_force")]
 
 
@@ -111,9 +111,9 @@ def feature(name: str) -> Feature:
     base = name.removesuffix(RATE)
     if base in ALONE:
         return Feature(name, *ALONE[base], rate=base != name)
-    place, _, quantity = base.partition("_")
-    if place in PLACES and quantity in QUANTITIES and base != "contact_max_force":
-        return Feature(name, place, quantity, rate=base != name)
+    zone, _, quantity = base.partition("_")
+    if zone in ZONES and quantity in QUANTITIES and base != "contact_max_force":
+        return Feature(name, zone, quantity, rate=base != name)
     import difflib  # a slow board starts sooner without it
 
     near = difflib.get_close_matches(base, names(), 3) or names()[:3]
@@ -135,13 +135,13 @@ def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
 
 
 class Measurer:
-    """Measures the frames of one skin at the places that some features call for.
+    """Measures the frames of one skin at the zones that some features call for.
 
     Attributes:
         motion: the contact's centroid is followed.
         force_motion: its force-weighted centroid is followed.
         regions: the regions are counted.
-        places: where integers are measured, in the order of `PLACES`.
+        zones: where integers are measured, in the order of `ZONES`.
     """
 
     def __init__(self, layout: SkinLayout, wanted: Sequence[str], connectivity: int = 4) -> None:
@@ -154,17 +154,17 @@ class Measurer:
         self._plan: list[tuple[str, slice, bool, bool]] = []
         half = layout.cols // 2
         parts = {"left": slice(0, half), "right": slice(half, layout.cols)}
-        for place in PLACES:
-            here = [f for f in types if f.place == place]
-            weighted = any(f.weighted for f in here) or (place == "contact" and self.force_motion)
+        for zone in ZONES:
+            here = [f for f in types if f.zone == zone]
+            weighted = any(f.weighted for f in here) or (zone == "contact" and self.force_motion)
             # The contact's own peak and area are measured with the region.
-            peak = place != "contact" and any(f.quantity == "max_force" for f in here)
-            area = place != "contact" and any(f.quantity == "area" for f in here)
+            peak = zone != "contact" and any(f.quantity == "max_force" for f in here)
+            area = zone != "contact" and any(f.quantity == "area" for f in here)
             if weighted or peak or area:
-                self._plan.append((place, parts.get(place, slice(None)), peak or area, weighted))
-        self.places = tuple(place for place, *_ in self._plan)
-        self._whole = any(place in ("skin", "left", "right") for place in self.places)
-        self._others = self.regions or "second" in self.places
+                self._plan.append((zone, parts.get(zone, slice(None)), peak or area, weighted))
+        self.zones = tuple(zone for zone, *_ in self._plan)
+        self._whole = any(zone in ("skin", "left", "right") for zone in self.zones)
+        self._others = self.regions or "second" in self.zones
         rows, cols = np.arange(layout.rows), np.arange(layout.cols)
         # Sums of whole numbers below 2^53 are exact in float64, in any order, and its products
         # are faster than those of int64.
@@ -181,7 +181,7 @@ class Measurer:
         self._exact: Any = np.int64 if fits else object
 
     def measure(self, frame: Frame, contact: Region | None) -> list[int]:
-        """`WIDTH` whole numbers a place, then the number of regions where it is asked for.
+        """`WIDTH` whole numbers a zone, then the number of regions where it is asked for.
 
         Args:
             frame: of the skin.
@@ -192,11 +192,11 @@ class Measurer:
         whole = frame.counts * self._active(frame) if self._whole else frame.counts
         others = self._find(frame) if self._others else []
         row: list[int] = []
-        for place, part, extent, weighted in self._plan:
-            if place == "contact":
+        for zone, part, extent, weighted in self._plan:
+            if zone == "contact":
                 held = frame.counts * contact.mask
                 row += (contact.peak, contact.area)
-            elif place == "second":
+            elif zone == "second":
                 rest = [other for other in others if other.bits != contact.bits]
                 if not rest:
                     row += NOTHING

@@ -52,7 +52,7 @@ class FeatureSeries:
             asked for.
         counts_per_newton: scale of `peak`, or None.
         ended: the contact ended with the last frame: force and area are zero from there on.
-        places: {place: (n, 8)} what was measured there, see `edge.touch.measures`.
+        zones: {zone: (n, 8)} what was measured there, see `edge.touch.measures`.
         regions: (n,) regions of the frame, or None.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
         turn: columns of a whole turn where the skin wraps, or None.
@@ -65,16 +65,16 @@ class FeatureSeries:
     motion: NDArray[np.float64]
     counts_per_newton: float | None = None
     ended: bool = False
-    places: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     regions: NDArray[np.int64] | None = None
     force_motion: NDArray[np.float64] | None = None
     turn: int | None = None
 
     @property
     def integers(self) -> NDArray[np.int64]:
-        """(n, m) all that was counted: peak, area, sums, then the places and the regions."""
+        """(n, m) all that was counted: peak, area, sums, then the zones and the regions."""
         more = [] if self.regions is None else [self.regions]
-        return np.column_stack([self.peak, self.area, self.sums, *self.places.values(), *more])
+        return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *more])
 
     @property
     def max_force(self) -> NDArray[np.float64]:
@@ -138,7 +138,7 @@ class Contact:
             missing = self.layout.alive & ~frame.valid
             self.missing_taxels = bool(missing.any())
         called = self.measurer
-        if called.places or called.regions:
+        if called.zones or called.regions:
             self._more.append(called.measure(frame, region))
         if region is None:
             self._measured.append((0, 0, 0, 0))
@@ -155,7 +155,7 @@ class Contact:
             self._measured.append((region.peak, region.area, 0, 0))
             self._motion.append(0.0)
         if called.force_motion:
-            sums = self._more[-1]  # the contact's place comes first
+            sums = self._more[-1]  # the contact's zone comes first
             centroid = (
                 sums[ROWS] / sums[FORCE],
                 sums[COLS] / sums[FORCE] % self.layout.cols,
@@ -208,8 +208,8 @@ class Contact:
             motion=np.array(self._motion),
             counts_per_newton=self.layout.counts_per_newton,
             ended=self.ended,
-            places={
-                place: more[:, WIDTH * i : WIDTH * (i + 1)] for i, place in enumerate(called.places)
+            zones={
+                place: more[:, WIDTH * i : WIDTH * (i + 1)] for i, place in enumerate(called.zones)
             },
             regions=more[:, -1] if called.regions else None,
             force_motion=np.array(self._force_motion) if called.force_motion else None,

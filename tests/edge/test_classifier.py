@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.classifier import Watcher, require_joints
+from edge.classifier import Classifier
 from edge.errors import InputError
-from edge.model.model import Model
+from edge.model.model import Model, require_joints
 from edge.recording import Recording
 
 
@@ -17,9 +17,9 @@ def model(exported):
 
 
 def watch(model, recording):
-    watcher = Watcher(model, recording.layout)
-    events = [(f.t, event) for f in recording for event in watcher.push(f)]
-    return events + [(None, event) for event in watcher.finish()]
+    classifier = Classifier(model, recording.layout)
+    events = [(f.t, event) for f in recording for event in classifier.push(f)]
+    return events + [(None, event) for event in classifier.finish()]
 
 
 def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(model, make_touch):
@@ -78,10 +78,10 @@ def test_taxels_that_could_not_be_read_flag_the_decision(model, make_touch):
 
 def test_a_pose_that_is_missing_flags_the_decision(model, make_touch):
     recording = make_touch()
-    watcher = Watcher(model, recording.layout)
+    classifier = Classifier(model, recording.layout)
     events = []
     for i, frame in enumerate(recording):
-        events += watcher.push(replace(frame, joints=None) if i == 60 else frame)
+        events += classifier.push(replace(frame, joints=None) if i == 60 else frame)
     assert "missing_pose" in events[-1]["flags"]
 
 
@@ -89,9 +89,9 @@ def test_features_too_large_to_measure_give_no_label(model, make_touch):
     recording = make_touch()
     skin = {**recording.meta["skin"], "counts_per_newton": 1e-300}
     tiny = replace(recording, meta={**recording.meta, "skin": skin})
-    watcher = Watcher(model)
-    watcher.tracker.layout = tiny.layout
-    events = [e for f in tiny for e in watcher.push(replace(f, counts=f.counts))]
+    classifier = Classifier(model)
+    classifier.tracker.layout = tiny.layout
+    events = [e for f in tiny for e in classifier.push(replace(f, counts=f.counts))]
     decision = events[-1]
     assert decision["label"] is None
     assert "out_of_range" in decision["flags"]
@@ -99,7 +99,7 @@ def test_features_too_large_to_measure_give_no_label(model, make_touch):
 
 def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm):
     with pytest.raises(InputError, match="columns 23"):
-        Watcher(model, replace(forearm, cols=23))
+        Classifier(model, replace(forearm, cols=23))
     with pytest.raises(InputError, match="here: has no joint angles"):
         require_joints(model, None, "here")
     with pytest.raises(InputError, match="here: has 3 joint angles, the model's arm has 5"):

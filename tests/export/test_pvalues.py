@@ -1,16 +1,16 @@
-"""A model with looks: the graph's p-values, decisions at an error rate, the golden file."""
+"""A model with decision points: p-values, decisions at an error rate, the golden file."""
 
 import json
 
 import numpy as np
 import pytest
 
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.cli import main as edge_classify
 from edge.errors import InputError
-from edge.model.model import NO_LOOK, Model
+from edge.model.model import NO_DECISION_POINT, Model
 from edge.recording import load, save
-from export.__main__ import main, parse_looks
+from export.__main__ import main, parse_decision_points
 from train.conformal import SequentialClassifier
 from train.dataset import load_trials
 from train.pipeline import Choice
@@ -28,9 +28,18 @@ def touches(make_touch, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def looked(touches, tmp_path_factory):
-    """A folder with their model.onnx and golden.npz, of four looks."""
+    """A folder with their model.onnx and golden.npz, of four decision points."""
     out = tmp_path_factory.mktemp("looked")
-    given = ["--data", str(touches), "--out", str(out), "--jobs", "1", "--looks", "0.3,0.6,0.9"]
+    given = [
+        "--data",
+        str(touches),
+        "--out",
+        str(out),
+        "--jobs",
+        "1",
+        "--decision-points",
+        "0.3,0.6,0.9",
+    ]
     assert main(given) == 0
     return out
 
@@ -41,61 +50,76 @@ def model(looked):
 
 
 @pytest.fixture(scope="module")
-def at_looks(touches, model):
+def at_decision_points(touches, model):
     dataset = load_trials([str(touches)], horizon_s=1.2)
-    return dataset, np.stack([dataset.features(s) for s in model.looks_s])
+    return dataset, np.stack([dataset.features(s) for s in model.decision_points_s])
 
 
 def test_the_metadata_names_the_looks_and_the_calibration(model):
-    assert model.looks_s == (0.3, 0.6, 0.9, 1.2)
+    assert model.decision_points_s == (0.3, 0.6, 0.9, 1.2)
     assert model.info.folds == (8, 8, 8, 8, 8)
     assert model.info.smallest_error == pytest.approx(1 / 9)
     assert model.info.from_json(model.info.to_json(), "again").to_json() == model.info.to_json()
 
 
-def test_the_graph_gives_the_estimators_p_values_and_decisions_at_every_look(model, at_looks):
-    dataset, X = at_looks
+def test_the_graph_gives_the_estimators_p_values_and_decisions_at_every_look(
+    model, at_decision_points
+):
+    dataset, X = at_decision_points
     y = {task: dataset.labels(task) for task in model.info.tasks}
     choices = {t: Choice(e.scaling, e.components, e.k) for t, e in model.info.tasks.items()}
-    fitted = SequentialClassifier(choices, model.looks_s).fit(X, y)
+    fitted = SequentialClassifier(choices, model.decision_points_s).fit(X, y)
     rng = np.random.default_rng(0)
-    for look in range(4):
-        near = X[look][:20] * (1 + 0.1 * rng.normal(size=(20, 120)))
-        queries = np.concatenate([X[look], near, 30.0 * near[:2]])
-        answer = model.run(queries, look)
+    for decision_point in range(4):
+        near = X[decision_point][:20] * (1 + 0.1 * rng.normal(size=(20, 120)))
+        queries = np.concatenate([X[decision_point], near, 30.0 * near[:2]])
+        answer = model.run(queries, decision_point)
         for task in choices:
-            expected = fitted.calibrations_[task].pvalues(look, queries)
+            expected = fitted.calibrations_[task].pvalues(decision_point, queries)
             assert (answer[f"{task}_pvalues"] == expected).all()
-            _, rows = fitted.looks_[look].neighbours(task, queries)
+            _, rows = fitted.decision_points_[decision_point].neighbours(task, queries)
             assert (answer[f"{task}_neighbours"] == rows).all()
             for i in (0, 25, 61):
-                decision = model.decide(queries[i], look)[task]
+                decision = model.decide(queries[i], decision_point)[task]
                 assert (decision.pvalues == expected[i]).all()
 
 
-def test_the_full_window_answers_as_a_model_without_looks(model, at_looks, touches, tmp_path):
-    given = ["--data", str(touches), "--out", str(tmp_path), "--jobs", "1", "--looks", "none"]
+def test_the_full_window_answers_as_a_model_without_looks(
+    model, at_decision_points, touches, tmp_path
+):
+    given = [
+        "--data",
+        str(touches),
+        "--out",
+        str(tmp_path),
+        "--jobs",
+        "1",
+        "--decision-points",
+        "none",
+    ]
     assert main(given) == 0
     plain = Model(tmp_path / "model.onnx")
-    assert plain.looks_s == (1.2,)
-    queries = at_looks[1][-1] * 1.03
+    assert plain.decision_points_s == (1.2,)
+    queries = at_decision_points[1][-1] * 1.03
     expected, answer = plain.run(queries), model.run(queries)
     for name, values in expected.items():
         assert (answer[name] == values).all()
     assert set(answer) - set(expected) == {"category_pvalues", "object_pvalues"}
 
 
-def test_one_class_and_a_class_of_one_trial_can_be_calibrated(model, at_looks, tmp_path):
+def test_one_class_and_a_class_of_one_trial_can_be_calibrated(model, at_decision_points, tmp_path):
     from dataclasses import replace
 
     from edge.model.model import Task
     from export.graph import to_onnx
 
-    _, X = at_looks
+    _, X = at_decision_points
     y = {"one": np.full(40, "thing"), "rare": np.array(["rare", *["common"] * 39])}
     choices = {"one": Choice("IV", 3, 2), "rare": Choice("IV", 3, 2)}
-    fitted = SequentialClassifier(choices, model.looks_s).fit(X, y)
-    tasks = {t: Task(tuple(fitted.looks_[0].classes_[t]), 2, 3, "IV", 1.0) for t in choices}
+    fitted = SequentialClassifier(choices, model.decision_points_s).fit(X, y)
+    tasks = {
+        t: Task(tuple(fitted.decision_points_[0].classes_[t]), 2, 3, "IV", 1.0) for t in choices
+    }
     path = tmp_path / "odd.onnx"
     path.write_bytes(to_onnx(fitted, replace(model.info, tasks=tasks)))
     for task, calibration in fitted.calibrations_.items():
@@ -104,8 +128,8 @@ def test_one_class_and_a_class_of_one_trial_can_be_calibrated(model, at_looks, t
         assert ((seen > 0.0) & (seen <= 1.0)).all()
 
 
-def test_what_is_not_finite_fits_nothing(model, at_looks):
-    wrong = at_looks[1][1][:2].copy()
+def test_what_is_not_finite_fits_nothing(model, at_decision_points):
+    wrong = at_decision_points[1][1][:2].copy()
     wrong[0, 3] = np.nan
     answer = model.run(wrong, 1)
     assert answer["object_label"][0] == -1
@@ -115,9 +139,9 @@ def test_what_is_not_finite_fits_nothing(model, at_looks):
 
 def replay(model, path, error):
     recording = load(path)
-    watcher = Watcher(model, recording.layout, error=error)
-    events = [(f.t, e) for f in recording for e in watcher.push(f)]
-    return events + [(None, e) for e in watcher.finish()]
+    classifier = Classifier(model, recording.layout, error=error)
+    events = [(f.t, e) for f in recording for e in classifier.push(f)]
+    return events + [(None, e) for e in classifier.finish()]
 
 
 def test_a_task_is_decided_at_the_first_look_that_leaves_one_label(model, touches):
@@ -161,11 +185,11 @@ def test_a_contact_unlike_all_that_was_trained_is_unknown(model, touches):
     frames = np.where(recording.frames.any(axis=(1, 2))[:, None, None], 6500, 0)
     frames = np.broadcast_to(frames, recording.frames.shape).astype(np.uint16).copy()
     frames[:, 8:] = 0
-    watcher = Watcher(model, recording.layout, error=0.2, alarms=0.15)
+    classifier = Classifier(model, recording.layout, error=0.2, novelty_rate=0.15)
     from dataclasses import replace
 
     strange = replace(recording, frames=frames)
-    events = [e for f in strange for e in watcher.push(f) if e["event"] == "decision"]
+    events = [e for f in strange for e in classifier.push(f) if e["event"] == "decision"]
     assert {e["label"] for e in events} == {"unknown"}
     assert all("unknown" in e["flags"] for e in events)
     assert all(e["window_s"] == 0.3 for e in events)
@@ -173,8 +197,8 @@ def test_a_contact_unlike_all_that_was_trained_is_unknown(model, touches):
 
 def test_a_stream_that_ends_between_looks_takes_the_best_of_what_is_left(model, make_touch):
     short = make_touch(kind="soft", seconds=0.4, seed=4)
-    watcher = Watcher(model, short.layout, error=0.12)
-    events = [e for f in short for e in watcher.push(f)] + watcher.finish()
+    classifier = Classifier(model, short.layout, error=0.12)
+    events = [e for f in short for e in classifier.push(f)] + classifier.finish()
     thing = next(e for e in events if e["event"] == "decision" and e["task"] == "object")
     assert thing["flags"] == ["short", "unsure"]
     assert thing["label"] in thing["left"]
@@ -185,15 +209,18 @@ def test_the_golden_file_covers_the_looks(looked, capsys, tmp_path):
     assert edge_classify(["verify", *files, str(looked / "golden.npz")]) == 0
     checks = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     names = {check["name"]: check["rows"] for check in checks}
-    assert names["features at looks"] == 4
-    assert names["object_look_pvalues"] == 4
+    assert names["features at decision points"] == 4
+    assert names["object_decision_point_pvalues"] == 4
     assert names["category_pvalues"] == 194
     arrays = dict(np.load(looked / "golden.npz"))
-    for key, change in {"object_look_pvalues": 0.1, "look_vectors": 1e-9}.items():
+    for key, change in {
+        "object_decision_point_pvalues": 0.1,
+        "decision_point_vectors": 1e-9,
+    }.items():
         wrong = {**arrays, key: arrays[key] + change}
         np.savez(tmp_path / "golden.npz", **wrong)
         assert edge_classify(["verify", *files, str(tmp_path / "golden.npz")]) == 1
-    assert "features at looks differs" in capsys.readouterr().err
+    assert "features at decision points differs" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", ["replay", "run"])
@@ -211,10 +238,12 @@ def test_a_model_without_calibration_is_one_sentence(exported, recordings, capsy
     model = str(exported / "model.onnx")
     assert edge_classify(["replay", "--model", model, "--error", "0.1", str(recordings)]) == 2
     out = capsys.readouterr()
-    assert "has no calibration, so --error cannot be held; export it with --looks" in out.err
+    assert (
+        "has no calibration, so --error cannot be held; export it with --decision-points" in out.err
+    )
     assert out.err.count("\n") == 1
     with pytest.raises(InputError, match="no calibration"):
-        Watcher(Model(model), error=0.1)
+        Classifier(Model(model), error=0.1)
 
 
 def test_an_error_rate_that_too_few_trials_can_tell_is_remarked_on(looked, touches, capsys):
@@ -228,26 +257,26 @@ def test_an_error_rate_that_too_few_trials_can_tell_is_remarked_on(looked, touch
 
 
 def test_looks_are_read_as_a_range_or_a_list_and_end_with_the_window():
-    assert parse_looks("0.2:1.2:0.2", 1.2) == (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-    assert parse_looks("0.2:1.2:0.2", 0.5) == (0.2, 0.4, 0.5)
-    assert parse_looks("0.9,0.3", 1.2) == (0.3, 0.9, 1.2)
-    assert parse_looks("none", 1.2) == ()
+    assert parse_decision_points("0.2:1.2:0.2", 1.2) == (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
+    assert parse_decision_points("0.2:1.2:0.2", 0.5) == (0.2, 0.4, 0.5)
+    assert parse_decision_points("0.9,0.3", 1.2) == (0.3, 0.9, 1.2)
+    assert parse_decision_points("none", 1.2) == ()
     for text in ("", "soon", "0:1:0.1", "0.5:0.2:0.1", "0.1:1:0", "-1,2", "nan"):
-        with pytest.raises(InputError, match="--looks must be like"):
-            parse_looks(text, 1.2)
+        with pytest.raises(InputError, match="--decision-points must be like"):
+            parse_decision_points(text, 1.2)
 
 
 def test_a_look_that_the_model_has_not_is_refused(model):
-    with pytest.raises(InputError, match="has the looks 0 to 3, not 4"):
+    with pytest.raises(InputError, match="has the decision points 0 to 3, not 4"):
         model.decide(np.zeros(120), 4)
 
 
 def test_without_a_look_the_graph_strikes_out_nothing_and_answers_as_at_the_full_window(
-    model, at_looks
+    model, at_decision_points
 ):
-    queries = at_looks[1][-1][:9] * 1.03
+    queries = at_decision_points[1][-1][:9] * 1.03
     full = model.run(queries)
-    given = {"features": queries, "look": np.array([NO_LOOK])}
+    given = {"features": queries, "decision_point": np.array([NO_DECISION_POINT])}
     plain = dict(zip(full, model._session.run(list(full), given), strict=True))
     for name, values in full.items():
         if name.endswith("_pvalues"):

@@ -114,7 +114,9 @@ def sequential(seed: int, classes: int) -> tuple[SequentialClassifier, Model, ND
     X = features(TRIALS, seed)[None]
     fitted = SequentialClassifier({"t": Choice("none", 6, 1)}, (1.2,), seed=seed)
     fitted.fit(X, {"t": labels_for(X[0], classes, seed)})
-    info = replace(describe(fitted.looks_[-1]), looks_s=(1.2,), folds=fitted.sizes_)
+    info = replace(
+        describe(fitted.decision_points_[-1]), decision_points_s=(1.2,), folds=fitted.sizes_
+    )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.onnx"
         path.write_bytes(to_onnx(fitted, info))
@@ -130,7 +132,7 @@ def seen_before_error(seed: int, classes: int, nudge: int) -> float:
     """
     fitted, model, X = sequential(seed, classes)
     calibration = fitted.calibrations_["t"]
-    labels = fitted.looks_[-1].labels_["t"]
+    labels = fitted.decision_points_[-1].labels_["t"]
     lost = 0
     for k, size in enumerate(calibration.sizes):
         own = np.flatnonzero(_folds(seed) == k)

@@ -157,7 +157,7 @@ MUTANTS = (
     Mutant(
         "the shortlist is checked",
         GRAPH,
-        'sure = build.node("Less", [build.node("Add", [kth, build.by_look(slack)]), reach])',
+        'sure = build.node("Less", [build.node("Add", [kth, build.by_decision_point(slack)]), reach])',  # noqa: E501
         'sure = build.node("LessOrEqual", [kth, kth])',
         (OF_GRAPH, "too_narrow"),
     ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.model.prediction_set import Candidates
+from edge.model.prediction_set import PredictionSet
 from edge.model.verify import first_contact
 from edge.touch.features import feature_vector
 from edge.touch.track import Tracker
@@ -17,17 +17,17 @@ from train.simulate.run import simulate
 from train.simulate.scene import load
 
 SCENES = Path(__file__).parents[2] / "train" / "scenes"
-LOOKS = (0.3, 0.6, 0.9, 1.2)
+DECISION_POINTS = (0.3, 0.6, 0.9, 1.2)
 
 
-def vectors(recordings, chain, looks=LOOKS):
-    """(looks, n, p) and the labels of recordings with a contact."""
+def vectors(recordings, chain, decision_points=DECISION_POINTS):
+    """(decision_points, n, p) and the labels of recordings with a contact."""
     rows, labels = [], []
     for recording in recordings:
-        tracker = Tracker(recording.layout, chain=chain, horizon_s=looks[-1])
+        tracker = Tracker(recording.layout, chain=chain, horizon_s=decision_points[-1])
         found = first_contact(recording, tracker)
         if found is not None:
-            rows.append([feature_vector(found[1], window) for window in looks])
+            rows.append([feature_vector(found[1], window) for window in decision_points])
             labels.append(recording.labels)
     y = {task: np.array([label[task] for label in labels]) for task in labels[0]}
     return np.array(rows).transpose(1, 0, 2), y
@@ -57,15 +57,15 @@ def parted(X, y, test):
     )
 
 
-def watched(model, task, X, error, alarms=0.05):
-    """`Candidates` of each trial after all looks it needs."""
+def watched(model, task, X, error, novelty_rate=0.05):
+    """`PredictionSet` of each trial after all decision points it needs."""
     calibration = model.calibrations_[task]
-    pvalues = [calibration.pvalues(look, x) for look, x in enumerate(X)]
+    pvalues = [calibration.pvalues(decision_point, x) for decision_point, x in enumerate(X)]
     out = []
     for i in range(X.shape[1]):
-        candidates = Candidates(calibration.classes, error, alarms)
-        for look in range(len(X)):
-            candidates.look(pvalues[look][i])
+        candidates = PredictionSet(calibration.classes, error, novelty_rate)
+        for decision_point in range(len(X)):
+            candidates.update(pvalues[decision_point][i])
         out.append(candidates)
     return out
 
@@ -76,8 +76,8 @@ def allowed(error, calibrated, tested):
 
 
 def struck_out(model, task, X, labels, error):
-    """Share of trials whose own label does not survive all looks; labels never met count."""
-    classes = model.looks_[-1].classes_[task].tolist()
+    """Share of trials whose own label does not survive; labels never met count."""
+    classes = model.decision_points_[-1].classes_[task].tolist()
     seen = watched(model, task, X, error)
     pairs = zip(seen, labels, strict=True)
     return np.mean([label not in [classes[i] for i in c.left] for c, label in pairs])
@@ -88,7 +88,7 @@ def test_on_unseen_simulated_trials_the_true_label_survives_as_often_as_asked(si
     X, y = simulated
     test = np.random.default_rng(1).permutation(X.shape[1]) % 2 == 0
     train_X, train_y, test_X, test_y = parted(X, y, test)
-    model = SequentialClassifier({task: Choice("IV", 10, 2)}, LOOKS).fit(train_X, train_y)
+    model = SequentialClassifier({task: Choice("IV", 10, 2)}, DECISION_POINTS).fit(train_X, train_y)
     for error in (0.05, 0.1, 0.2, 0.3):
         rate = struck_out(model, task, test_X, test_y[task], error)
         assert rate <= allowed(error, (~test).sum(), test.sum())
@@ -100,15 +100,17 @@ def test_on_unseen_real_grasps_the_true_label_survives_as_often_as_asked(grasps)
     X, y = grasps
     test = np.random.default_rng(2).permutation(X.shape[1]) % 2 == 0
     train_X, train_y, test_X, test_y = parted(X, y, test)
-    model = SequentialClassifier({"object": Choice("IV", 15, 1)}, LOOKS).fit(train_X, train_y)
+    model = SequentialClassifier({"object": Choice("IV", 15, 1)}, DECISION_POINTS).fit(
+        train_X, train_y
+    )
     for error in (0.05, 0.1, 0.2, 0.3):
         rate = struck_out(model, "object", test_X, test_y["object"], error)
         assert rate <= allowed(error, (~test).sum(), test.sum())
     assert struck_out(model, "object", test_X, test_y["object"], 0.3) > 0.1
 
 
-def far_off(model, X, alarms):
-    return np.mean([c.unknown for c in watched(model, "object", X, 1e-9, alarms)])
+def far_off(model, X, novelty_rate):
+    return np.mean([c.unknown for c in watched(model, "object", X, 1e-9, novelty_rate)])
 
 
 def test_whole_objects_left_out_are_called_unknown_oftener_than_known_ones(simulated):
@@ -120,7 +122,7 @@ def test_whole_objects_left_out_are_called_unknown_oftener_than_known_ones(simul
     for out in (names[0::3], names[1::3], names[2::3]):
         left_out = np.isin(y["object"], out)
         train = ~test & ~left_out
-        model = SequentialClassifier({"object": Choice("IV", 10, 2)}, LOOKS).fit(
+        model = SequentialClassifier({"object": Choice("IV", 10, 2)}, DECISION_POINTS).fit(
             X[:, train], {"object": y["object"][train]}
         )
         known.append(far_off(model, X[:, test & ~left_out], 0.1))

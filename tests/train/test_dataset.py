@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import load, save
@@ -30,11 +30,11 @@ def test_training_and_the_board_compute_the_same_bits(recordings, exported):
     data = load_trials([recordings], horizon_s=1.2)
     for trial, expected in zip(data.trials, data.features(), strict=True):
         recording = load(trial.path)
-        watcher = Watcher(model, recording.layout)
+        classifier = Classifier(model, recording.layout)
         seen = []
         for frame in recording:
-            watcher.push(frame)
-            seen += [w.contact for w in watcher._waiting if w.contact not in seen]
+            classifier.push(frame)
+            seen += [w.contact for w in classifier._waiting if w.contact not in seen]
         vector = feature_vector(seen[0].series(), 1.2)
         assert vector.tobytes() == expected.tobytes()
 

@@ -174,9 +174,9 @@ def section(context: Context) -> Section:
         "Beyond three features",
         [
             f"Every feature type is a place and a quantity by whole-number arithmetic on the "
-            f"frame ({len(types)} types; see `edge/touch/measures.py`), measured only where a model "
-            f"names it. {FEW} samples each, Method IV, 1.2 s. The cost is that of following a "
-            f"contact on this machine ({floor:.0f} us a frame with max_force alone, of the 10 ms "
+            f"frame ({len(types)} types; see `edge/touch/measures.py`), measured only where a "
+            f"model names it. {FEW} samples each, Method IV, 1.2 s. The cost is that of following "
+            f"a contact on this machine ({floor:.0f} us a frame with max_force alone, of the 10 ms "
             "that a frame has).",
             "Orientation enters as slant (a covariance), not as an angle, which would jump. A "
             "rate of change is any name with `_rate`; PCA of 20 or 40 samples spans it already, "

@@ -140,7 +140,7 @@ def thinned(series: FeatureSeries, every: int) -> FeatureSeries:
         area=series.area[pick],
         sums=series.sums[pick],
         motion=series.motion[pick],
-        places={name: values[pick] for name, values in series.places.items()},
+        zones={name: values[pick] for name, values in series.zones.items()},
         regions=None if series.regions is None else series.regions[pick],
         force_motion=None if series.force_motion is None else series.force_motion[pick],
     )

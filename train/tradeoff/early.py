@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from edge.model.prediction_set import ALARMS, Candidates
+from edge.model.prediction_set import NOVELTY_RATE, PredictionSet
 from train.conformal import FEWEST, SequentialClassifier
 from train.conformal import FOLDS as CALIBRATION_FOLDS
 from train.simulate.scene_model import Scene
@@ -47,15 +47,16 @@ class Beside:
     """Early stopping and fixed windows on the same trials.
 
     Attributes:
-        looks_s: windows.
-        fixed: (looks,) share wrong at each window, with components and k chosen for that window.
+        decision_points_s: windows.
+        fixed: (decision_points,) share wrong at each window, with components and k chosen for that
+            window.
         early: an entry an asked error.
         trials: held out in turn.
         hindsight_s: mean of the first window from which on each trial is told as right or wrong
             as at the full one: what no rule that stops on these answers could undercut.
     """
 
-    looks_s: tuple[float, ...]
+    decision_points_s: tuple[float, ...]
     fixed: NDArray[np.float64]
     early: list[Early]
     trials: int
@@ -65,23 +66,23 @@ class Beside:
 def beside(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
-    looks_s: Sequence[float],
+    decision_points_s: Sequence[float],
     features: Sequence[str],
     scaling: str = "IV",
 ) -> Beside:
     """Five folds are held out in turn; the others choose, train and calibrate.
 
     Args:
-        X: (looks, n, p).
+        X: (decision_points, n, p).
         labels: (n,).
-        looks_s: windows in seconds.
+        decision_points_s: windows in seconds.
         features: names of the types.
         scaling: of the features.
     """
-    looks, n = X.shape[:2]
+    decision_points, n = X.shape[:2]
     indices = {"task": np.unique(labels, return_inverse=True)[1]}
     fold_of = np.random.default_rng(1).permutation(n) % FOLDS
-    right = np.zeros((looks, n), dtype=bool)
+    right = np.zeros((decision_points, n), dtype=bool)
     outcomes: dict[float, list[tuple[bool, bool, bool, bool, bool, float]]] = {
         error: [] for error in ERRORS
     }
@@ -90,33 +91,39 @@ def beside(
             train, test = np.flatnonzero(fold_of != fold), np.flatnonzero(fold_of == fold)
             cells = [told(x, indices, train, test, scaling, features)["task"] for x in X]
             right[:, test] = [cell.right for cell in cells]
-            model = SequentialClassifier({"task": cells[-1].choice}, looks_s, features).fit(
-                X[:, train], {"task": labels[train]}
-            )
+            model = SequentialClassifier(
+                {"task": cells[-1].choice}, decision_points_s, features
+            ).fit(X[:, train], {"task": labels[train]})
             calibration = model.calibrations_["task"]
-            last = model.looks_[-1]
+            last = model.decision_points_[-1]
             classes = last.classes_["task"]
             said = last.predict(X[-1, test])["task"]
-            pvalues = [calibration.pvalues(i, X[i, test]) for i in range(looks)]
+            pvalues = [calibration.pvalues(i, X[i, test]) for i in range(decision_points)]
             for place, trial in enumerate(test):
                 seen = [p[place] for p in pvalues]
                 favourite = int(np.searchsorted(classes, said[place]))
                 for error in ERRORS:
                     outcomes[error].append(
-                        _decide(seen, error, classes, labels[trial], favourite, looks_s)
+                        _decide(seen, error, classes, labels[trial], favourite, decision_points_s)
                     )
     early = []
     for error, rows in outcomes.items():
         table = np.array(rows, dtype=np.float64).mean(axis=0)
         early.append(Early(error, *table.tolist()))
-    return Beside(tuple(looks_s), 1.0 - right.mean(axis=1), early, n, hindsight(right, looks_s))
+    return Beside(
+        tuple(decision_points_s),
+        1.0 - right.mean(axis=1),
+        early,
+        n,
+        hindsight(right, decision_points_s),
+    )
 
 
-def hindsight(right: NDArray[np.bool_], looks_s: Sequence[float]) -> float:
-    """Mean seconds to the first look from which on `right` (looks, n) stays what it ends as."""
+def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> float:
+    """Mean seconds until `right` (decision_points, n) keeps its final value."""
     same = right == right[-1]
     stays = np.logical_and.accumulate(same[::-1])[::-1]
-    return float(np.array(looks_s)[stays.argmax(axis=0)].mean())
+    return float(np.array(decision_points_s)[stays.argmax(axis=0)].mean())
 
 
 @dataclass(frozen=True)
@@ -124,12 +131,12 @@ class Strangers:
     """Contacts with things that were trained, and with things that were not.
 
     Attributes:
-        alarms: how often a trained thing may be called unknown for lying far from all.
+        novelty_rate: how often a trained thing may be called unknown for lying far from all.
         known: trials of trained things, and how many of them were called unknown.
         strange: the same of things left out whole.
     """
 
-    alarms: float
+    novelty_rate: float
     known: tuple[int, int]
     strange: tuple[int, int]
 
@@ -137,16 +144,16 @@ class Strangers:
 def strangers(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
-    looks_s: Sequence[float],
+    decision_points_s: Sequence[float],
     features: Sequence[str],
     scaling: str = "IV",
     error: float = 0.2,
-    rates: Sequence[float] = (ALARMS, 0.1, 0.2),
+    rates: Sequence[float] = (NOVELTY_RATE, 0.1, 0.2),
 ) -> list[Strangers]:
     """A third of the labels is left out whole, in turn; a fifth of the others' trials is held out.
 
     Args:
-        X, labels, looks_s, features, scaling: as for `beside`.
+        X, labels, decision_points_s, features, scaling: as for `beside`.
         error: asked for.
         rates: of false alarms asked for.
 
@@ -164,7 +171,7 @@ def strangers(
             if len(np.unique(labels[train])) < 2 or len(train) < FEWEST * CALIBRATION_FOLDS:
                 continue
             cell = told(X[-1], indices, train, train[:0], scaling, features)["task"]
-            model = SequentialClassifier({"task": cell.choice}, looks_s, features).fit(
+            model = SequentialClassifier({"task": cell.choice}, decision_points_s, features).fit(
                 X[:, train], {"task": labels[train]}
             )
             calibration = model.calibrations_["task"]
@@ -172,10 +179,10 @@ def strangers(
                 pvalues = [calibration.pvalues(i, x[trials]) for i, x in enumerate(X)]
                 for rate in rates:
                     for place in range(int(trials.sum())):
-                        candidates = Candidates(calibration.classes, error, rate)
+                        candidates = PredictionSet(calibration.classes, error, rate)
                         for values in pvalues:
                             if not candidates.settled:
-                                candidates.look(values[place])
+                                candidates.update(values[place])
                         counts[rate][row] += (1, candidates.unknown)
     return [
         Strangers(rate, (int(k[0]), int(k[1])), (int(s[0]), int(s[1])))
@@ -190,15 +197,15 @@ def _decide(
     classes: NDArray[np.str_],
     truth: str,
     favourite: int,
-    looks_s: Sequence[float],
+    decision_points_s: Sequence[float],
 ) -> tuple[bool, bool, bool, bool, bool, float]:
     """As the board's watcher does; (struck, wrong, sure and wrong, unsure, unknown, seconds)."""
-    candidates = Candidates(len(classes), error, ALARMS)
-    answer, seconds, settled = "", looks_s[-1], False
-    for look, values in enumerate(pvalues):
-        candidates.look(values)
+    candidates = PredictionSet(len(classes), error, NOVELTY_RATE)
+    answer, seconds, settled = "", decision_points_s[-1], False
+    for decision_point, values in enumerate(pvalues):
+        candidates.update(values)
         if candidates.settled and not settled:
-            settled, seconds = True, looks_s[look]
+            settled, seconds = True, decision_points_s[decision_point]
             answer = "" if candidates.unknown else str(classes[candidates.left[0]])
     unknown = settled and not answer
     if not settled:
@@ -215,11 +222,12 @@ def fixed_time(found: Beside, wrong: float) -> float | None:
         return None
     after = int(np.argmax(least <= wrong))
     if after == 0:
-        return found.looks_s[0]
+        return found.decision_points_s[0]
     high, low = least[after - 1], least[after]
     share = (high - wrong) / (high - low)
     return float(
-        found.looks_s[after - 1] + share * (found.looks_s[after] - found.looks_s[after - 1])
+        found.decision_points_s[after - 1]
+        + share * (found.decision_points_s[after] - found.decision_points_s[after - 1])
     )
 
 
@@ -230,7 +238,7 @@ def saved(found: Beside, early: Early) -> float:
     share is a lower bound.
     """
     fixed = fixed_time(found, early.wrong)
-    return 1.0 - early.mean_s / (found.looks_s[-1] if fixed is None else fixed)
+    return 1.0 - early.mean_s / (found.decision_points_s[-1] if fixed is None else fixed)
 
 
 def at_full_accuracy(found: Beside) -> tuple[float, Early] | None:
@@ -239,7 +247,7 @@ def at_full_accuracy(found: Beside) -> tuple[float, Early] | None:
     if not able:
         return None
     quickest = min(able, key=lambda one: one.mean_s)
-    return 1.0 - quickest.mean_s / found.looks_s[-1], quickest
+    return 1.0 - quickest.mean_s / found.decision_points_s[-1], quickest
 
 
 def floors(scene: Scene) -> dict[str, float]:

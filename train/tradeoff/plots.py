@@ -113,18 +113,21 @@ def stopping(found: Beside, floors: Mapping[str, float], task: str) -> bytes:
         figure = Figure(figsize=(8.0, 4.4 + below), layout="constrained")
         if slow:
             axes, floor = figure.subplots(2, 1, sharex=True, height_ratios=(4.4, below))
-            _floor(floor, slow, 1e3 * found.looks_s[-1])
+            _floor(floor, slow, 1e3 * found.decision_points_s[-1])
         else:
             axes = figure.subplots()
         axes.plot(
-            [1e3 * s for s in found.looks_s], 100 * found.fixed, "-s", ms=4, color=COLOURS[0],
+            [1e3 * s for s in found.decision_points_s], 100 * found.fixed, "-s", ms=4,
+            color=COLOURS[0],
             label="fixed windows",
         )  # fmt: skip
         axes.plot(
             [1e3 * e.mean_s for e in found.early], [100 * e.wrong for e in found.early], "-o",
             ms=5, color=COLOURS[1], label="as soon as it is sure, by asked error",
         )  # fmt: skip
-        for one in _apart(found.early, 0.04 * found.looks_s[-1], 0.06 * found.fixed.max()):
+        for one in _apart(
+            found.early, 0.04 * found.decision_points_s[-1], 0.06 * found.fixed.max()
+        ):
             axes.annotate(
                 f"{100 * one.asked:g} %",
                 (1e3 * one.mean_s, 100 * one.wrong),
@@ -139,7 +142,7 @@ def stopping(found: Beside, floors: Mapping[str, float], task: str) -> bytes:
             1e3 * found.hindsight_s, color=COLOURS[2], lw=1.0, ls="--",
             label="as accurate as the full window, in hindsight",
         )  # fmt: skip
-        axes.set_xlim(0, 1e3 * found.looks_s[-1] * 1.05)
+        axes.set_xlim(0, 1e3 * found.decision_points_s[-1] * 1.05)
         axes.set_ylim(bottom=0)
         (floor if slow else axes).set_xlabel("mean milliseconds from onset to decision")
         axes.set_ylabel(f"wrong of {found.trials} held-out trials, %")

@@ -114,7 +114,7 @@ def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main
             )
         fixed.rows += [
             (task, round(1e3 * s), round(100 * wrong, 1))
-            for s, wrong in zip(found.looks_s, found.fixed.tolist(), strict=True)
+            for s, wrong in zip(found.decision_points_s, found.fixed.tolist(), strict=True)
         ]
     text = [
         "Five folds are held out in turn; the others choose components and k, train and "
@@ -144,7 +144,7 @@ def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main
 
 
 def _headline(task: str, found: early.Beside) -> str:
-    full = found.looks_s[-1]
+    full = found.decision_points_s[-1]
     most = max(found.early, key=lambda one: early.saved(found, one))
     parts = [
         f"{task}: up to {100 * early.saved(found, most):.0f} % of the time is saved at equal "
@@ -184,7 +184,7 @@ def unknown(task: str, found: Sequence[early.Strangers]) -> Section:
         ),
         [
             (
-                round(100 * one.alarms, 1),
+                round(100 * one.novelty_rate, 1),
                 one.known[0],
                 round(100 * one.known[1] / one.known[0], 1),
                 one.strange[0],

@@ -69,8 +69,8 @@ def test_a_bus_that_is_not_there_is_one_sentence(library):
     code = "from edge.i2c.bus import LinuxBus; LinuxBus(77)"
     done = python(library, code)
     assert done.stderr.splitlines()[-1] == (
-        "edge.i2c.bus.BusMissing: /dev/i2c-77: no such bus; is I2C switched on, and the number right? "
-        "(ENOENT)"
+        "edge.i2c.bus.BusMissing: /dev/i2c-77: no such bus; is I2C switched on, and the number "
+        "right? (ENOENT)"
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from edge import demo
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.cli import main
 from edge.errors import InputError
 from edge.model.model import Model
@@ -91,7 +91,7 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
     model = Model(demo.MODEL)
     for path in demo.recordings():
         recording = load(path)
-        alone, several = Watcher(model), Watcher(model, several=True)
+        alone, several = Classifier(model), Classifier(model, several=True)
         expected, seen = ([e for f in recording for e in w.push(f)] for w in (alone, several))
         number = next(e["contact"] for e in seen if e["event"] == "decision")
         mine = [e for e in seen if e["contact"] == number]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.faults import Fault, positions, run, scripts
-from edge.classifier import Watcher
+from edge.classifier import Classifier
 from edge.commands.run import chip_event
 from edge.fake.player import Playback, fake_skin
 from edge.model.model import Model
@@ -88,9 +88,9 @@ def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):
     for faults, flagged in (((), False), (lost, True)):
         playback = Playback(trial)
         with fake_skin(file, playback, faults=faults) as skin:
-            watcher = Watcher(model, skin.layout)
+            classifier = Classifier(model, skin.layout)
             loop = Loop(skin, joints=playback, lasts_s=playback.ends)
-            events = [event for frame in loop.frames() for event in watcher.push(frame)]
+            events = [event for frame in loop.frames() for event in classifier.push(frame)]
             changed = [status.state for status in skin.changes()]
         decisions = [e for e in events if e["event"] == "decision"]
         assert ["missing_taxels" in e["flags"] for e in decisions] == [flagged] * 2

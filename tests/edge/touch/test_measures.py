@@ -15,7 +15,7 @@ from edge.touch.arm import Chain
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import PLACES, QUANTITIES, Measurer, feature, features, names
+from edge.touch.measures import QUANTITIES, ZONES, Measurer, feature, features, names
 from edge.touch.region import find_regions, largest_region
 from edge.touch.track import Tracker
 
@@ -25,7 +25,7 @@ ALL = names()
 
 
 def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[int]:
-    """What `edge.touch.measures` promises for a place, by plain sums; the best of all cuts of a turn."""
+    """What is measured in a zone, by plain sums; the best of all cuts of a turn."""
     candidates = []
     for cut in range(turn or 1):
         moved = {(r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()}
@@ -95,12 +95,12 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(seed, density, hig
         frame.counts, layout.threshold_counts, valid=frame.valid, wraps=wraps, connectivity=4
     )
     measurer = Measurer(layout, ALL)
-    assert measurer.places == PLACES
+    assert measurer.zones == ZONES
     row = measurer.measure(frame, contact)
     if contact is None:
         assert row == [0] * 41
         return
-    seen = {place: row[8 * i : 8 * i + 8] for i, place in enumerate(PLACES)}
+    seen = {zone: row[8 * i : 8 * i + 8] for i, zone in enumerate(ZONES)}
     assert seen == expected(layout, frame)
     regions = find_regions(frame.counts, 10, valid=frame.valid, wraps=wraps, connectivity=4)
     assert row[-1] == len(regions)
@@ -283,7 +283,7 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
     wanted = [*ALL[:3], "skin_force", "force_motion", "regions"]
     series = series_of(FLAT, frames, wanted)
     assert series.integers.shape == (2, 4 + 8 * 2 + 1)
-    assert series.places["skin"][:, 2].tolist() == [50, 140]
+    assert series.zones["skin"][:, 2].tolist() == [50, 140]
     assert series.force_motion.shape == series.motion.shape == (2,)
 
 
@@ -299,19 +299,19 @@ def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
     series_of(FLAT, frames, ["skin_force", "left_length"])
     monkeypatch.setattr(Chain, "pose", refuse)
     series = series_of(FLAT, frames, ["skin_force"], chain=Chain.cody())
-    assert list(series.places) == ["skin"]
+    assert list(series.zones) == ["skin"]
     monkeypatch.setattr(Measurer, "_moments", refuse)
     series_of(FLAT, frames, ["right_max_force", "left_area"])
     monkeypatch.setattr(Measurer, "measure", refuse)
     series = series_of(FLAT, frames, ["max_force", "contact_area", "contact_motion"])
-    assert series.places == {}
+    assert series.zones == {}
     with pytest.raises(AssertionError, match="no feature called"):
         series_of(FLAT, frames, ["skin_force"])
 
 
 def test_the_papers_three_are_the_default_and_come_first():
     assert FEATURES == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
-    assert len(ALL) == len(set(ALL)) == len(PLACES) * len(QUANTITIES) + 3
+    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 3
     assert [feature(name).name for name in ALL] == ALL
 
 

@@ -88,8 +88,8 @@ def test_motion_counts_from_the_reading_that_counts():
 
 def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
     tracker = Tracker(FLAT, TrackSettings(release=2))
-    places = [(1, 1), (1, 2), (2, 4), None, None]
-    for i, place in enumerate(places):
+    zones = [(1, 1), (1, 2), (2, 4), None, None]
+    for i, place in enumerate(zones):
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
         if place:
             counts[place] = 50

@@ -218,7 +218,7 @@ class TestEarly:
 
     def test_hindsight_stops_each_trial_once_its_answer_stays_as_it_ends(self):
         right = np.array([[1, 0, 1, 0], [1, 1, 0, 1], [1, 1, 1, 0]], dtype=bool)
-        # From the first look on, the second, the last, and the last.
+        # From the first decision point on, the second, the last, and the last.
         expected = np.mean([0.2, 0.6, 1.0, 1.0])
         assert early.hindsight(right, (0.2, 0.6, 1.0)) == pytest.approx(expected)
 
