@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,15 +141,21 @@ def _array(path: str, archive: zipfile.ZipFile, key: str) -> NDArray[Any]:
         return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
 
 
-def load_arrays(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def load_arrays(
+    path: str | os.PathLike[str], file: BinaryIO | None = None
+) -> dict[str, NDArray[Any]]:
     """All arrays of an `.npz`, without pickle.
+
+    Args:
+        path: of the file, which sentences name.
+        file: its contents, where they have been read already.
 
     Raises:
         InputError: the file is missing, damaged, or holds something other than plain arrays.
     """
     name = os.fspath(path)
     try:
-        with zipfile.ZipFile(name) as archive:
+        with zipfile.ZipFile(file or name) as archive:
             keys = [m.removesuffix(".npy") for m in archive.namelist() if m.endswith(".npy")]
             return {key: _array(name, archive, key) for key in keys}
     except InputError:
@@ -199,15 +205,19 @@ def _no_constant(text: str) -> None:
     raise ValueError(f"{text} is not a JSON number")
 
 
-def load(path: str | os.PathLike[str]) -> Recording:
+def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recording:
     """Read a recording.
+
+    Args:
+        path: of the `.npz`, which sentences name.
+        file: its contents, where they have been read already.
 
     Raises:
         InputError: the file is missing, damaged, or not as the contract says; the sentence
             names the file and what to do.
     """
     name = os.fspath(path)
-    arrays = load_arrays(name)
+    arrays = load_arrays(name, file)
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}")

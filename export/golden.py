@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from edge.model.model import Model
 from edge.model.verify import first_series, outputs, parts
-from edge.recording import Recording, load, save_arrays
+from edge.recording import Recording, save_arrays
 from edge.touch.features import feature_vector
 from train.dataset import DataSet
 
@@ -77,7 +77,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     found: list[tuple[float, Any]] = []
     for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
-        part = trimmed(load(trial.path), trial.onset_s, model)
+        part = trimmed(trial.recording, trial.onset_s, model)
         series = first_series(part, model)
         if series is None:
             continue

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto
 
 from export.build import Builder, project, widened
-from train.conformal import Calibration, Ranking, SequentialClassifier
+from train.conformal import ConformalCalibration, Ranking, SequentialClassifier
 from train.pipeline import Projection
 
 
@@ -119,7 +119,7 @@ def _gaps(build: Builder, wide: str, model: SequentialClassifier, scaling: str) 
     return build.node("Sub", [rows, z]), c
 
 
-def _scores(build: Builder, squares: str, calibration: Calibration) -> list[str]:
+def _scores(build: Builder, squares: str, calibration: ConformalCalibration) -> list[str]:
     """Squared distances (n, folds, rows) to a task's scores: (n, folds, labels) and one more."""
     classes = calibration.classes
     ints = build.ints
@@ -144,7 +144,7 @@ def _scores(build: Builder, squares: str, calibration: Calibration) -> list[str]
     return [ratio, first]
 
 
-def _pvalues(build: Builder, scores: str, calibrations: list[Calibration]) -> str:
+def _pvalues(build: Builder, scores: str, calibrations: list[ConformalCalibration]) -> str:
     """Scores (n, folds, columns) to their p-values.
 
     The columns are a task's labels and its distance to the nearest, task by task; all labels of

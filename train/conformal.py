@@ -114,7 +114,7 @@ class Ranking:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class ConformalCalibration:
     """What the p-values of one task are made of; L decision points, K folds, R rows, M trials a
     fold.
 
@@ -175,7 +175,7 @@ def calibrate(
     features: Sequence[str],
     fold_of: NDArray[np.int64],
     projections: list[list[Projection]],
-) -> Calibration:
+) -> ConformalCalibration:
     """Calibrate one task.
 
     Args:
@@ -215,7 +215,7 @@ def calibrate(
             best[0] = np.maximum(best[0], ratio(ratios(new)[np.arange(size), labels[own]]))
             best[1] = np.maximum(best[1], far(new.min(axis=1)))
         maxima[:, k, :size] = best * (1.0 + SLACK)
-    return Calibration(projections, rows, row_labels, rankings, maxima, sizes, classes)
+    return ConformalCalibration(projections, rows, row_labels, rankings, maxima, sizes, classes)
 
 
 class SequentialClassifier(BaseEstimator):
@@ -230,7 +230,7 @@ class SequentialClassifier(BaseEstimator):
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` a look.
-        calibrations_: {task: Calibration}.
+        calibrations_: {task: ConformalCalibration}.
         sizes_: trials of each fold.
     """
 

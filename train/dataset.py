@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from edge.errors import InputError
-from edge.model.verify import first_contact
 from edge.recording import Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
+from edge.touch.contacts import first_contact
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
 from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries, Tracker, TrackSettings, for_device
@@ -26,9 +27,14 @@ class Trial:
     """One recording's first contact."""
 
     path: Path
-    labels: dict[str, str]
+    recording: Recording
     onset_s: float
     series: FeatureSeries
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """{task: label}."""
+        return self.recording.labels
 
 
 @dataclass(frozen=True)
@@ -108,14 +114,24 @@ def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Ch
     return chain
 
 
+def _contents(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
 def _load_all(paths: list[Path], progress: bool) -> tuple[list[Recording], str]:
     digest = hashlib.sha256()
     recordings: list[Recording] = []
     bad: list[str] = []
     for path in tqdm(paths, desc="reading", unit=" trials", disable=not progress):
         try:
-            recordings.append(load(path))
-            digest.update(path.read_bytes())
+            contents = _contents(path)
+            recordings.append(load(path, io.BytesIO(contents)))
+            digest.update(contents)
         except InputError as error:
             bad.append(str(error))
     if bad:
@@ -189,7 +205,7 @@ def load_trials(
         if found is None:
             untouched.append(path)
         else:
-            trials.append(Trial(path, recording.labels, *found))
+            trials.append(Trial(path, recording, *found))
     if not trials:
         raise InputError(
             f"no contact in any of {len(paths)} recordings; lower the threshold "

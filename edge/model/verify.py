@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.model.model import Model, require_joints
 from edge.recording import Recording, load_arrays, load_meta
+from edge.touch.contacts import first_contact
 from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries, Tracker, for_device
@@ -74,20 +75,6 @@ def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeri
         features=info.features,
     )
     return first_contact(recording, tracker)
-
-
-def first_contact(recording: Recording, tracker: Tracker) -> tuple[float, FeatureSeries] | None:
-    """Onset in seconds and series of a recording's first contact; None where there is none."""
-    first = None
-    for frame in recording:
-        contact = tracker.push(frame)
-        if first is None:
-            first = contact
-        if first is not None and (first.ended or contact is not first):
-            break
-        if first is not None and frame.t - first.onset_s >= tracker.horizon_s:
-            break
-    return None if first is None else (first.onset_s, first.series())
 
 
 def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:

@@ -7,7 +7,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.model.prediction_set import PredictionSet
-from edge.model.verify import first_contact
+from edge.touch.contacts import first_contact
 from edge.touch.features import feature_vector
 from edge.touch.track import Tracker
 from train.conformal import Ranking, SequentialClassifier, deal, ratios

@@ -11,9 +11,9 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.model.verify import first_contact
 from edge.recording import Recording
 from edge.touch.arm import Chain
+from edge.touch.contacts import first_contact
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region

@@ -66,7 +66,6 @@ class Context:
 
     Attributes:
         dataset: followed for the paper's three features, up to 2 s.
-        recordings: of the dataset's trials, in their order.
         scene: what they were simulated from, or None.
         jobs: processes.
         cluster: a joblib backend that is not this machine's, or None.
@@ -74,7 +73,6 @@ class Context:
     """
 
     dataset: DataSet
-    recordings: list[Recording]
     scene: Scene | None
     jobs: int
     cluster: str | None = None
@@ -85,6 +83,11 @@ class Context:
         """{task: (n,) labels} of the tasks that have more than one class."""
         every = {task: self.dataset.labels(task) for task in self.dataset.tasks}
         return {task: labels for task, labels in every.items() if len(set(labels)) > 1}
+
+    @property
+    def recordings(self) -> list[Recording]:
+        """Of each trial."""
+        return [trial.recording for trial in self.dataset.trials]
 
     @property
     def series(self) -> list[FeatureSeries | None]:
@@ -114,9 +117,10 @@ class Context:
         """The trials' contacts in each of several views, in the order of the trials."""
         data = self.dataset
         # A recording travels to another process once, however many views it is seen in.
-        parts = np.array_split(np.arange(len(self.recordings)), 8 * self.jobs)
+        recordings = self.recordings
+        parts = np.array_split(np.arange(len(recordings)), 8 * self.jobs)
         cases = [
-            ({i: self.recordings[i] for i in part.tolist()}, views, data.tracking, data.chain)
+            ({i: recordings[i] for i in part.tolist()}, views, data.tracking, data.chain)
             for part in parts
             if part.size
         ]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
-from edge.model.verify import first_contact
 from edge.recording import Recording
+from edge.touch.contacts import first_contact
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from edge.touch.measures import feature, names
 from edge.touch.track import Tracker, for_device

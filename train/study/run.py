@@ -12,7 +12,6 @@ from typing import Any
 import joblib
 
 from edge.errors import InputError
-from edge.recording import load
 from train.dataset import load_trials
 from train.report import html as report
 from train.report.tables import Context, Section
@@ -64,8 +63,7 @@ def study(
         raise InputError(
             f"{len(dataset.trials)} trials are too few to study; give {FEWEST} or more"
         )
-    recordings = [load(trial.path) for trial in dataset.trials]
-    context = Context(dataset, recordings, source, jobs)
+    context = Context(dataset, source, jobs)
     alike = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:
         raise InputError(

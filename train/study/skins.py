@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge.model.verify import first_contact
 from edge.recording import Recording
 from edge.touch.arm import Chain
+from edge.touch.contacts import first_contact
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
 from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries, Tracker, TrackSettings, for_device

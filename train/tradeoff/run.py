@@ -14,7 +14,6 @@ from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.recording import load
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
 from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries
@@ -100,7 +99,7 @@ def tradeoff(
 
 def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[Point]:
     """Every setting worth showing, of every task."""
-    recordings = [load(trial.path) for trial in dataset.trials]
+    recordings = [trial.recording for trial in dataset.trials]
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in recordings]))
     layout = dataset.layout
     series: dict[str, list[FeatureSeries | None]] = {"": [t.series for t in dataset.trials]}

@@ -8,9 +8,9 @@ import pytest
 from edge.cli import main
 from edge.commands.bench import summary, touch
 from edge.model.model import Model
-from edge.model.verify import first_contact
 from edge.recording import Recording
 from edge.skin.file import shipped
+from edge.touch.contacts import first_contact
 from edge.touch.track import Tracker
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.recording import load
 from train.dataset import load_trials
 from train.report.tables import Context
 from train.simulate import scene as scenes
@@ -35,7 +34,7 @@ def context(scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("trials")
     write(scene, folder)
     data = load_trials([folder])
-    return Context(data, [load(trial.path) for trial in data.trials], scene, jobs=1)
+    return Context(data, scene, jobs=1)
 
 
 def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
