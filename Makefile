@@ -174,7 +174,7 @@ hard-cases-versions: $(READY) $(OTHER)/.ready
 	$(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $(OTHER)/bin/python
 
 mutants: $(READY)
-	$(BIN)/python -m tests.hard_cases.mutants
+	$(BIN)/python -m tests.mutation.guards
 
 clean:
 	rm -rf build dist

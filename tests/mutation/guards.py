@@ -1,0 +1,373 @@
+"""`python -m tests.mutation.guards`: each guard is taken out in turn, and a test must fail."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tests.mutation import runner, shapes
+
+
+@dataclass(frozen=True)
+class Guard:
+    """A guard and what is left without it.
+
+    Attributes:
+        keeps: what it keeps from happening.
+        stood: `file:function` where it stood when this was written; a hint, no condition.
+        shape: its code, as `shapes.find` takes it.
+        without: what takes its place.
+        case: a `-k` expression of the hard cases to ask first.
+        beside: a module whose tests are to be asked first.
+    """
+
+    keeps: str
+    stood: str
+    shape: str
+    without: str
+    case: str = ""
+    beside: str = ""
+
+    def job(self) -> runner.Job:
+        """The change, and the tests that are asked about it.
+
+        Raises:
+            LookupError: the guard is not found.
+        """
+        match = shapes.find(self.shape, self.stood)
+        first: list[tuple[str, ...]] = [(runner.HARD, "-k", self.case)] if self.case else []
+        if self.beside and (shapes.ROOT / runner.mirror(self.beside)).exists():
+            first.append((runner.mirror(self.beside),))
+        text = shapes.without(match, self.without)
+        return runner.Job(self.keeps, match.file, text, runner.stages(match.file, first))
+
+
+PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/touch/track.py"
+CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
+TILT = "train/simulate/effects/tilt.py"
+
+GUARDS = (
+    Guard(
+        "a type that told nothing gets no gain",
+        f"{PIPELINE}:scale_of",
+        "np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)",
+        "np.divide(1.0, scale, out=np.ones(types), where=scale > 0.0)",
+    ),
+    Guard(
+        "a spread that is rounding is no spread",
+        f"{PIPELINE}:scale_of",
+        "deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0",
+        "pass",
+        "spread and rounding",
+    ),
+    Guard(
+        "a column that is constant but for rounding weighs nothing",
+        f"{PIPELINE}:_centred",
+        "still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)",
+        "still = np.zeros(X.shape[1], dtype=bool)",
+    ),
+    Guard(
+        "components end at the rank",
+        f"{PIPELINE}:principal_axes",
+        "limit = values[:1].max(initial=0.0) * max(X.shape) * np.finfo(float).eps",
+        "limit = 0.0",
+        "rank",
+    ),
+    Guard(
+        "the sign is fixed",
+        f"{PIPELINE}:principal_axes",
+        "axes *= np.sign(axes[np.arange(rank), top])[:, None]",
+        "pass",
+    ),
+    Guard(
+        "entries equal but for rounding are equal",
+        f"{PIPELINE}:principal_axes",
+        "sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True)",
+        "sizes >= sizes.max(axis=1, keepdims=True)",
+    ),
+    Guard(
+        "a projection is exact: high half",
+        f"{PIPELINE}:__call__",
+        "high = (d + self.high) - self.high",
+        "high = 0.5 * d",
+    ),
+    Guard(
+        "a projection is exact: low half",
+        f"{PIPELINE}:__call__",
+        "low = ((d - high) + self.low) - self.low",
+        "low = d - high",
+        beside=GRAPH,
+    ),
+    Guard(
+        "the mean is subtracted first",
+        f"{PIPELINE}:__call__",
+        "d = (X - self.mean) * self.gain",
+        "d = X * self.gain - self.mean * self.gain",
+        "offset or exact",
+    ),
+    Guard(
+        "scales that cannot be held are refused",
+        f"{PIPELINE}:__init__",
+        "if largest > LARGEST_SCALE or 0.0 < largest < SMALLEST_SCALE: ...",
+        "if False: ...",
+    ),
+    Guard(
+        "a training vector that is not finite is refused",
+        f"{PIPELINE}:fit",
+        "if not np.isfinite(X).all(): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "equal distances go to the earlier row (estimator)",
+        f"{PIPELINE}:kneighbors",
+        'np.argsort(squares, kind="stable")[: self.k]',
+        'len(squares) - 1 - np.argsort(squares[::-1], kind="stable")[: self.k]',
+    ),
+    Guard(
+        "the graph's projection: high half",
+        "export/build.py:project",
+        'half = build.node("Sub", [build.node("Add", [d, step]), step])',
+        'half = build.node("Mul", [d, build.constant(0.5)])',
+        beside=GRAPH,
+    ),
+    Guard(
+        "the graph measures distances directly",
+        f"{GRAPH}:_nearest",
+        'squares = build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)',
+        'squares = build.node("ReduceSumSquare", [build.node("Cast", [build.node("Cast", [gaps], '
+        "to=TensorProto.FLOAT)], to=TensorProto.DOUBLE), build.ints(1)], keepdims=0)",
+        "distances or near-duplicate",
+    ),
+    Guard(
+        "the shortlist is checked",
+        f"{GRAPH}:_shortlisted",
+        'sure = build.node("Less", [build.node("Add", [kth, build.by_decision_point(slack)]), '
+        "reach])",
+        'sure = build.node("LessOrEqual", [kth, kth])',
+    ),
+    Guard(
+        "the check allows for float32's rounding",
+        f"{GRAPH}:_shortlisted",
+        "slack = [2.0 * u * float(of.max()) for of in lengths]",
+        "slack = [0.0 * float(of.max()) for of in lengths]",
+    ),
+    Guard(
+        "the shortlist is measured in the order of the rows",
+        f"{GRAPH}:_shortlisted",
+        'ordered, _ = build.nodes("TopK", [picked, ints(count)], ["", ""], largest=0, sorted=1)',
+        "ordered = picked",
+        "duplicates or equal",
+    ),
+    Guard(
+        "the shortlist's rows are brought to float32's size",
+        f"{GRAPH}:_shortlisted",
+        "units = [_unit(r) for r in rows]",
+        "units = [1.0 for r in rows]",
+    ),
+    Guard(
+        "no shortlist of nearly all rows",
+        f"{GRAPH}:_convert",
+        "len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
+        "len(rows[0]) >= SHORTLIST_ROWS",
+    ),
+    Guard(
+        "a distance that is no number votes for nothing",
+        f"{GRAPH}:_decide",
+        'said = build.node("Where", [known, said, build.constant(-1, np.int64)])',
+        "pass",
+    ),
+    Guard(
+        "a tie goes to the nearest of the tied",
+        f"{GRAPH}:_decide",
+        'place = build.node("ArgMax", [own], axis=1, keepdims=1)',
+        'place = build.node("ArgMax", [own], axis=1, keepdims=1, select_last_index=1)',
+    ),
+    Guard(
+        "label -1 is refused on the board",
+        "edge/model/model.py:decide",
+        "if index < 0: ...",
+        "if False: ...",
+    ),
+    Guard(
+        "leave-one-out: equal distances at the partition's limit",
+        f"{CROSSVAL}:_nearest",
+        "among = np.flatnonzero(near)",
+        "among = np.argpartition(row, k - 1)[:k]",
+    ),
+    Guard(
+        "leave-one-out: equal trials are equally far",
+        f"{CROSSVAL}:split_neighbours",
+        "z = (scaled @ axes.T)[first_equal(X) if first is None else first]",
+        "z = scaled @ axes.T",
+    ),
+    Guard(
+        "leave-one-out refuses what is not finite",
+        f"{CROSSVAL}:neighbours",
+        "if not np.isfinite(X).all(): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "a fraction of a step, not a slope, meets the values",
+        f"{FEATURES}:_resample",
+        "np.minimum(fraction, 1.0, out=fraction)",
+        "np.minimum(fraction, 2.0, out=fraction)",
+    ),
+    Guard(
+        "a step of no length divides nothing",
+        f"{FEATURES}:_resample",
+        "step[step == 0.0] = 1.0",
+        "pass",
+    ),
+    Guard(
+        "what rounding leaves of a line's width is not its root",
+        f"{FEATURES}:width",
+        "np.maximum(along * around - slant * slant, 0.0)",
+        "along * around - slant * slant",
+        "width",
+    ),
+    Guard(
+        "a trial seen before is as strange as it was",
+        "train/conformal.py:",
+        "SLACK = 1e-9",
+        "SLACK = 0.0",
+        "repeats",
+    ),
+    Guard(
+        "two readings of one instant are one",
+        f"{TRACK}:add",
+        "if self._t and t <= self._t[-1]: ...",
+        "if False: ...",
+    ),
+    Guard(
+        "motion counts from the reading that counts",
+        f"{TRACK}:add",
+        "self._starts.pop(which, None)",
+        "pass",
+    ),
+    Guard(
+        "a frame's time is finite",
+        f"{TRACK}:_take",
+        "if not math.isfinite(frame.t): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "a chip's time is finite",
+        f"{TRACK}:_time",
+        "if not math.isfinite(t): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "one frame alone begins no contact",
+        f"{TRACK}:_await",
+        "if self._run < of.settings.debounce: ...",
+        "if False: ...",
+    ),
+    Guard(
+        "equal areas stay with the region followed",
+        f"{REGION}:_settle",
+        "tied = [bits for bits, overlap in zip(tied, overlaps, strict=True) if overlap == most]",
+        "pass",
+        "flicker",
+    ),
+    Guard(
+        "a taxel that could not be read is not in contact",
+        f"{REGION}:_active",
+        "inside &= valid",
+        "pass",
+        "splits",
+    ),
+    Guard(
+        "a region across the seam is averaged on the circle",
+        f"{REGION}:col_sum",
+        "if self.wraps and all(bits & outside for outside in self._halves): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "a clear bit after each row stops carries",
+        f"{REGION}:__init__",
+        "self.stride = stride = cols + 1",
+        "self.stride = stride = cols",
+    ),
+    Guard(
+        "1 - cos as 2 sin^2 of the half angle",
+        "edge/touch/arm.py:pose",
+        "f, g = np.sin(angles), 2.0 * half * half",
+        "f, g = np.sin(angles), 1.0 - np.cos(angles)",
+        "tiny",
+    ),
+    Guard(
+        "an angle that is not finite is refused",
+        "edge/touch/arm.py:pose",
+        "if not np.isfinite(angles).all(): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "angles between two lines go the shorter way",
+        "edge/runtime/joint_stream.py:at",
+        "turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))",
+        "pass",
+    ),
+    Guard(
+        "a line that is not finite is no pose",
+        "edge/runtime/joint_stream.py:_line",
+        "if not finite: ...",
+        "if False: ...",
+        "NaN",
+    ),
+    Guard(
+        "a recording's times are finite",
+        "edge/recording.py:_check",
+        "if not np.isfinite(t).all(): ...",
+        "if False: ...",
+        "NaN",
+    ),
+    Guard(
+        "a recording's joint angles are finite",
+        "edge/recording.py:_check",
+        "if not finite.all(): ...",
+        "if False: ...",
+        "NaN",
+    ),
+    Guard(
+        "the tilt's Newton steps are cut back",
+        f"{TILT}:solve",
+        "y = guarded(state, y, free, c, ~done)",
+        "pass",
+        "tilt",
+    ),
+    Guard(
+        "the tilt's loads come from the side with more digits",
+        f"{TILT}:agree",
+        "force = np.where(stiff, (c[2] * d0 - c[1] * d1) / some, bed[0])",
+        "force = bed[0]",
+        "tilt",
+    ),
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print a line a guard; 1 where none of the tests misses one, or one is not found."""
+    parser = argparse.ArgumentParser(prog="mutation.guards", description=__doc__)
+    parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("--only", default="", help="guards whose description holds this text")
+    arguments = parser.parse_args(argv)
+    chosen = [guard for guard in GUARDS if arguments.only in guard.keeps]
+    try:
+        work = [guard.job() for guard in chosen]
+    except LookupError as error:
+        print(f"NOT FOUND {error.args[0]}")
+        return 1
+    alive = 0
+    for job, noticed, took in runner.run(work, arguments.jobs):
+        alive += not noticed
+        print(f"{'killed  ' if noticed else 'SURVIVED'} {job.name}")
+        print(f"         {job.file}: {noticed or 'no test failed'} [{took:.0f} s]", flush=True)
+    print(f"{len(work) - alive} of {len(work)} guards are missed by a test when taken out")
+    return 1 if alive else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
