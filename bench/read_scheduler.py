@@ -21,7 +21,6 @@ from edge.model.model import Model
 from edge.recording import Recording, find, load
 from edge.runtime.loop import Loop
 from edge.skin import file as skinfile
-from edge.skin import read_scheduler as interest
 from edge.skin.file import BusSpec, SkinFile
 from edge.touch.arm import Chain
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
@@ -65,13 +64,11 @@ def follow(
     samples: int = SAMPLES,
 ) -> Followed:
     """The first contact of a recording, read by a skin."""
-    reading = replace(file.reading, rate_hz=rate_hz)
+    reading = replace(file.reading, rate_hz=rate_hz, region_of_interest=region)
     file = replace(file, layout=recording.layout, reading=reading)
     playback = Playback(recording)
     skin = fake_skin(file, playback, timed=True)
     playback.start = skin.clock.now()
-    if region:
-        skin.planner = interest.Planner.of(skin)
     tracker = Tracker(recording.layout, chain=chain, horizon_s=window_s)
     contact: Contact | None = None
     with skin:

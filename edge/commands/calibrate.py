@@ -16,7 +16,7 @@ from edge.commands.source import add_skin, open_skin
 from edge.errors import InputError
 from edge.runtime.loop import Loop
 from edge.skin.calibration import save_calibration
-from edge.skin.file import Calibration
+from edge.skin.file import TaxelCalibration
 from edge.skin.skin import Skin
 
 FRAMES = 1000
@@ -41,7 +41,7 @@ def add_parser(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[Calibration, int]:
+def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCalibration, int]:
     """Mean and standard deviation of each taxel's raw values, from sums of whole numbers.
 
     Args:
@@ -55,7 +55,6 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[Calibra
     shape = skin.layout.shape
     n = np.zeros(shape, dtype=np.int64)
     total, squares = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
-    skin.following = False
     seen = 0
     for _ in Loop(skin, lasts_s=lasts_s).frames():
         raw, valid = skin.raw()
@@ -67,8 +66,7 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[Calibra
         seen += 1
         if seen == frames:
             break
-    skin.following = True
-    return Calibration(*mean_and_deviation(n, total, squares)), seen
+    return TaxelCalibration(*mean_and_deviation(n, total, squares)), seen
 
 
 def mean_and_deviation(
@@ -117,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     taken = datetime.now(UTC).replace(microsecond=0)
     backup = save_calibration(
-        arguments.skin, Calibration(calibration.baseline, calibration.noise, taken)
+        arguments.skin, TaxelCalibration(calibration.baseline, calibration.noise, taken)
     )
     if unread:
         print(f"edge-classify: {unread} taxels could not be read", file=sys.stderr)

@@ -54,7 +54,7 @@ def chip_event(status: ChipStatus, t: float) -> Event:
         "event": "chip",
         "t": t,
         "bus": status.bus,
-        "place": status.place,
+        "place": status.route,
         "state": status.state,
     }
     return {**event, "error": status.error} if status.error else event
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
         notifier = stack.enter_context(Notifier(now=time.monotonic))
         lines = stack.enter_context(Lines(udp=arguments.udp))
-        opened = stack.enter_context(open_skin(arguments))
+        opened = stack.enter_context(open_skin(arguments, model=model))
         on_skin = arguments.without_joints == "skin"
         if not on_skin:
             check_joints(model, arguments, opened)
@@ -96,8 +96,6 @@ def run(arguments: argparse.Namespace) -> int:
         touch_map = None
         if arguments.map is not None:
             touch_map = stack.enter_context(MapFile(arguments.map, model.info))
-        # The model's threshold counts where it is the lower one.
-        skin.touch_counts = min(skin.touch_counts, classifier.layout.threshold_counts)
         loop = Loop(
             skin,
             joints=joints if chain is not None else None,

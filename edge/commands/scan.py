@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
                     {
                         "event": "chip",
                         "bus": status.bus,
-                        "place": status.place,
+                        "place": status.route,
                         "kind": status.kind,
                         "state": status.state,
                         "error": status.error or None,

@@ -18,8 +18,9 @@ from edge.recording import load
 from edge.runtime import joint_stream as joints
 from edge.runtime.loop import JointSource
 from edge.skin import file as skinfile
-from edge.skin import read_scheduler as interest
+from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
+from edge.touch.track import for_device
 
 
 def add_skin(parser: argparse.ArgumentParser, *, joint_options: bool = False) -> None:
@@ -71,6 +72,17 @@ def _seconds(text: str) -> float:
     return seconds
 
 
+def touch_counts(model: Model | None, file: SkinFile) -> int | None:
+    """The model's threshold in the counts of a skin.
+
+    Raises:
+        InputError: the model was made for another skin.
+    """
+    if model is None:
+        return None
+    return for_device(model.info.layout, file.layout).threshold_counts
+
+
 @dataclass(frozen=True)
 class Opened:
     """A skin that is being read.
@@ -89,8 +101,15 @@ class Opened:
 
 
 @contextmanager
-def open_skin(arguments: argparse.Namespace, *, calibrated: bool = True) -> Iterator[Opened]:
+def open_skin(
+    arguments: argparse.Namespace, *, calibrated: bool = True, model: Model | None = None
+) -> Iterator[Opened]:
     """The skin that the options name, closed at the end of the block.
+
+    Args:
+        arguments: parsed.
+        calibrated: refuse a real skin that has no calibration.
+        model: its threshold says when a taxel is being touched, where it is the lower one.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
@@ -104,7 +123,10 @@ def open_skin(arguments: argparse.Namespace, *, calibrated: bool = True) -> Iter
             else:
                 file = skinfile.load(arguments.skin)
             clock = PacedClock() if arguments.real_time else VirtualClock()
-            skin, playback = play(file, recording, loop=arguments.loop, clock=clock)
+            touch = touch_counts(model, file)
+            skin, playback = play(
+                file, recording, loop=arguments.loop, clock=clock, touch_counts=touch
+            )
             stack.enter_context(skin)
             lasts = min(playback.ends, arguments.seconds)
             opened = Opened(skin, lasts, playback, f"fake {arguments.fake}")
@@ -114,18 +136,12 @@ def open_skin(arguments: argparse.Namespace, *, calibrated: bool = True) -> Iter
             if arguments.skin is None:
                 raise InputError("give --skin skin.toml, or --fake REC.npz for no hardware")
             file = skinfile.load(arguments.skin)
-            if calibrated and file.calibration is None:
-                raise InputError(
-                    f"{arguments.skin}: has no calibration; run "
-                    f"`edge-classify calibrate --skin {arguments.skin}` with nothing touching"
-                )
-            skin = stack.enter_context(Skin.open(file))
+            touch = touch_counts(model, file)
+            skin = stack.enter_context(Skin.open(file, calibrated=calibrated, touch_counts=touch))
             opened = Opened(skin, arguments.seconds, None, arguments.skin)
         for status in skin.status():
             if status.error:
                 print(f"edge-classify: {status.error}; left out for now", file=sys.stderr)
-        if file.reading.region_of_interest:
-            skin.planner = interest.Planner.of(skin)
         yield opened
 
 

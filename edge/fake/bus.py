@@ -10,7 +10,7 @@ import numpy as np
 
 from edge.fake.chips import FakeChip, FakeTCA9548A
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import NO_FAULTS, Fault, Place, Script
+from edge.fake.faults import NO_FAULTS, Fault, Route, Script
 from edge.i2c.bus import LARGEST_BYTES, LARGEST_MESSAGES, Message, Transfer, bus_error, wire_bits
 
 Way = tuple[str, int, int | None, int | None]
@@ -64,7 +64,7 @@ class FakeBus:
         self.transactions = 0
         self.threads: set[int] = set()
         """Threads that have used it: a bus belongs to one at a time."""
-        self._held: dict[tuple[Place, int], bytes] = {}
+        self._held: dict[tuple[Route, int], bytes] = {}
         self._open = True
 
     def inject(self, faults: Sequence[Fault], seed: int = 0) -> None:
@@ -110,8 +110,8 @@ class FakeBus:
         if not self._open:
             raise bus_error(errno.ENODEV, self.name, address)
         way, chips = self._route(address)
-        place = Place(*way) if self.script.faults else None
-        fault = None if place is None else self.script.next(place, self.now())
+        route = Route(*way) if self.script.faults else None
+        fault = None if route is None else self.script.next(route, self.now())
         self.transactions += 1
         if fault is not None and fault.kind == "error":
             self._spend(11 if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
@@ -129,7 +129,7 @@ class FakeBus:
         self._spend(wire_bits(messages))
         t = self.now()
         for message in messages:
-            self._carry(message, chips, t, fault, place)
+            self._carry(message, chips, t, fault, route)
         self._stop()
 
     def _refuse(self, messages: Sequence[Message]) -> None:
@@ -163,7 +163,7 @@ class FakeBus:
         chips: Sequence[FakeChip],
         t: float,
         fault: Fault | None,
-        place: Place | None,
+        route: Route | None,
     ) -> None:
         if not message.read:
             data = message.buffer.tobytes()
@@ -180,13 +180,13 @@ class FakeBus:
         if fault is not None and fault.kind == "flip":
             bit = self.script.random.randrange(8 * len(out))
             out[bit // 8] ^= 1 << bit % 8
-        if place is None:
+        if route is None:
             message.buffer[:] = out
             return
         if fault is not None and fault.kind == "hold":
-            out[:] = np.frombuffer(self._held.get((place, len(out)), out.tobytes()), dtype=np.uint8)
+            out[:] = np.frombuffer(self._held.get((route, len(out)), out.tobytes()), dtype=np.uint8)
         elif len(out) > 2:
-            self._held[place, len(out)] = out.tobytes()
+            self._held[route, len(out)] = out.tobytes()
         message.buffer[:] = out
 
     def _stop(self) -> None:

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.fake.clock import TIME_ROUNDING_S
 from edge.i2c import ad7147, block, mpr121
 
 Sense = Callable[[float], NDArray[np.uint16]]
@@ -185,8 +186,7 @@ class FakeBlock:
         if self._pointer == block.IDENTITY[0]:
             out = block.sealed(block.MAGIC + bytes([self._bits]) + self._taxels.to_bytes(2, "big"))
         elif self._pointer == block.FRAME[0]:
-            # Half a microsecond keeps a time that is a sample's own from rounding below it.
-            sample = int(t * self._rate + 5e-7)
+            sample = int((t + TIME_ROUNDING_S) * self._rate)
             values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
             out = block.sealed(
                 (sample & 0xFFFF).to_bytes(2, "big") + block.pack(values, self._bits)

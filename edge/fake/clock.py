@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import time
 
+TIME_ROUNDING_S = 5e-7
+"""A time that is meant to be a sample's own may lie below it by rounding; no two samples are as
+close as this half microsecond."""
+
 
 class Hand:
     """One bus's place in time; buses run side by side, so each has its own."""

@@ -48,7 +48,7 @@ NO_FAULTS: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True)
-class Place:
+class Route:
     """Where a transaction goes: bus, address, and the mux and channel it passes."""
 
     bus: str
@@ -61,7 +61,7 @@ class Script:
     """The faults of one bus.
 
     >>> script = Script([Fault(at=[1])], "bus 0")
-    >>> [script.next(Place("bus 0", 0x2C), 0.0) is not None for _ in range(3)]
+    >>> [script.next(Route("bus 0", 0x2C), 0.0) is not None for _ in range(3)]
     [False, True, False]
     """
 
@@ -73,16 +73,16 @@ class Script:
         # A stream per bus, so that what one bus meets does not depend on the others' threads.
         self.random = random.Random(f"faults/{seed}/{bus}")
 
-    def next(self, place: Place, t: float) -> Fault | None:
+    def next(self, route: Route, t: float) -> Fault | None:
         """The fault that the next transaction meets, the first of those that match."""
         self._n += 1
         for fault in self.faults:
             if (
                 (fault.at is None or self._n in fault.at)
                 and fault.during[0] <= t < fault.during[1]
-                and fault.address in (None, place.address)
-                and fault.mux in (None, place.mux)
-                and fault.channel in (None, place.channel)
+                and fault.address in (None, route.address)
+                and fault.mux in (None, route.mux)
+                and fault.channel in (None, route.channel)
                 and (fault.rate >= 1.0 or self.random.random() < fault.rate)
             ):
                 self.met += 1

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
 from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA9548A, Sense
-from edge.fake.clock import VirtualClock
+from edge.fake.clock import TIME_ROUNDING_S, VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
 from edge.i2c import ad7147, block
 from edge.recording import Recording
 from edge.skin import file as skinfile
-from edge.skin.file import UNUSED, BusSpec, Calibration, ChipSpec, SkinFile
+from edge.skin.file import UNUSED, BusSpec, ChipSpec, SkinFile, TaxelCalibration
 from edge.skin.skin import Skin
 from edge.touch.layout import SkinLayout
 
@@ -67,8 +67,7 @@ class Playback:
         t -= self.start
         if self._loop:
             t %= self._length
-        # Half a microsecond: a time that is meant to be a frame's own finds that frame.
-        return max(0, int(np.searchsorted(self._t, t + 5e-7, side="right")) - 1)
+        return max(0, int(np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")) - 1)
 
     def __call__(self, t: float) -> NDArray[np.uint16]:
         """Counts above baseline (rows, cols) at `t`."""
@@ -90,7 +89,7 @@ def calibrated(file: SkinFile) -> SkinFile:
             if taxel != UNUSED:
                 baseline[taxel] = _rest(chip)
     shape = file.layout.shape
-    return replace(file, calibration=Calibration(baseline.reshape(shape), np.zeros(shape)))
+    return replace(file, calibration=TaxelCalibration(baseline.reshape(shape), np.zeros(shape)))
 
 
 def _rest(chip: ChipSpec) -> int:
@@ -212,12 +211,13 @@ def fake_skin(
     noise_counts: float = 0.0,
     faults: Sequence[Fault] = NO_FAULTS,
     seed: int = 0,
+    touch_counts: int | None = None,
 ) -> Skin:
     """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
     clock = clock or VirtualClock()
     file = calibrated(file)
     buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed)
-    skin = Skin(file, buses, clock=clock)
+    skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
     skin.start()
     clock.sleep_until(clock.now())
     for bus in buses:
@@ -237,6 +237,7 @@ def play(
     *,
     loop: bool = False,
     clock: VirtualClock | None = None,
+    touch_counts: int | None = None,
 ) -> tuple[Skin, Playback]:
     """A fake skin that feels a recording.
 
@@ -250,15 +251,15 @@ def play(
             f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
         )
     playback = Playback(recording, loop=loop)
-    skin = fake_skin(file, playback, clock=clock)
+    skin = fake_skin(file, playback, clock=clock, touch_counts=touch_counts)
     playback.start = skin.clock.now()
     return skin, playback
 
 
 def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
     """Bits on each bus's wire for so many frames, counted as the drivers send them."""
-    skin = still(file)
-    with skin:
+    whole = replace(file, reading=replace(file.reading, region_of_interest=False))
+    with still(whole) as skin:
         buses = [reader.bus for reader in skin.readers]
         before = [bus.bits for bus in buses]  # type: ignore[attr-defined]
         for _ in range(frames):

@@ -8,10 +8,24 @@ from __future__ import annotations
 
 import errno
 
-from edge.i2c.bus import Bus, BusError, BusNack, Message, Transfer, bus_error, read, write
+from edge.i2c.bus import (
+    Bus,
+    BusError,
+    BusNack,
+    Message,
+    Transfer,
+    bus_error,
+    read,
+    wire_bits,
+    write,
+)
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = 8
+SELECT_BITS = wire_bits([write(0x70, b"\0")])
+"""Bits on the wire of selecting a channel."""
+VERIFY_BITS = wire_bits([read(0x70, 1)])
+"""Bits on the wire of reading the control byte back."""
 
 
 class TCA9548A:

@@ -154,9 +154,9 @@ def stop_on(*signals: int) -> Iterator[Stop]:
 class Loop:
     """Frames of a skin at its rate.
 
-    >>> from edge import skinfile
     >>> from edge.fake.player import still
-    >>> with still(skinfile.load(skinfile.shipped())) as skin:
+    >>> from edge.skin import file
+    >>> with still(file.load(file.shipped("cody"))) as skin:
     ...     sum(1 for _ in Loop(skin, lasts_s=0.05).frames())
     5
     """

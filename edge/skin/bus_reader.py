@@ -65,7 +65,6 @@ class Slot:
         row: (bytes,) that its frame is read into.
         state: see `State`.
         error: why it is down.
-        bits: of one reading on the wire.
         at: when it was last read, on the bus's clock.
         good: the bytes in `row` are of one whole transfer of a chip with its settings.
         recoveries: how often it has come back.
@@ -78,7 +77,6 @@ class Slot:
         self.error: BusError | None = None
         self.at = NEVER
         self.good = False
-        self.bits = frame_wire_bits(spec, row)
         self.suspect = False
         """Its bytes look like those of a chip that has lost its settings: check it first."""
         self.recoveries = 0
@@ -98,10 +96,10 @@ def _nothing(transfer: Transfer) -> None:
     raise AssertionError("a chip that is down is not read")
 
 
-def frame_wire_bits(spec: ChipSpec, row: NDArray[np.uint8]) -> int:
-    """Bits on the wire of one reading of a chip: `[write pointer][read row]`."""
+def frame_wire_bits(spec: ChipSpec) -> int:
+    """Bits on the wire of one reading of a chip: `[write pointer][read frame]`."""
     pointer = b"\0\0" if spec.kind == "ad7147" else b"\0"
-    return wire_bits([write(spec.address, pointer), read(spec.address, row)])
+    return wire_bits([write(spec.address, pointer), read(spec.address, frame_bytes(spec))])
 
 
 def frame_bytes(spec: ChipSpec) -> int:

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.skin.file import Calibration, SkinFile, parse, read_text
+from edge.skin.file import SkinFile, TaxelCalibration, parse, read_text
 
 
-def calibration_text(calibration: Calibration) -> str:
+def calibration_text(calibration: TaxelCalibration) -> str:
     """The `[calibration]` table as TOML, a line a row of the skin."""
 
     def rows(values: Iterable[Iterable[object]]) -> Iterator[str]:
@@ -33,7 +33,7 @@ def calibration_text(calibration: Calibration) -> str:
     return "".join(lines)
 
 
-def with_calibration(text: str, calibration: Calibration, where: str = "skin") -> str:
+def with_calibration(text: str, calibration: TaxelCalibration, where: str = "skin") -> str:
     """The file's text with its `[calibration]` replaced; all else, comments too, stays.
 
     Raises:
@@ -56,7 +56,7 @@ def with_calibration(text: str, calibration: Calibration, where: str = "skin") -
     return out
 
 
-def save_calibration(path: str | os.PathLike[str], calibration: Calibration) -> Path:
+def save_calibration(path: str | os.PathLike[str], calibration: TaxelCalibration) -> Path:
     """Put a calibration into a skin's file, whole or not at all; the old file stays beside it.
 
     Returns:

@@ -48,8 +48,8 @@ class ChipSpec:
     bits: int = 16
 
     @property
-    def place(self) -> str:
-        """Where it is, for a person."""
+    def route(self) -> str:
+        """The way to it as a person reads it: mux, channel and address."""
         way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
         return f"{way}address {self.address:#04x}"
 
@@ -107,7 +107,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class TaxelCalibration:
     """What `edge-classify calibrate` measured with nothing touching.
 
     Attributes:
@@ -130,7 +130,7 @@ class SkinFile:
     buses: tuple[BusSpec, ...]
     signal: Signal = field(default_factory=Signal)
     reading: Reading = field(default_factory=Reading)
-    calibration: Calibration | None = None
+    calibration: TaxelCalibration | None = None
     path: str = "skin"
 
     @property
@@ -350,7 +350,7 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
             place = (chip.mux, chip.channel, chip.address)
             if place in seen:
                 raise InputError(
-                    f"{where}: bus {b} chip {c} has the place of chip {seen[place]}, {chip.place}"
+                    f"{where}: bus {b} chip {c} has the place of chip {seen[place]}, {chip.route}"
                 )
             if chip.mux is not None and chip.address in direct | muxes:
                 raise InputError(
@@ -368,7 +368,7 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
                 owner[taxel] = f"bus {b} chip {c}"
 
 
-def _calibration(table: Table, layout: SkinLayout) -> Calibration:
+def _calibration(table: Table, layout: SkinLayout) -> TaxelCalibration:
     arrays: dict[str, NDArray[np.float64]] = {}
     for key in ("baseline", "noise"):
         value = table.get(key)
@@ -394,7 +394,7 @@ def _calibration(table: Table, layout: SkinLayout) -> Calibration:
     if taken is not None and not isinstance(taken, datetime):
         raise table.fail("taken", "a date and time")
     table.done()
-    return Calibration(arrays["baseline"].astype(np.uint16), arrays["noise"], taken)
+    return TaxelCalibration(arrays["baseline"].astype(np.uint16), arrays["noise"], taken)
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:

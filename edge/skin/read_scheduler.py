@@ -14,26 +14,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.skin.file import UNUSED, BusSpec
-from edge.skin.skin import MARGIN, Skin
+from edge.i2c.tca9548a import SELECT_BITS, VERIFY_BITS
+from edge.skin.bus_reader import frame_wire_bits
+from edge.skin.file import UNUSED, BusSpec, SkinFile
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
+MARGIN = 0.9
+"""Share of a period that planned readings may fill; retries and health checks need the rest."""
 SPARE = 0.15
-"""Part of the wire that chips away from the contact get at least, so that none is forgotten."""
+"""Share of the wire that is kept for chips away from the contact, so that none is forgotten."""
 REACH = 1
 """Taxels around a contact that count as its neighbourhood."""
+OLDEST_FRAMES = 25
+"""After so many frames without a reading a taxel is no longer valid. With `SPARE` of a bus for
+the rest, a full turn through 32 chips takes at most 20 frames."""
 
 
 @dataclass(frozen=True)
-class Wire:
+class BusBudget:
     """What one bus carries in a period, and what its chips cost.
 
     Attributes:
         bits: of one period.
         costs: bits of each chip's reading.
-        select: bits of connecting a mux channel.
-        channels: for each chip a number that is the same for chips behind one mux channel.
+        select: bits that it takes to connect a mux channel.
+        channels: for each chip a number; chips behind the same mux channel share it.
     """
 
     bits: float
@@ -42,28 +48,29 @@ class Wire:
     channels: tuple[int, ...]
 
 
-class Planner:
-    """Chooses the chips of the next frame; see the module.
+class ReadScheduler:
+    """Chooses the chips that the next frame reads.
 
-    >>> from edge import skinfile
-    >>> from edge.fake.player import still
-    >>> with still(skinfile.load(skinfile.shipped())) as skin:
-    ...     skin.planner = Planner.of(skin)
-    ...     [len(chips) for chips in skin.planner.plan(None)]
+    >>> from edge.skin import file
+    >>> scheduler = ReadScheduler.of(file.load(file.shipped("cody")))
+    >>> [len(chips) for chips in scheduler.plan(None)]
     [12, 12, 8]
     """
 
     def __init__(
-        self, layout: SkinLayout, wires: Sequence[Wire], taxels: Sequence[Sequence[Sequence[int]]]
+        self,
+        layout: SkinLayout,
+        budgets: Sequence[BusBudget],
+        taxels: Sequence[Sequence[Sequence[int]]],
     ) -> None:
-        """Plan for a skin.
+        """Schedule the readings of a skin.
 
         Args:
-            layout: of the skin.
-            wires: one a bus.
-            taxels: for each bus and chip its flat taxel indices.
+            layout: the skin's.
+            budgets: one for each bus.
+            taxels: for each chip of each bus, its flat taxel indices.
         """
-        self._wires = wires
+        self._budgets = budgets
         self._near = []
         for chips in taxels:
             near = np.zeros((len(chips), *layout.shape), dtype=np.bool_)
@@ -72,31 +79,30 @@ class Planner:
             # A chip is concerned where its own taxels or those within reach feel something.
             spread = spread_by(near, REACH, layout.wraps)
             self._near.append(spread.reshape(len(chips), -1))
-        self._read_at = [np.full(len(w.costs), -1, dtype=np.int64) for w in wires]
+        self._read_at = [np.full(len(w.costs), -1, dtype=np.int64) for w in budgets]
         self._tick = 0
 
     @classmethod
-    def of(cls, skin: Skin) -> Planner:
-        """For a skin that has started, at its own rate."""
-        wires, taxels = [], []
-        for reader, spec in zip(skin.readers, skin.file.buses, strict=True):
-            wires.append(
-                Wire(
-                    bits=MARGIN * skin.period_s * spec.clock_hz,
-                    costs=tuple(slot.bits for slot in reader.slots),
-                    select=40 if skin.file.reading.verify_mux else 20,
-                    channels=_channels(spec),
-                )
+    def of(cls, file: SkinFile) -> ReadScheduler:
+        """The scheduler of a skin, at the rate that its file asks for."""
+        reading = file.reading
+        budgets = [
+            BusBudget(
+                bits=MARGIN * spec.clock_hz / reading.rate_hz,
+                costs=tuple(map(frame_wire_bits, spec.chips)),
+                select=SELECT_BITS + (VERIFY_BITS if reading.verify_mux else 0),
+                channels=_channels(spec),
             )
-            taxels.append([chip.taxels for chip in spec.chips])
-        return cls(skin.layout, wires, taxels)
+            for spec in file.buses
+        ]
+        return cls(file.layout, budgets, [[c.taxels for c in spec.chips] for spec in file.buses])
 
     def plan(self, frame: Frame | None, touch_counts: int = 0) -> list[list[int]]:
         """For each bus the indices of the chips to read next, in wire order.
 
         Args:
             frame: the last one, or None before the first.
-            touch_counts: a taxel above this feels something.
+            touch_counts: a taxel above this is being touched.
         """
         self._tick += 1
         felt: NDArray[np.bool_] | None = None
@@ -104,20 +110,20 @@ class Planner:
             felt = frame.counts.reshape(-1) > touch_counts
             if not felt.any():
                 felt = None
-        return [self._plan(b, felt) for b in range(len(self._wires))]
+        return [self._plan(b, felt) for b in range(len(self._budgets))]
 
     def _plan(self, b: int, felt: NDArray[np.bool_] | None) -> list[int]:
-        wire, read_at = self._wires[b], self._read_at[b]
-        n = len(wire.costs)
+        budget, read_at = self._budgets[b], self._read_at[b]
+        n = len(budget.costs)
         hot = np.zeros(n, dtype=np.bool_) if felt is None else self._near[b] @ felt
         oldest_first = np.argsort(read_at, kind="stable").tolist()
         chosen: list[int] = []
         left = self._take(
-            chosen, [i for i in oldest_first if hot[i]], wire, (1 - SPARE) * wire.bits
+            chosen, [i for i in oldest_first if hot[i]], budget, (1 - SPARE) * budget.bits
         )
-        left += SPARE * wire.bits
-        left = self._take(chosen, [i for i in oldest_first if not hot[i]], wire, left)
-        self._take(chosen, [i for i in oldest_first if hot[i]], wire, left)
+        left += SPARE * budget.bits
+        left = self._take(chosen, [i for i in oldest_first if not hot[i]], budget, left)
+        self._take(chosen, [i for i in oldest_first if hot[i]], budget, left)
         if not chosen:
             chosen.append(oldest_first[0])  # a wire too slow for a chip a period still reads one
         chosen.sort()
@@ -125,18 +131,20 @@ class Planner:
         return chosen
 
     @staticmethod
-    def _take(chosen: list[int], wanted: Sequence[int], wire: Wire, bits: float) -> float:
+    def _take(chosen: list[int], wanted: Sequence[int], budget: BusBudget, bits: float) -> float:
         """Add chips while the bits last; returns what is left of them."""
-        connected = {wire.channels[i] for i in chosen}
+        connected = {budget.channels[i] for i in chosen}
         for i in wanted:
             if i in chosen:
                 continue
-            cost = wire.costs[i] + (0 if wire.channels[i] in connected else wire.select)
+            cost = budget.costs[i]
+            if budget.channels[i] not in connected:
+                cost += budget.select
             if cost > bits:
                 break
             bits -= cost
             chosen.append(i)
-            connected.add(wire.channels[i])
+            connected.add(budget.channels[i])
         return bits
 
 

@@ -3,39 +3,33 @@
 from __future__ import annotations
 
 import math
+import os
 import queue
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.clock import Clock, SystemClock
-from edge.errors import EdgeError
+from edge.errors import EdgeError, InputError
 from edge.i2c.bus import Bus, BusError, LinuxBus
 from edge.skin.baseline import Baseline
 from edge.skin.buffers import Buffers, ChipGroup, buffers
 from edge.skin.bus_reader import NEVER, BusReader, Slot, State
 from edge.skin.calibration import dead_band
-from edge.skin.file import UNUSED, SkinFile
+from edge.skin.file import UNUSED, SkinFile, load
+from edge.skin.read_scheduler import MARGIN, ReadScheduler
+from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
 from edge.touch.frame import Frame
 
 FOLLOW_FRAMES = 4
-"""The baseline takes a step every so many frames: drift is slow, and steps cost time."""
+"""The baseline follows drift in one frame of so many: drift is slow, and a step costs time."""
 NOISY = 1.0
 """Standard deviation in counts from which a chip's bytes change with every conversion."""
-MARGIN = 0.9
-"""Part of a period in which a bus may begin what can wait."""
-
-
-class Planner(Protocol):
-    """Chooses which chips a frame reads; `edge.skin.read_scheduler` has one."""
-
-    def plan(self, frame: Frame | None, touch_counts: int) -> Sequence[Sequence[int]]:
-        """For each bus the indices of the chips to read next, in order."""
-        ...
+OLDEST_FRAMES = 2
+"""A chip read in every frame may miss one before its taxels are no longer valid."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +37,7 @@ class ChipStatus:
     """How one chip does.
 
     Attributes:
-        bus, place, kind: where and what it is, for a person.
+        bus, route, kind: where and what it is, for a person.
         taxels: flat indices.
         state: running, starting or down.
         error: why it is down.
@@ -51,7 +45,7 @@ class ChipStatus:
     """
 
     bus: str
-    place: str
+    route: str
     kind: str
     taxels: tuple[int, ...]
     state: str
@@ -84,30 +78,40 @@ class Skin:
     """A skin on its buses.
 
     >>> from edge.fake.player import still
-    >>> from edge import skinfile
-    >>> skin = still(skinfile.load(skinfile.shipped("cody")))
+    >>> from edge.skin import file
+    >>> skin = still(file.load(file.shipped("cody")))
     >>> with skin:
     ...     frame = skin.read()
     >>> frame.counts.shape, bool(frame.valid.all())
     ((16, 24), True)
     """
 
-    def __init__(self, file: SkinFile, buses: Sequence[Bus], *, clock: Clock | None = None) -> None:
-        """Set the skin up on buses that are open; `start` then sets the chips up.
+    def __init__(
+        self,
+        file: SkinFile,
+        buses: Sequence[Bus],
+        *,
+        clock: Clock | None = None,
+        touch_counts: int | None = None,
+    ) -> None:
+        """Take buses that are open; `start` then sets the chips up.
 
         Args:
-            file: what is where.
-            buses: one for each of the file's, in their order; `close` closes them.
-            clock: of the loop; the kernel's where None. The buses go by the same.
+            file: which chip is where.
+            buses: one for each of the file's buses, in their order; `close` closes them.
+            clock: the loop's, which the buses go by too; the kernel's where None.
+            touch_counts: a taxel above this is being touched: the baseline is frozen, and
+                region-of-interest reading turns to its chip. The file's threshold where None
+                or where that is lower.
         """
         self.file, self.layout = file, file.layout
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
-        self.planner: Planner | None = None
-        self.touch_counts = file.layout.threshold_counts
-        """A taxel above this is being touched: the baseline is frozen, its chip is of interest."""
-        self.following = True
-        """The baseline follows drift."""
+        self.scheduler = ReadScheduler.of(file) if file.reading.region_of_interest else None
+        threshold = file.layout.threshold_counts
+        self.touch_counts = threshold if touch_counts is None else min(threshold, touch_counts)
+        self.oldest_s = self.period_s * (OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES)
+        """How old a taxel's value may be."""
         groups = buffers(file)
         self.readers = [
             BusReader(
@@ -125,19 +129,38 @@ class Skin:
         self._file_signal()
         self._last: Frame | None = None
         self._touched_at = self._followed_at = -math.inf
-        self._untold = 0
+        self._since_follow = 0
         self._states = [slot.state for slot in self._slots]
         self._workers = [_Worker(reader) for reader in self.readers[1:]]
         self._closed = False
 
     @classmethod
-    def open(cls, file: SkinFile) -> Skin:
-        """Open the file's buses and set their chips up.
+    def open(
+        cls,
+        file: SkinFile | str | os.PathLike[str],
+        *,
+        calibrated: bool = True,
+        touch_counts: int | None = None,
+    ) -> Skin:
+        """Open the buses of a skin file and set their chips up.
+
+        Args:
+            file: the skin file or its path.
+            calibrated: refuse a file without calibration, whose counts would mean nothing.
+            touch_counts: as for `Skin`.
 
         Raises:
+            InputError: the file cannot be used, or has no calibration.
             BusError: a bus is missing or may not be opened; the sentence names it.
             EdgeError: no chip answers at all.
         """
+        if not isinstance(file, SkinFile):
+            file = load(file)
+        if calibrated and file.calibration is None:
+            raise InputError(
+                f"{file.path}: has no calibration; run "
+                f"`edge-classify calibrate --skin {file.path}` with nothing touching"
+            )
         buses: list[Bus] = []
         try:
             for spec in file.buses:
@@ -146,7 +169,7 @@ class Skin:
             for bus in buses:
                 bus.close()
             raise
-        skin = cls(file, buses)
+        skin = cls(file, buses, touch_counts=touch_counts)
         try:
             skin.start()
         except BaseException:
@@ -212,7 +235,7 @@ class Skin:
             The chips that are down.
 
         Raises:
-            EdgeError: every chip is down.
+            EdgeError: no chip answers.
         """
         for reader in self.readers:
             reader.start()
@@ -227,7 +250,7 @@ class Skin:
         return [
             ChipStatus(
                 bus=reader.bus.name,
-                place=slot.spec.place,
+                route=slot.spec.route,
                 kind=slot.spec.kind,
                 taxels=slot.spec.taxels,
                 state=slot.state.value,
@@ -251,7 +274,7 @@ class Skin:
         return changed
 
     def read(self) -> Frame:
-        """One frame: the chips that the planner names, the others as they were last read.
+        """One frame; with region-of-interest reading, some chips are as they were last read.
 
         Returns:
             A frame whose `times` say when each taxel was read; a taxel that could not be read,
@@ -274,8 +297,8 @@ class Skin:
 
     def _transfer(self, t: float) -> None:
         jobs = self._every
-        if self.planner is not None:
-            chosen = self.planner.plan(self._last, self.touch_counts)
+        if self.scheduler is not None:
+            chosen = self.scheduler.plan(self._last, self.touch_counts)
             jobs = [
                 [reader.slots[i] for i in indices]
                 for reader, indices in zip(self.readers, chosen, strict=True)
@@ -325,11 +348,6 @@ class Skin:
         )
         return self._last
 
-    @property
-    def oldest_s(self) -> float:
-        """How old a taxel's value may be: with region-of-interest reading many frames."""
-        return (2.0 if self.planner is None else 25.0) * self.period_s
-
     def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
         """Judge chips by what they serve: damaged words, or bytes that never change."""
         for group in self._groups:
@@ -357,14 +375,14 @@ class Skin:
         t: float,
     ) -> None:
         """Let the baseline follow drift, unless something touches or has just touched."""
-        if self.file.calibration is None or not self.following:
+        if self.file.calibration is None:
             return
         if int(counts.max()) > self.touch_counts:
             self._touched_at = t
-        self._untold += 1
-        if self._untold < FOLLOW_FRAMES:
+        self._since_follow += 1
+        if self._since_follow < FOLLOW_FRAMES:
             return
-        self._untold = 0
+        self._since_follow = 0
         if t - self._touched_at >= self.file.signal.settle_s:
             self.baseline.follow(values, valid & (times >= self._followed_at))
         self._followed_at = t

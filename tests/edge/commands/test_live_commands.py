@@ -228,7 +228,7 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         (["--skin", "no.toml"], "no.toml: cannot be read"),
         (["--fake", "REC", "--joints", "tcp:5"], "--joints: give stdin or udp:[HOST:]PORT"),
         (["--fake", "REC", "--joints", "udp:x"], "joints udp:x: give udp:PORT"),
-        (["--fake", "REC", "--skin", "PAD"], "16 x 24 taxels, the skin 'mpr121 pad' 8 x 12"),
+        (["--fake", "REC", "--skin", "PAD"], "this skin has rows 8, the model was made for 16"),
     ],
 )
 def test_a_bad_option_is_one_sentence(edge, exported, recordings, arguments, said):

@@ -38,7 +38,7 @@ def python(library, code, *arguments, **environment):
 WHOLE_SKIN = """
     from edge.skin import file as skinfile
     from edge.skin.skin import Skin
-    with Skin.open(skinfile.load(skinfile.shipped("cody"))) as skin:
+    with Skin.open(skinfile.load(skinfile.shipped("cody")), calibrated=False) as skin:
         for _ in range(5):
             frame = skin.read()
         raw, valid = skin.raw()

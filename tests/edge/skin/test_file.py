@@ -8,7 +8,7 @@ import pytest
 from edge.errors import InputError
 from edge.skin import file as skinfile
 from edge.skin.calibration import calibration_text, dead_band, save_calibration, with_calibration
-from edge.skin.file import Calibration, Reading
+from edge.skin.file import Reading, TaxelCalibration
 
 SMALL = """
 [skin]
@@ -112,7 +112,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 def calibration(seed=0, taken=None):
     draw = np.random.default_rng(seed)
-    return Calibration(
+    return TaxelCalibration(
         draw.integers(0, 65536, (4, 6)).astype(np.uint16),
         np.round(draw.random((4, 6)) * 9, 3),
         taken,

@@ -1,24 +1,26 @@
 """Reading only what matters: what is chosen, and how far it is from reading everything."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.read_scheduler import compare, one_bus
-from edge.fake.player import fake_skin, still
+from edge.fake.player import fake_skin
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
-from edge.skin.read_scheduler import Planner, spread_by
+from edge.skin.read_scheduler import ReadScheduler, spread_by
 from edge.touch.frame import Frame
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 ONE = one_bus(CODY)
+SCHEDULED = replace(ONE, reading=replace(ONE.reading, region_of_interest=True))
 
 
 @pytest.fixture
-def planner():
-    with still(ONE) as skin:
-        return Planner.of(skin)
+def scheduler():
+    return ReadScheduler.of(ONE)
 
 
 def touched(*places):
@@ -33,57 +35,54 @@ def chips_at(*places):
     return {i for i, chip in enumerate(ONE.chips) if wanted & set(chip.taxels)}
 
 
-def test_one_400_khz_bus_carries_13_chips_at_100_hz(planner):
-    counts = [len(planner.plan(None)[0]) for _ in range(50)]
+def test_one_400_khz_bus_carries_13_chips_at_100_hz(scheduler):
+    counts = [len(scheduler.plan(None)[0]) for _ in range(50)]
     assert set(counts) == {13}
 
 
-def test_while_nothing_touches_every_chip_comes_in_turn(planner):
-    read = [set(planner.plan(touched(), 200)[0]) for _ in range(9)]
+def test_while_nothing_touches_every_chip_comes_in_turn(scheduler):
+    read = [set(scheduler.plan(touched(), 200)[0]) for _ in range(9)]
     for k in range(6):
         assert set.union(*read[k : k + 3]) == set(range(32))
 
 
-def test_chips_near_a_contact_are_read_in_every_frame(planner):
+def test_chips_near_a_contact_are_read_in_every_frame(scheduler):
     # Row 3 is the last of its chip: the next chip, one taxel away, belongs to the neighbourhood.
     frame = touched((3, 4))
     near = chips_at((3, 4), (4, 4))
     assert len(near) == 2
     for _ in range(20):
-        assert near <= set(planner.plan(frame, 200)[0])
+        assert near <= set(scheduler.plan(frame, 200)[0])
 
 
-def test_the_neighbourhood_reaches_across_the_seam(planner):
+def test_the_neighbourhood_reaches_across_the_seam(scheduler):
     near = chips_at((8, 23), (8, 0))
     assert len(near) == 2
     for _ in range(5):
-        assert near <= set(planner.plan(touched((8, 0)), 200)[0])
+        assert near <= set(scheduler.plan(touched((8, 0)), 200)[0])
 
 
-def test_away_from_the_contact_no_chip_is_forgotten(planner):
+def test_away_from_the_contact_no_chip_is_forgotten(scheduler):
     frame = touched(*[(row, col) for row in range(4, 8) for col in range(6, 12)])
     last = np.zeros(32, dtype=int)
     oldest = 0
     for tick in range(1, 200):
-        last[planner.plan(frame, 200)[0]] = tick
+        last[scheduler.plan(frame, 200)[0]] = tick
         oldest = max(oldest, int((tick - last).max()))
     assert oldest <= 20
 
 
-def test_a_contact_larger_than_the_wire_is_read_in_turn(planner):
+def test_a_contact_larger_than_the_wire_is_read_in_turn(scheduler):
     frame = Frame(t=0.0, counts=np.full((16, 24), 3000, dtype=np.uint16))
-    read = [set(planner.plan(frame, 200)[0]) for _ in range(6)]
+    read = [set(scheduler.plan(frame, 200)[0]) for _ in range(6)]
     assert set.union(*read[:3]) == set(range(32))
     assert all(len(chips) >= 12 for chips in read)
 
 
 def test_a_wire_too_slow_for_one_chip_still_reads_one():
-    from dataclasses import replace
-
     slow = replace(ONE, buses=(replace(ONE.buses[0], clock_hz=10_000),))
-    with still(slow) as skin:
-        planner = Planner.of(skin)
-    seen = [planner.plan(None)[0] for _ in range(32)]
+    scheduler = ReadScheduler.of(slow)
+    seen = [scheduler.plan(None)[0] for _ in range(32)]
     assert sorted(i for chips in seen for i in chips) == list(range(32))
 
 
@@ -94,8 +93,7 @@ def test_every_plan_fits_the_period():
     for patch in patches:
         row, col = draw.integers(0, 12), draw.integers(0, 24)
         patch[row : row + 4, [(col + i) % 24 for i in range(5)]] = 2000
-    with fake_skin(ONE, lambda t: patches[int(t * 20) % 40], timed=True) as skin:
-        skin.planner = Planner.of(skin)
+    with fake_skin(SCHEDULED, lambda t: patches[int(t * 20) % 40], timed=True) as skin:
         start = skin.clock.now()
         worst = 0.0
         for k in range(200):
@@ -109,8 +107,7 @@ def test_every_plan_fits_the_period():
 def test_a_taxel_keeps_its_value_and_its_own_time_until_it_is_read_again():
     flat = np.full((16, 24), 700, dtype=np.uint16)
     quiet = np.zeros((16, 24), dtype=np.uint16)
-    with fake_skin(ONE, lambda t: flat if t < 0.05 else quiet, timed=True) as skin:
-        skin.planner = Planner.of(skin)
+    with fake_skin(SCHEDULED, lambda t: flat if t < 0.05 else quiet, timed=True) as skin:
         start = skin.clock.now()
         for k in range(12):
             skin.clock.sleep_until(start + k * 0.01)
