@@ -1,0 +1,89 @@
+"""What every chip does alike: it is identified, set up, checked and read."""
+
+import numpy as np
+import pytest
+
+from edge.fake.bus import FakeBus
+from edge.fake.chips import FakeAD7147, FakeBlock, FakeMPR121
+from edge.i2c import ad7147, mpr121
+from edge.i2c.ad7147 import AD7147
+from edge.i2c.block import Block
+from edge.i2c.bus import BusNack
+from edge.i2c.chip import WrongChip, start
+from edge.i2c.mpr121 import MPR121
+from tests.edge.i2c.chips import CHIPS, VALUES, parsed, sense
+
+
+@pytest.fixture(params=CHIPS, ids=CHIPS)
+def pair(request):
+    driver, model, address, options, model_options = CHIPS[request.param]
+    bus = FakeBus(chips={address: model(sense, **model_options)})
+    return bus, bus.chips[address], driver(bus, address, **options)
+
+
+def test_a_chip_serves_its_values_once_it_is_set_up(pair):
+    _, _, chip = pair
+    start(chip)
+    values, whole = parsed(chip)
+    np.testing.assert_array_equal(values, VALUES)
+    assert whole.all()
+    assert chip.healthy()
+
+
+def test_a_chip_that_lost_its_settings_is_found_out_and_set_up_again(pair):
+    _, model, chip = pair
+    start(chip)
+    model.reset()
+    if chip.kind == "block":
+        return  # it comes up by itself
+    assert not chip.healthy()
+    values, whole = parsed(chip)
+    assert (values == 0).all()
+    assert not whole.any()
+    start(chip)
+    assert chip.healthy()
+    np.testing.assert_array_equal(parsed(chip)[0], VALUES)
+
+
+def test_a_constructor_checks_that_its_chip_is_there(pair):
+    bus, _, chip = pair
+    driver, _, _, options, _ = next(c for c in CHIPS.values() if c[0] is type(chip))
+    with pytest.raises(BusNack):
+        driver(bus, 0x08, **options)
+
+
+@pytest.mark.parametrize(
+    ("driver", "model", "options"),
+    [
+        (AD7147, FakeMPR121(sense), {}),
+        (AD7147, FakeBlock(sense, taxels=12), {}),
+        (MPR121, FakeAD7147(sense), {}),
+        (Block, FakeMPR121(sense), {"taxels": 12}),
+        (Block, FakeBlock(sense, taxels=24), {"taxels": 12}),
+        (Block, FakeBlock(sense, taxels=12, bits=8), {"taxels": 12, "bits": 16}),
+    ],
+)
+def test_a_constructor_refuses_another_chip(driver, model, options):
+    with pytest.raises(WrongChip, match=r"fake, address 0x2c: .*(not|serves)"):
+        driver(FakeBus(chips={0x2C: model}), 0x2C, **options)
+
+
+@pytest.mark.parametrize("name", ["ad7147", "mpr121"])
+def test_every_register_that_does_not_keep_its_value_is_found_by_reading_back(name):
+    driver, model_class, address, _, _ = CHIPS[name]
+    wide = 2 if name == "ad7147" else 1
+    table = ad7147.settings_table() if name == "ad7147" else mpr121.SETTINGS
+    for register, values in table:
+        if not any(values):
+            continue  # losing a zero changes nothing
+        model = model_class(sense)
+        keep = model.write
+
+        def forgetful(data, t, register=register, keep=keep, wide=wide):
+            first = int.from_bytes(data[:wide], "big")
+            keep(data[:wide] if first == register and len(data) > wide else data, t)
+
+        model.write = forgetful
+        chip = driver(FakeBus(chips={address: model}), address)
+        with pytest.raises(WrongChip, match=f"register {register:#04x}"):
+            start(chip)

@@ -1,0 +1,43 @@
+"""The MPR121: stopped, written and started; its words and its bits on the wire."""
+
+import numpy as np
+
+from edge.fake.bus import FakeBus
+from edge.fake.chips import FakeMPR121
+from edge.i2c import mpr121
+from edge.i2c.bus import fetch, send, wire_bits
+from edge.i2c.chip import start
+from edge.i2c.mpr121 import MPR121
+from tests.edge.i2c.chips import sense
+
+
+def test_is_stopped_written_and_started_once():
+    sent = []
+    bus = FakeBus(chips={0x5A: FakeMPR121(sense)})
+    chip = MPR121(bus, 0x5A)
+    model_write = bus.chips[0x5A].write
+    bus.chips[0x5A].write = lambda data, t: (sent.append(data), model_write(data, t))
+    start(chip)
+    ecr = [d for d in sent if len(d) == 2 and d[0] == mpr121.ECR]
+    assert ecr == [b"\x5e\x00", b"\x5e\x8f"]
+    assert sent[0] == b"\x80\x63"
+
+
+def test_model_loses_writes_while_it_runs():
+    bus = FakeBus(chips={0x5A: FakeMPR121(sense)})
+    start(MPR121(bus, 0x5A))
+    send(bus, 0x5A, [mpr121.CONFIG2, 0x77])
+    assert fetch(bus, 0x5A, bytes([mpr121.CONFIG2]), 1) == b"\x20"
+
+
+def test_parses_low_byte_first_and_tells_a_damaged_word():
+    data = np.zeros((1, 24), dtype=np.uint8)
+    data[0, :6] = 0x34, 0x02, 0x34, 0x06, 0xFF, 0x03
+    values, whole = mpr121.parse(data)
+    assert values[0, :3].tolist() == [0x234, 0x634, 0x3FF]
+    assert whole[0].tolist() == [True, False, True] + [False] * 9
+
+
+def test_frame_is_246_bits():
+    chip = MPR121(FakeBus(chips={0x5A: FakeMPR121(sense)}), 0x5A)
+    assert wire_bits(chip.frame.messages) == 246
