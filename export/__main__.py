@@ -21,7 +21,7 @@ from edge.touch import measures
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from export import golden
 from export.graph import to_onnx
-from train import operating_points as pick
+from train import operating_points
 from train.conformal import FEWEST, FOLDS, SequentialClassifier
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
@@ -146,17 +146,17 @@ def _take_front(arguments: argparse.Namespace) -> None:
     """Set what a point of the front says, where the options do not."""
     path = arguments.fronts or FRONTS
     if arguments.fronts is None and not path.exists():
-        path = pick.SHIPPED
-    task, deals = pick.read(path)
-    deal = pick.pick(deals, arguments.front)
-    arguments.window, arguments.features = deal.window_s, list(deal.features)
+        path = operating_points.SHIPPED
+    front = operating_points.ParetoFront.read(path)
+    point = front.pick(arguments.front)
+    arguments.window, arguments.features = point.window_s, list(point.features)
     print(
-        f"{path}: {arguments.front} is {deal.window_s:g} s of {' '.join(deal.features)}, scaling "
-        f"{deal.scaling}: {task} {deal.accuracy:.1%} in {deal.milliseconds:.0f} ms there",
+        f"{path}: {arguments.front} is {point.window_s:g} s of {' '.join(point.features)}, scaling "
+        f"{point.scaling}: {front.task} {point.accuracy:.1%} in {point.milliseconds:.0f} ms there",
         file=sys.stderr,
     )
     if arguments.scaling is None:
-        arguments.scaling = deal.scaling
+        arguments.scaling = point.scaling
 
 
 def _check_fixed(arguments: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""A recording as a picture: frames, the region found on them, the three features, the arm."""
+"""Draw a recording: its frames with the region found, the three features, and the arm."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def draw(
     scene: bool = False,
     threshold: int | None = None,
 ) -> None:
-    """Draw a recording into a PNG.
+    """Draw a recording and save the picture as PNG.
 
     Args:
         where: names the recording in errors.
         scene: add the arm and the contact's path, seen from the side.
-        threshold: counts above which a taxel is in contact, in place of the skin's.
+        threshold: counts above which a taxel is in contact; the recording's own where None.
 
     Raises:
         InputError: the sketch is asked for and the arm is not known, or `out` cannot be written.
@@ -134,7 +134,7 @@ def _feature(axis: Any, series: FeatureSeries | None, name: str, unit: str) -> N
 
 
 def _links(chain: Chain, q: Any) -> np.ndarray:
-    """(links, 3) places of the chain's joints and its tip, metres."""
+    """(links, 3) positions of the chain's joints and its tip, in metres."""
     points = []
     moving = 0
     for i in range(len(chain.joints)):
@@ -156,23 +156,23 @@ def _side(
     joints = recording.joints
     assert joints is not None
     simulated = recording.meta.get("simulation")
-    told = simulated if isinstance(simulated, dict) else {}
-    width, radius, mass = (_size(told, key) for key in ("width_m", "radius_m", "mass_kg"))
+    drawn = simulated if isinstance(simulated, dict) else {}
+    width, radius, mass = (_size(drawn, key) for key in ("width_m", "radius_m", "mass_kg"))
     for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
         k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
         points = _links(chain, joints[k])
         axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
         found = _contact(recording, chain, layout, k)
         if found is not None:
-            place, outward = found
-            axis.plot(place[0], place[2], "*", color=style, markersize=13)
+            position, outward = found
+            axis.plot(position[0], position[2], "*", color=style, markersize=13)
             if width is not None:
-                outline = _outline(place, outward, width, radius)
+                outline = _outline(position, outward, width, radius)
                 axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
-    if told:
-        effects = told.get("effects")
+    if drawn:
+        effects = drawn.get("effects")
         names = ", ".join(map(str, effects)) if isinstance(effects, list) else ""
-        what = str(told.get("family", "")) + (f", {mass:.2g} kg" if mass is not None else "")
+        what = str(drawn.get("family", "")) + (f", {mass:.2g} kg" if mass is not None else "")
         axis.set_title(f"seen from the side: {what}\n{names}", fontsize=9)
     else:
         axis.set_title("seen from the side", fontsize=9)
@@ -183,7 +183,7 @@ def _side(
 
 
 def _size(simulated: dict[str, Any], key: str) -> float | None:
-    """A size that the simulation was drawn with, where the recording tells one that makes sense."""
+    """A size that the simulator drew, where the recording holds a plausible one; else None."""
     values = simulated.get("values")
     size = values.get(key) if isinstance(values, dict) else None
     if isinstance(size, bool) or not isinstance(size, int | float):
@@ -192,10 +192,10 @@ def _size(simulated: dict[str, Any], key: str) -> float | None:
 
 
 DEPTH_M = 0.08
-"""How much of an object is sketched behind its face."""
+"""Depth of the object that is sketched behind its face."""
 
 
-def _outline(place: Any, outward: Any, width_m: float, radius_m: float | None) -> np.ndarray:
+def _outline(position: Any, outward: Any, width_m: float, radius_m: float | None) -> np.ndarray:
     """(points, 2) x and z of the object's face, with what is behind it."""
     normal = np.array([outward[0], outward[2]])
     normal /= np.linalg.norm(normal) or 1.0
@@ -204,7 +204,7 @@ def _outline(place: Any, outward: Any, width_m: float, radius_m: float | None) -
     s = np.linspace(-width_m / 2, width_m / 2, 33)
     back = 0.0 * s if radius > 1e3 else radius - np.sqrt(radius**2 - s**2)
     depth = max(float(back.max()), DEPTH_M)
-    centre = np.array([place[0], place[2]])
+    centre = np.array([position[0], position[2]])
     face = centre + s[:, None] * along + back[:, None] * normal
     ends = centre + np.array([s[-1], s[0]])[:, None] * along + depth * normal
     return np.vstack([face, ends])
@@ -213,14 +213,14 @@ def _outline(place: Any, outward: Any, width_m: float, radius_m: float | None) -
 def _contact(
     recording: Recording, chain: Chain, layout: SkinLayout, k: int
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """World place of the region's centroid on frame k, and the way out of the skin there."""
+    """World position of the region's centroid in frame k, and the outward normal there."""
     region = largest_region(recording.frames[k], layout.threshold_counts, wraps=layout.wraps)
     if region is None or recording.joints is None:
         return None
     pose = chain.pose(recording.joints[k])
-    place = layout.position(*region.centroid)
-    out = place * [1.0, 1.0, 0.0]
-    return pose[:3, :3] @ place + pose[:3, 3], pose[:3, :3] @ out
+    position = layout.position(*region.centroid)
+    out = position * [1.0, 1.0, 0.0]
+    return pose[:3, :3] @ position + pose[:3, 3], pose[:3, :3] @ out
 
 
 def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:

@@ -21,10 +21,10 @@ UNKNOWN = "not told"
 
 
 def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> None:
-    """Two views of the contacts, a colour and a marker a label; faint where votes were divided.
+    """Two views of the contacts, a colour and marker a label; fainter where votes were divided.
 
     Raises:
-        InputError: there is nothing on the map, or no such task.
+        InputError: the map is empty, or has no such task.
     """
     if not found.touches:
         raise InputError(f"{where}: no contact is on this map yet")
@@ -34,14 +34,14 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
         raise InputError(f"{where}: has no task {chosen!r}; it has {', '.join(tasks)}")
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in found.touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in found.touches])
-    places = np.array([touch.place for touch in found.touches])
+    positions = np.array([touch.place for touch in found.touches])
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
         for i, label in enumerate(sorted(set(labels))):
             those = np.array([seen == label for seen in labels])
             axis.scatter(
-                places[those, across],
-                places[those, up],
+                positions[those, across],
+                positions[those, up],
                 s=90,
                 marker=MARKERS[i % len(MARKERS)],
                 color="0.6" if label == UNKNOWN else f"C{i % 10}",

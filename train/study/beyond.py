@@ -16,8 +16,9 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from edge.touch.measures import feature, names
 from edge.touch.track import Tracker, for_device
 from train.pipeline import scale_of
-from train.report.tables import SCORE, Context, Figure, Section, Table, percent, score
-from train.study import plots
+from train.report import figures
+from train.report.tables import SCORE, Figure, Section, Table, percent, score
+from train.study.context import Context
 from train.study.honest import FOLDS, nested
 from train.study.score import Labels, Result, collect, evaluate, nested_fold, shuffled_folds
 from train.study.skins import View, vectors
@@ -164,7 +165,7 @@ def section(context: Context) -> Section:
         for row in sets
         if row[3].startswith("nested") and not row[0].startswith("best path")
     ]
-    png = plots.scatter(
+    png = figures.scatter(
         points,
         x="cost",
         title=f"{task}: nested accuracy against cost",

@@ -6,8 +6,9 @@ from itertools import combinations
 
 from edge.touch.features import FEATURES
 from train.pipeline import SCALINGS
-from train.report.tables import SCORE, Context, Figure, Section, Table, percent, score
-from train.study import plots
+from train.report import figures
+from train.report.tables import SCORE, Figure, Section, Table, percent, score
+from train.study.context import Context
 from train.study.paper import entries
 from train.study.score import Result, evaluate
 
@@ -43,7 +44,7 @@ def confusion(context: Context) -> Section:
         assert result.said is not None
         low, high = result.interval
         title = f"{task}: {result.accuracy:.2%} ({low:.1%} to {high:.1%})"
-        png = plots.confusion(truth, result.said, title)
+        png = figures.confusion(truth, result.said, title)
         section.figures.append(Figure(f"confusion_{task}", f"Confusion, {task}", png))
         pairs: dict[tuple[str, str], int] = {}
         for was, said in zip(truth.tolist(), result.said.tolist(), strict=True):
@@ -65,7 +66,7 @@ def window(context: Context) -> Section:
     for seconds, results in zip(windows, found, strict=True):
         table.rows += [(seconds, task, *score(r)) for task, r in results.items()]
     by_task = {task: [results[task] for results in found] for task in context.labels}
-    png = plots.lines(
+    png = figures.lines(
         windows,
         by_task,
         label="window from onset, s",
@@ -102,7 +103,7 @@ def scaling(context: Context) -> Section:
             table.rows.append((method, task, *score(r), theirs))
             context.ours["II", method, task] = percent(r.accuracy)
     tasks = context.labels
-    png = plots.bars(
+    png = figures.bars(
         SCALINGS,
         {task: [results[task] for results in found] for task in tasks},
         title="Effect of feature scaling (Table II)",
@@ -148,7 +149,7 @@ def features(context: Context) -> Section:
         }
         for task in context.labels
     }
-    png = plots.bars(
+    png = figures.bars(
         short_names,
         by_task,
         title="Effect of the features (Table III)",

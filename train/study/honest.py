@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from edge.recording import Recording
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
-from train.report.tables import SCORE, Context, Figure, Section, Table, score
-from train.study import plots
+from train.report import figures
+from train.report.tables import SCORE, Figure, Section, Table, score
+from train.study.context import Context
 from train.study.score import (
     Labels,
     Result,
@@ -96,7 +97,7 @@ def section(context: Context) -> Section:
         )
         + "."
     ]
-    figures = []
+    pictures = []
     others = [t for t in y if t != GROUP_TASK]
     unseen = bars.get("objects not met before")
     if unseen is not None:
@@ -110,12 +111,12 @@ def section(context: Context) -> Section:
             )
             + "."
         )
-    png = plots.bars(
+    png = figures.bars(
         list(bars),
         {task: [bars[how].get(task) for how in bars] for task in y},
         title="How the score is taken",
     )
-    figures.append(Figure("honest", "How the score is taken", png))
+    pictures.append(Figure("honest", "How the score is taken", png))
     tables = [table, *_thresholds(context, plain)]
     text += [
         "Thresholds: the paper set one by hand for each object, which a robot cannot do before it "
@@ -128,7 +129,7 @@ def section(context: Context) -> Section:
             "smaller one is lost. It matters only to a contact that lies there, so the skin is "
             "also turned until its seam lies under the middle of the contacts."
         )
-    return Section("What the paper did not ask", text, tables, figures)
+    return Section("What the paper did not ask", text, tables, pictures)
 
 
 def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:

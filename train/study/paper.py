@@ -10,7 +10,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from edge.commands.summary import wilson
-from train.report.tables import Context, Section, Table, percent
+from train.report.tables import Section, Table, percent
+from train.study.context import Context
 
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140

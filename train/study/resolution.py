@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 
 from edge.touch.layout import SkinLayout
-from train.report.tables import SCORE, Context, Figure, Section, Table, percent, score
-from train.study import plots
+from train.report import figures
+from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.classify import papers
+from train.study.context import Context
 from train.study.score import evaluate
 from train.study.skins import View, masked, pooled_down, pooled_layout, thinned, vectors
 
@@ -78,7 +79,7 @@ def section(context: Context) -> Section:
     for share, found in zip(SHARES, fewer, strict=True):
         read = int((thinned(layout.shape, share) & layout.alive).sum())
         chips.rows += [(f"1/{share}", read, task, *score(r)) for task, r in found.items()]
-    figures = []
+    pictures = []
     for how, found in by_how.items():
         by_task = {task: [r[task] for r in found] for task in context.labels}
         theirs: dict[str, list[tuple[float, float]]] = {
@@ -86,7 +87,7 @@ def section(context: Context) -> Section:
             for task in by_task
             if papers("I", task) and context.scene
         }
-        png = plots.lines(
+        png = figures.lines(
             taxels,
             by_task,
             label="taxels",
@@ -95,8 +96,8 @@ def section(context: Context) -> Section:
             logarithmic=True,
             ticks=[str(n) for n in taxels],
         )
-        figures.append(Figure(f"resolution_{how}", f"Resolution, {how}", png))
-    png = plots.lines(
+        pictures.append(Figure(f"resolution_{how}", f"Resolution, {how}", png))
+    png = figures.lines(
         SHARES,
         {task: [r[task] for r in fewer] for task in context.labels},
         label="chips of which one is read",
@@ -104,7 +105,7 @@ def section(context: Context) -> Section:
         logarithmic=True,
         ticks=[str(s) for s in SHARES],
     )
-    figures.append(Figure("chips", "Fewer chips", png))
+    pictures.append(Figure("chips", "Fewer chips", png))
     return Section(
         "Effect of taxel resolution (Table I, Fig. 9)",
         [
@@ -117,5 +118,5 @@ def section(context: Context) -> Section:
             "this saves time on the wire, which larger taxels would too.",
         ],
         [table, chips],
-        figures,
+        pictures,
     )

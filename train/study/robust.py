@@ -11,13 +11,14 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries, TrackSettings
-from train.report.tables import SCORE, Context, Figure, Section, Table, score
+from train.report import figures
+from train.report.tables import SCORE, Figure, Section, Table, score
 from train.simulate.engine import Trial, kind_of, read_out, shoot
 from train.simulate.plan import make_plan
 from train.simulate.run import parts, recordings
 from train.simulate.scene_model import Scene
 from train.simulate.schema import EFFECTS
-from train.study import plots
+from train.study.context import Context
 from train.study.score import evaluate, transfer
 from train.study.skins import Remembering, follow, vectors
 
@@ -172,9 +173,9 @@ def section(context: Context) -> Section | None:
         )
         for how, results in zip(hows, sets, strict=True):
             table.rows += [(name, task, how, *score(r), lost) for task, r in results.items()]
-    figures = []
+    pictures = []
     for task in y:
-        png = plots.bars(
+        png = figures.bars(
             list(others),
             {
                 "with the change, leave-one-out": [r[task] for r in own],
@@ -183,7 +184,7 @@ def section(context: Context) -> Section | None:
             title=f"{task}: what a change costs",
             reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
         )
-        figures.append(Figure(f"robustness_{task}", f"Robustness, {task}", png))
+        pictures.append(Figure(f"robustness_{task}", f"Robustness, {task}", png))
     return Section(
         "Another speed, another arm, each effect of the sensor",
         [
@@ -196,5 +197,5 @@ def section(context: Context) -> Section | None:
             "without the change is never in its training set: it would tell it by itself.",
         ],
         [table],
-        figures,
+        pictures,
     )

@@ -14,9 +14,10 @@ import joblib
 from edge.errors import InputError
 from train.dataset import load_trials
 from train.report import html as report
-from train.report.tables import Context, Section
+from train.report.tables import Section
 from train.simulate import scene as scenes
 from train.study import beyond, classify, honest, paper, resolution, robust
+from train.study.context import Context
 
 SECTIONS: tuple[Callable[[Context], Section], ...] = (
     classify.confusion,

@@ -1,4 +1,4 @@
-"""Nested accuracies of many settings, and the deals among them."""
+"""Nested accuracies of many settings, and the Pareto front among them."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def nested(
     with threadpool_limits(1):
         for fold in range(int(folds.max()) + 1):
             train, test = everything[folds != fold], everything[folds == fold]
-            for task, one in told(X, classes, train, test, scaling, features).items():
+            for task, one in evaluate_split(X, classes, train, test, scaling, features).items():
                 cells[task][one.choice.components, one.choice.k] += len(test)
                 right[task] += int(one.right.sum())
     found = {}
@@ -72,27 +72,27 @@ def nested(
 
 
 @dataclass(frozen=True)
-class Told:
-    """What one split of the trials gives of a task.
+class SplitResult:
+    """The outcome of one split into training and test trials, for one task.
 
     Attributes:
         choice: the cell of the highest leave-one-out accuracy among the training trials.
-        right: (test,) whether its vote told the trial.
+        right: (test,) whether the vote named the trial's label.
     """
 
     choice: Choice
     right: NDArray[np.bool_]
 
 
-def told(
+def evaluate_split(
     X: NDArray[np.float64],
     classes: Mapping[str, NDArray[np.int64]],
     train: NDArray[np.int64],
     test: NDArray[np.int64],
     scaling: str,
     features: Sequence[str],
-) -> dict[str, Told]:
-    """Choose each task's cell among the training trials, and tell the test trials with it.
+) -> dict[str, SplitResult]:
+    """Choose each task's cell on the training trials alone, and classify the test trials with it.
 
     Args:
         X: (n, p).
@@ -124,12 +124,12 @@ def told(
         grid = votes_right(np.array(among), here, here).mean(axis=1)
         c, j = best_cell(grid)
         right = votes_right(seen[c], here, labels[test])[:, j]
-        answers[task] = Told(Choice(scaling, COMPONENTS[c], j + 1), right)
+        answers[task] = SplitResult(Choice(scaling, COMPONENTS[c], j + 1), right)
     return answers
 
 
 def thinned(series: FeatureSeries, every: int) -> FeatureSeries:
-    """Every so-manieth frame of a series, as a slower wire would have brought them."""
+    """Every n-th frame of a series, as a slower wire would deliver them."""
     if every == 1:
         return series
     pick = slice(None, None, every)
@@ -147,7 +147,7 @@ def thinned(series: FeatureSeries, every: int) -> FeatureSeries:
 
 
 @dataclass(frozen=True)
-class Point:
+class MeasuredPoint:
     """One setting of one task, with what it costs and gives.
 
     Attributes:
@@ -183,9 +183,9 @@ class Point:
         return self.window_s + self.wire_s + self.arithmetic_s
 
 
-def front(points: Sequence[Point]) -> list[Point]:
-    """The points that no other beats in time and accuracy both, the fastest first."""
-    best: list[Point] = []
+def pareto_front(points: Sequence[MeasuredPoint]) -> list[MeasuredPoint]:
+    """The points that no other beats in both time and accuracy, the fastest first."""
+    best: list[MeasuredPoint] = []
     for point in sorted(points, key=lambda p: (p.seconds, -p.result.accuracy)):
         if not best or point.result.accuracy > best[-1].result.accuracy:
             best.append(point)

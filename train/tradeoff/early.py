@@ -13,7 +13,7 @@ from edge.model.prediction_set import NOVELTY_RATE, PredictionSet
 from train.conformal import FEWEST, SequentialClassifier
 from train.conformal import FOLDS as CALIBRATION_FOLDS
 from train.simulate.scene_model import Scene
-from train.tradeoff.accuracy import told
+from train.tradeoff.accuracy import evaluate_split
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 FOLDS = 5
@@ -43,7 +43,7 @@ class Early:
 
 
 @dataclass(frozen=True)
-class Beside:
+class StoppingComparison:
     """Early stopping and fixed windows on the same trials.
 
     Attributes:
@@ -63,13 +63,13 @@ class Beside:
     hindsight_s: float
 
 
-def beside(
+def compare_stopping(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
     decision_points_s: Sequence[float],
     features: Sequence[str],
     scaling: str = "IV",
-) -> Beside:
+) -> StoppingComparison:
     """Five folds are held out in turn; the others choose, train and calibrate.
 
     Args:
@@ -89,7 +89,7 @@ def beside(
     with threadpool_limits(1):
         for fold in range(FOLDS):
             train, test = np.flatnonzero(fold_of != fold), np.flatnonzero(fold_of == fold)
-            cells = [told(x, indices, train, test, scaling, features)["task"] for x in X]
+            cells = [evaluate_split(x, indices, train, test, scaling, features)["task"] for x in X]
             right[:, test] = [cell.right for cell in cells]
             model = SequentialClassifier(
                 {"task": cells[-1].choice}, decision_points_s, features
@@ -110,7 +110,7 @@ def beside(
     for error, rows in outcomes.items():
         table = np.array(rows, dtype=np.float64).mean(axis=0)
         early.append(Early(error, *table.tolist()))
-    return Beside(
+    return StoppingComparison(
         tuple(decision_points_s),
         1.0 - right.mean(axis=1),
         early,
@@ -127,7 +127,7 @@ def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> f
 
 
 @dataclass(frozen=True)
-class Strangers:
+class Novelty:
     """Contacts with things that were trained, and with things that were not.
 
     Attributes:
@@ -141,7 +141,7 @@ class Strangers:
     strange: tuple[int, int]
 
 
-def strangers(
+def novelty(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
     decision_points_s: Sequence[float],
@@ -149,11 +149,11 @@ def strangers(
     scaling: str = "IV",
     error: float = 0.2,
     rates: Sequence[float] = (NOVELTY_RATE, 0.1, 0.2),
-) -> list[Strangers]:
+) -> list[Novelty]:
     """A third of the labels is left out whole, in turn; a fifth of the others' trials is held out.
 
     Args:
-        X, labels, decision_points_s, features, scaling: as for `beside`.
+        X, labels, decision_points_s, features, scaling: as for `compare_stopping`.
         error: asked for.
         rates: of false alarms asked for.
 
@@ -170,7 +170,7 @@ def strangers(
             train = np.flatnonzero(~strange & ~held)
             if len(np.unique(labels[train])) < 2 or len(train) < FEWEST * CALIBRATION_FOLDS:
                 continue
-            cell = told(X[-1], indices, train, train[:0], scaling, features)["task"]
+            cell = evaluate_split(X[-1], indices, train, train[:0], scaling, features)["task"]
             model = SequentialClassifier({"task": cell.choice}, decision_points_s, features).fit(
                 X[:, train], {"task": labels[train]}
             )
@@ -185,7 +185,7 @@ def strangers(
                                 candidates.update(values[place])
                         counts[rate][row] += (1, candidates.unknown)
     return [
-        Strangers(rate, (int(k[0]), int(k[1])), (int(s[0]), int(s[1])))
+        Novelty(rate, (int(k[0]), int(k[1])), (int(s[0]), int(s[1])))
         for rate, (k, s) in counts.items()
         if k[0] and s[0]
     ]
@@ -215,7 +215,7 @@ def _decide(
     return truth not in survivors, wrong, settled and wrong, not settled, unknown, seconds
 
 
-def fixed_time(found: Beside, wrong: float) -> float | None:
+def fixed_time(found: StoppingComparison, wrong: float) -> float | None:
     """The shortest fixed window, interpolated, with at most so large a share wrong; or None."""
     least = np.minimum.accumulate(found.fixed)
     if wrong < least[-1]:
@@ -231,7 +231,7 @@ def fixed_time(found: Beside, wrong: float) -> float | None:
     )
 
 
-def saved(found: Beside, early: Early) -> float:
+def saved(found: StoppingComparison, early: Early) -> float:
     """Share of time saved against the shortest fixed window that is as accurate.
 
     Where none is, the full window stands in: it takes longer and is less accurate, so that the
@@ -241,7 +241,7 @@ def saved(found: Beside, early: Early) -> float:
     return 1.0 - early.mean_s / (found.decision_points_s[-1] if fixed is None else fixed)
 
 
-def at_full_accuracy(found: Beside) -> tuple[float, Early] | None:
+def at_full_accuracy(found: StoppingComparison) -> tuple[float, Early] | None:
     """The most time saved, against the full window, by an asked error no less accurate than it."""
     able = [one for one in found.early if one.wrong <= found.fixed[-1]]
     if not able:
@@ -250,7 +250,7 @@ def at_full_accuracy(found: Beside) -> tuple[float, Early] | None:
     return 1.0 - quickest.mean_s / found.decision_points_s[-1], quickest
 
 
-def floors(scene: Scene) -> dict[str, float]:
+def breakaway_times(scene: Scene) -> dict[str, float]:
     """{object: seconds} before which an object that can move does not: mu_s m g / (k v).
 
     What is narrow and high tips before it slides: where its base over twice the contact's height

@@ -9,17 +9,17 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from train.study.plots import COLOURS, STYLE, png
-from train.tradeoff.accuracy import Point
-from train.tradeoff.early import Beside, Early
+from train.report.figures import COLOURS, STYLE, png
+from train.tradeoff.accuracy import MeasuredPoint
+from train.tradeoff.early import Early, StoppingComparison
 
 
-def deals(
-    points: Sequence[Point],
-    best: Sequence[Point],
+def operating_points(
+    points: Sequence[MeasuredPoint],
+    best: Sequence[MeasuredPoint],
     task: str,
-    is_paper: Callable[[Point], bool],
-    floors: Mapping[str, float],
+    is_paper: Callable[[MeasuredPoint], bool],
+    breakaways: Mapping[str, float],
     board: str,
 ) -> bytes:
     """Accuracy against time; below, how the front's points and the paper's split theirs."""
@@ -50,7 +50,7 @@ def deals(
         ]
         top.errorbar(
             times, heights, yerr=spans, color="black", lw=1.2, elinewidth=0.7, capsize=2,
-            marker="o", ms=5, mfc="white", drawstyle="steps-post", label="best deals, 95 %",
+            marker="o", ms=5, mfc="white", drawstyle="steps-post", label="best settings, 95 %",
         )  # fmt: skip
         for point in paper:
             top.scatter(
@@ -58,10 +58,10 @@ def deals(
                 color="#e0a400", edgecolors="black", linewidths=0.7, zorder=5,
                 label="the paper's setting",
             )  # fmt: skip
-        if floors:
+        if breakaways:
             top.plot(
-                [1e3 * s for s in floors.values()], [0.022] * len(floors), "|", ms=11, mew=1.3,
-                color="#444444", transform=top.get_xaxis_transform(),
+                [1e3 * s for s in breakaways.values()], [0.022] * len(breakaways), "|", ms=11,
+                mew=1.3, color="#444444", transform=top.get_xaxis_transform(),
                 label="static friction breaks, an object each",
             )  # fmt: skip
         top.set_xlim(0, 1.04e3 * max(p.seconds for p in points))
@@ -95,7 +95,7 @@ def deals(
         bottom.grid(visible=False, axis="y")
         bottom.set_xlim(0, max(left.max() * 1.4, 100))
         bottom.set_xlabel(
-            f"milliseconds: waiting + wire + arithmetic of the best deals; arithmetic on {board}"
+            f"milliseconds: waiting + wire + arithmetic of the best settings; arithmetic on {board}"
         )
         bottom.legend(loc="lower right", fontsize=8)
         return png(figure)
@@ -105,9 +105,9 @@ def _taxels(count: int) -> str:
     return f"{count} taxel{'s' if count > 1 else ''}"
 
 
-def stopping(found: Beside, floors: Mapping[str, float], task: str) -> bytes:
+def stopping(found: StoppingComparison, breakaways: Mapping[str, float], task: str) -> bytes:
     """Share wrong against mean time: fixed windows and early stopping; below, the floor."""
-    slow = sorted(floors.items(), key=lambda item: -item[1])
+    slow = sorted(breakaways.items(), key=lambda item: -item[1])
     with mpl.rc_context(STYLE):
         below = 0.5 + 0.14 * len(slow) if slow else 0.0
         figure = Figure(figsize=(8.0, 4.4 + below), layout="constrained")

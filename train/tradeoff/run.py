@@ -23,17 +23,17 @@ from train.simulate import scene as scenes
 from train.study import skins
 from train.tradeoff import board as boards
 from train.tradeoff import early, prices, sections
-from train.tradeoff.accuracy import Point, front, nested, thinned
+from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front, thinned
 from train.tradeoff.wires import Wire, wires
 
 WINDOWS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-LOOKS = tuple(round(0.1 * i, 1) for i in range(2, 13))
+DECISION_POINTS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 FEWER = (("max_force",), ("max_force", "contact_area"))
 PAPER = ("none", 1.2)
 """The paper's operating point: no scaling, 1.2 s, its three features, all taxels (IV-A)."""
 FEWEST = 40
 Case = tuple[str, int, tuple[str, ...], str, float, int]
-"""Skin's name, taxels, features, scaling, window, every so-manieth frame."""
+"""Skin's name, taxels, features, scaling, window, and n where only every n-th frame arrives."""
 
 
 def tradeoff(
@@ -72,12 +72,12 @@ def tradeoff(
     if main not in dataset.tasks:
         raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
     points = measured(dataset, board, jobs)
-    best = {task: front([p for p in points if p.task == task]) for task in dataset.tasks}
+    best = {task: pareto_front([p for p in points if p.task == task]) for task in dataset.tasks}
     both, finest, strange = _early(dataset, jobs)
-    floors = {} if scene is None else early.floors(scene)
+    breakaways = {} if scene is None else early.breakaway_times(scene)
     parts = [
-        sections.deals(points, best, main, board, floors, is_paper),
-        sections.stopping(both, floors, main),
+        sections.operating_points(points, best, main, board, breakaways, is_paper),
+        sections.stopping(both, breakaways, main),
         *([sections.unknown(finest, strange)] if strange else []),
         *([] if sizes is None else [prices.section(sizes, dataset, main)]),
         sections.arithmetic(board),
@@ -97,7 +97,7 @@ def tradeoff(
     return report
 
 
-def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[Point]:
+def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[MeasuredPoint]:
     """Every setting worth showing, of every task."""
     recordings = [trial.recording for trial in dataset.trials]
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in recordings]))
@@ -126,7 +126,7 @@ def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[Point]:
     y = {task: dataset.labels(task) for task in dataset.tasks}
     work = (delayed(nested)(_vectors(series[case[0]], case), y, case[3], case[2]) for case in cases)
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
-    points: list[Point] = []
+    points: list[MeasuredPoint] = []
     for case, found in zip(cases, tqdm(results, total=len(cases), desc="settings"), strict=True):
         name, taxels, features, scaling, window, every = case
         for wire in wired[name]:
@@ -134,7 +134,7 @@ def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[Point]:
                 continue
             for task, result in found.items():
                 points.append(
-                    Point(
+                    MeasuredPoint(
                         task=task,
                         taxels=taxels,
                         wire=wire.name,
@@ -168,17 +168,17 @@ def _vectors(series: Sequence[FeatureSeries | None], case: Case) -> NDArray[np.f
 
 def _early(
     dataset: DataSet, jobs: int
-) -> tuple[dict[str, early.Beside], str, list[early.Strangers]]:
+) -> tuple[dict[str, early.StoppingComparison], str, list[early.Novelty]]:
     """Early stopping of every task; the finest task, and things left out whole in it."""
-    X = np.stack([dataset.features(window) for window in LOOKS])
+    X = np.stack([dataset.features(window) for window in DECISION_POINTS_S])
     y = {task: dataset.labels(task) for task in dataset.tasks}
     finest = max(y, key=lambda task: len(set(y[task])))
-    work = (delayed(early.beside)(X, y[task], LOOKS, FEATURES) for task in y)
+    work = (delayed(early.compare_stopping)(X, y[task], DECISION_POINTS_S, FEATURES) for task in y)
     found = dict(zip(y, Parallel(n_jobs=jobs)(work), strict=True))
-    return found, finest, early.strangers(X, y[finest], LOOKS, FEATURES)
+    return found, finest, early.novelty(X, y[finest], DECISION_POINTS_S, FEATURES)
 
 
-def is_paper(point: Point) -> bool:
+def is_paper(point: MeasuredPoint) -> bool:
     """The paper's setting, on the wire that carries its 100 frames a second."""
     return (
         point.whole
@@ -188,8 +188,8 @@ def is_paper(point: Point) -> bool:
     )
 
 
-def fronts(points: Sequence[Point], main: str, board: str) -> dict[str, Any]:
-    """front.json: the best deals on the recordings' own skin, which models are exported for."""
+def fronts(points: Sequence[MeasuredPoint], main: str, board: str) -> dict[str, Any]:
+    """front.json: the best settings on the recordings' own skin, which models are exported for."""
     return {
         "format": 1,
         "task": main,
@@ -205,6 +205,6 @@ def fronts(points: Sequence[Point], main: str, board: str) -> dict[str, Any]:
                 "milliseconds": round(1e3 * point.seconds, 2),
                 "accuracy": round(point.result.accuracy, 4),
             }
-            for point in front([p for p in points if p.task == main and p.whole])
+            for point in pareto_front([p for p in points if p.task == main and p.whole])
         ],
     }

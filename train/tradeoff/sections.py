@@ -6,17 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 
 from train.report.tables import Figure, Section, Table
 from train.tradeoff import early, plots
-from train.tradeoff.accuracy import Point
+from train.tradeoff.accuracy import MeasuredPoint
 from train.tradeoff.board import Board
 
 
-def deals(
-    points: Sequence[Point],
-    best: Mapping[str, list[Point]],
+def operating_points(
+    points: Sequence[MeasuredPoint],
+    best: Mapping[str, list[MeasuredPoint]],
     main: str,
     board: Board,
-    floors: Mapping[str, float],
-    is_paper: Callable[[Point], bool],
+    breakaways: Mapping[str, float],
+    is_paper: Callable[[MeasuredPoint], bool],
 ) -> Section:
     """Every point, and of each task those that no other beats.
 
@@ -25,13 +25,13 @@ def deals(
         best: {task: its front}.
         main: the task of the picture.
         board: whose arithmetic it is.
-        floors: {object: seconds} of static friction, for the picture.
+        breakaways: {object: seconds} of static friction, for the picture.
         is_paper: whether a point is the paper's.
     """
     arithmetic = max(p.arithmetic_s / p.seconds for p in points)
     wire = max(p.wire_s / p.seconds for p in points)
-    picture = plots.deals(
-        [p for p in points if p.task == main], best[main], main, is_paper, floors, board.name
+    picture = plots.operating_points(
+        [p for p in points if p.task == main], best[main], main, is_paper, breakaways, board.name
     )
     columns = (
         "task", "taxels", "wire", "features", "scaling", "components", "k",
@@ -39,7 +39,7 @@ def deals(
         "accuracy %", "low %", "high %", "front", "paper's point",
     )  # fmt: skip
     every = Table("points", "Every point", columns, [])
-    few = Table("front", "The best deals, and the paper's point", columns, [])
+    few = Table("front", "The best settings, and the paper's point", columns, [])
     for point in sorted(points, key=lambda p: (p.task != main, p.task, p.seconds)):
         low, high = point.result.interval
         row = (
@@ -64,9 +64,9 @@ def deals(
         if row[-1] or row[-2]:
             few.rows.append(row)
     return Section(
-        "Every setting, and the best deals",
+        "Every setting, and the best settings",
         [
-            "A best deal is a point than which no other is both as fast and as accurate. The best "
+            "A best setting is one that no other matches in both speed and accuracy. The best "
             "of many settings flatters: where intervals overlap, the cheaper one may be as good.",
             "A pooled skin's larger taxels carry the sum of their parts' forces; a wire that "
             "carries fewer frames a second than were recorded gets every second, third, ... of "
@@ -79,7 +79,9 @@ def deals(
     )
 
 
-def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main: str) -> Section:
+def stopping(
+    both: Mapping[str, early.StoppingComparison], breakaways: Mapping[str, float], main: str
+) -> Section:
     """Early stopping of every task beside its fixed windows."""
     table = Table(
         "early",
@@ -123,7 +125,7 @@ def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main
         "accurate, time saved is against the full one: at least so much.",
         *(_headline(task, found) for task, found in both.items()),
     ]
-    if floors:
+    if breakaways:
         text.append(
             "The floor, mu_s m g / (k v) at the middle of each object's friction and mass: before "
             "it, an object that can move stands still, and looks like one that cannot."
@@ -136,14 +138,14 @@ def stopping(both: Mapping[str, early.Beside], floors: Mapping[str, float], main
         Figure(
             f"early_{task}",
             f"Mean time to decision against error: {task}",
-            plots.stopping(found, floors, task),
+            plots.stopping(found, breakaways, task),
         )
         for task, found in sorted(both.items(), key=lambda item: item[0] != main)
     ]
     return Section("As soon as it is sure", text, [table, fixed], figures)
 
 
-def _headline(task: str, found: early.Beside) -> str:
+def _headline(task: str, found: early.StoppingComparison) -> str:
     full = found.decision_points_s[-1]
     most = max(found.early, key=lambda one: early.saved(found, one))
     parts = [
@@ -170,7 +172,7 @@ def _headline(task: str, found: early.Beside) -> str:
     return " ".join(parts)
 
 
-def unknown(task: str, found: Sequence[early.Strangers]) -> Section:
+def unknown(task: str, found: Sequence[early.Novelty]) -> Section:
     """How often contacts with known and with strange things are called unknown."""
     table = Table(
         "unknown",

@@ -33,7 +33,7 @@ class Wire:
     frame_s: float
 
     def every(self, rate_hz: float) -> int:
-        """Each so-manieth of frames that come at a rate is what this wire can carry."""
+        """Frames that arrive at a rate are carried by this wire one in so many (1: all of them)."""
         return max(1, math.ceil(self.frame_s * rate_hz - 1e-9))
 
 
@@ -45,7 +45,7 @@ def count(name: str, file: SkinFile) -> Wire:
 
 
 def spread(layout: SkinLayout, buses: int, clock_hz: int = 400_000) -> SkinFile:
-    """A skin on AD7147 chips, dealt out over so many buses with a TCA9548A each."""
+    """A skin on AD7147 chips, spread over that many buses, each with a TCA9548A."""
     taxels = layout.rows * layout.cols
     groups = [tuple(range(a, min(a + STAGES, taxels))) for a in range(0, taxels, STAGES)]
     specs = []

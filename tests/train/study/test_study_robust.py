@@ -8,10 +8,10 @@ import pytest
 
 from edge.errors import InputError
 from train.dataset import load_trials
-from train.report.tables import Context
 from train.simulate import scene as scenes
 from train.simulate.run import simulate, write
 from train.study import robust
+from train.study.context import Context
 from train.study.robust import UNCHANGED, anew, groups, variants
 from train.study.skins import follow, vectors
 

@@ -1,4 +1,4 @@
-"""What accuracy costs in time: wires, boards, nested accuracy, deals, and early stopping."""
+"""What accuracy costs in time: wires, boards, nested accuracy, points, and early stopping."""
 
 import csv
 import json
@@ -13,11 +13,11 @@ from edge.skin import file as skinfile
 from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries
 from export.__main__ import main as export
-from train import operating_points as pick
 from train.__main__ import main as train
+from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.study.score import Result
 from train.tradeoff import accuracy, board, early
-from train.tradeoff.accuracy import Point, front, nearest, nested, thinned
+from train.tradeoff.accuracy import MeasuredPoint, nearest, nested, pareto_front, thinned
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
 
@@ -57,7 +57,7 @@ def series(n):
     return FeatureSeries(t, counts, counts, np.stack([counts, counts], axis=1), t * 0.1)
 
 
-def test_a_slower_wire_brings_every_so_manieth_frame():
+def test_a_slower_wire_brings_every_nth_frame():
     thin = thinned(series(9), 4)
     assert thin.t.tolist() == [0.0, 0.04, 0.08]
     assert thin.peak.tolist() == thin.sums[:, 1].tolist() == [0, 4, 8]
@@ -100,23 +100,26 @@ def point(seconds, right, **changes):
         "result": Result(right, 100),
         "whole": True,
     }
-    return Point(**{**given, **changes})
+    return MeasuredPoint(**{**given, **changes})
 
 
 def test_the_front_is_what_no_other_beats_in_both():
     a, b, c, d = point(0.2, 50), point(0.4, 70), point(0.6, 70), point(0.8, 90)
-    assert front([d, c, b, a]) == [a, b, d]
-    assert front([point(0.2, 50), point(0.2, 60)]) == [point(0.2, 60)]
+    assert pareto_front([d, c, b, a]) == [a, b, d]
+    assert pareto_front([point(0.2, 50), point(0.2, 60)]) == [point(0.2, 60)]
 
 
 def test_a_point_s_time_is_the_sum_of_its_three_parts():
     assert point(0.2, 1, wire_s=0.01, arithmetic_s=0.001).seconds == pytest.approx(0.211)
 
 
-class TestPick:
-    DEALS = tuple(
-        pick.Deal(ms / 1000, ("max_force",), "IV", ms, accuracy)
-        for ms, accuracy in ((200.0, 0.5), (400.0, 0.8), (1200.0, 0.9))
+class TestParetoFront:
+    FRONT = ParetoFront(
+        "category",
+        tuple(
+            OperatingPoint(ms / 1000, ("max_force",), "IV", ms, accuracy)
+            for ms, accuracy in ((200.0, 0.5), (400.0, 0.8), (1200.0, 0.9))
+        ),
     )
 
     @pytest.mark.parametrize(
@@ -132,7 +135,7 @@ class TestPick:
         ],
     )
     def test_by_name_by_time_and_by_accuracy(self, wanted, milliseconds):
-        assert pick.pick(list(self.DEALS), wanted).milliseconds == milliseconds
+        assert self.FRONT.pick(wanted).milliseconds == milliseconds
 
     @pytest.mark.parametrize(
         ("wanted", "sentence"),
@@ -146,20 +149,21 @@ class TestPick:
     )
     def test_what_cannot_be_had_is_one_sentence(self, wanted, sentence):
         with pytest.raises(InputError, match=sentence):
-            pick.pick(list(self.DEALS), wanted)
+            self.FRONT.pick(wanted)
 
     def test_the_shipped_front_rises(self):
-        task, deals = pick.read(pick.SHIPPED)
-        assert task == "category"
-        assert [d.accuracy for d in deals] == sorted(d.accuracy for d in deals)
-        assert len(deals) >= 3
+        front = ParetoFront.read(SHIPPED)
+        assert front.task == "category"
+        accuracies = [point.accuracy for point in front.points]
+        assert accuracies == sorted(accuracies)
+        assert len(accuracies) >= 3
 
     def test_a_file_that_is_no_front_is_one_sentence(self, tmp_path):
         with pytest.raises(InputError, match="cannot be read"):
-            pick.read(tmp_path / "none.json")
+            ParetoFront.read(tmp_path / "none.json")
         (tmp_path / "front.json").write_text('{"task": "t", "points": []}')
         with pytest.raises(InputError, match="has no point"):
-            pick.read(tmp_path / "front.json")
+            ParetoFront.read(tmp_path / "front.json")
 
 
 def test_export_takes_window_features_and_scaling_of_a_point(recordings, tmp_path, capsys):
@@ -188,7 +192,7 @@ def test_export_takes_window_features_and_scaling_of_a_point(recordings, tmp_pat
 
 class TestEarly:
     def found(self, fixed):
-        return early.Beside((0.2, 0.6, 1.0), np.array(fixed), [], 100, 0.5)
+        return early.StoppingComparison((0.2, 0.6, 1.0), np.array(fixed), [], 100, 0.5)
 
     def test_the_fixed_window_that_is_as_accurate_is_interpolated(self):
         found = self.found([0.5, 0.3, 0.1])
@@ -228,7 +232,7 @@ class TestEarly:
         labels = np.repeat(["a", "b"], 60)
         X = rng.normal(size=(3, 120, 12))
         X[1:, :, 0] += 200.0 * (labels == "a")
-        found = early.beside(X, labels, (0.2, 0.6, 1.0), ("max_force",), "none")
+        found = early.compare_stopping(X, labels, (0.2, 0.6, 1.0), ("max_force",), "none")
         assert found.fixed[0] > 0.3
         assert found.fixed[1:].tolist() == [0.0, 0.0]
         assert 0.2 < found.hindsight_s <= 0.6
@@ -240,7 +244,7 @@ class TestEarly:
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
 
-        floors = early.floors(load(SCENE))
+        floors = early.breakaway_times(load(SCENE))
         # mu_s m g / (k v): equal arms, so the ratio of two objects is that of mu_s m.
         assert floors["plastic bin"] / floors["cardboard box"] == pytest.approx(0.28 / 0.6)
         # The chair tips: 0.4 / (2 * 0.7) instead of 0.6.
@@ -310,7 +314,7 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
             save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
     monkeypatch.setattr(accuracy, "LEAVE_ONE_OUT_UP_TO", 0)
     monkeypatch.setattr(whole, "WINDOWS", (1.2,))
-    monkeypatch.setattr(whole, "LOOKS", (0.4, 1.2))
+    monkeypatch.setattr(whole, "DECISION_POINTS_S", (0.4, 1.2))
     digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
     path = board_file(tmp_path / "board.json", digest)
     out = tmp_path / "out"
@@ -329,6 +333,6 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
         assert float(cells["time ms"]) == pytest.approx(sum(parts), abs=0.1)
         assert float(cells["low %"]) <= float(cells["accuracy %"]) <= float(cells["high %"])
     assert sum(cells["paper's point"] == "yes" for cells in rows) == 2  # once a task
-    task, deals = pick.read(out / "front.json")
-    assert task == "category"
-    assert deals[-1].accuracy > 0.9
+    front = ParetoFront.read(out / "front.json")
+    assert front.task == "category"
+    assert front.points[-1].accuracy > 0.9
