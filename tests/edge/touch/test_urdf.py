@@ -1,0 +1,68 @@
+"""The joints of a URDF file from one link to another, in order, or one sentence why not."""
+
+import pytest
+
+from edge.errors import InputError
+from edge.touch.urdf import joints_between
+
+ARM = """<robot name="r">
+  <link name="base"/><link name="upper"/><link name="lower"/><link name="aside"/>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0.3 0 -1e-3" rpy="0 1.5 0"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="0" effort="1" velocity="1"/></joint>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/></joint>
+  <joint name="camera" type="fixed"><parent link="upper"/><child link="aside"/></joint>
+</robot>"""
+
+
+@pytest.fixture
+def joints(tmp_path):
+    def read(text, base="base", tip="lower"):
+        path = tmp_path / "arm.urdf"
+        path.write_text(text)
+        return joints_between(path, base, tip)
+
+    return read
+
+
+def test_the_chain_runs_from_base_to_tip_whatever_the_order_of_the_file(joints):
+    assert [joint["name"] for joint in joints(ARM)] == ["shoulder", "elbow"]
+    assert [joint["name"] for joint in joints(ARM, "upper", "aside")] == ["camera"]
+    assert joints(ARM, "upper", "upper") == []
+
+
+def test_a_joint_keeps_its_numbers(joints):
+    assert joints(ARM)[1] == {
+        "name": "elbow",
+        "type": "revolute",
+        "axis": [0.0, 1.0, 0.0],
+        "origin_xyz": [0.3, 0.0, -1e-3],
+        "origin_rpy": [0.0, 1.5, 0.0],
+        "limits": [-2.5, 0.0],
+    }
+
+
+def test_what_a_file_leaves_out_is_urdf_s_default(joints):
+    assert joints(ARM)[0] == {"name": "shoulder", "type": "continuous", "axis": [1.0, 0.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("<robot", "<sdf", "not a URDF file"),
+        ('link name="base"', 'link name="world"', "no link 'base'; it has world, upper"),
+        ('<parent link="base"/>', '<parent link="lower"/>', "no chain of joints leads from"),
+        ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
+        ("0.3 0 -1e-3", "0.3 0", "origin of joint 'elbow' must be 3 numbers, not '0.3 0'"),
+        ('lower="-2.5"', 'lower="low"', "limit of joint 'elbow' must be 2 numbers"),
+    ],
+)
+def test_what_is_wrong_is_named(joints, old, new, said):
+    with pytest.raises(InputError, match=r"arm\.urdf: .*") as caught:
+        joints(ARM.replace(old, new))
+    assert said in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        joints_between(tmp_path / "none.urdf", "a", "b")

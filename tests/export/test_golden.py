@@ -1,0 +1,43 @@
+"""What a golden file is made of."""
+
+import numpy as np
+import pytest
+
+from edge.model.model import Model
+from export.golden import trials_of, trimmed
+from train.dataset import load_trials
+
+
+@pytest.fixture(scope="module")
+def data(recordings):
+    return load_trials(sorted(recordings.iterdir()))
+
+
+@pytest.mark.parametrize("count", [1, 4, 16, 100])
+def test_the_trials_spread_over_the_labels_of_the_finest_task(data, count):
+    chosen = trials_of(data, count)
+    assert chosen == sorted(set(chosen))
+    assert len(chosen) == min(count, 16)
+    if count >= 4:
+        assert {data.labels("object")[i] for i in chosen} == set(data.labels("object"))
+
+
+def test_trimming_keeps_every_frame_that_the_window_uses(exported, data):
+    model = Model(exported / "model.onnx")
+    for trial in data.trials[::5]:
+        part = trimmed(trial.recording, trial.onset_s, model)
+        end = trial.onset_s + model.info.window_s
+        assert trial.onset_s - 0.26 <= part.t[0] <= trial.onset_s
+        assert part.t[-1] > end or len(part.t) == len(trial.recording.t)
+        assert part.valid.shape == part.frames.shape
+
+
+def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_finite(exported):
+    golden = np.load(exported / "golden.npz")
+    trials, vectors = len(golden["onset_s"]), golden["vectors"]
+    finite = np.isfinite(vectors).all(axis=1)
+    assert finite[:-2].all()
+    assert not finite[-2:].any()
+    for task in ("category", "object"):
+        assert (golden[f"{task}_label"] == np.where(finite, golden[f"{task}_label"], -1)).all()
+    assert (golden["object_distances"][: trials + 16, 0] == 0.0).all()

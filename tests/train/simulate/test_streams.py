@@ -1,0 +1,48 @@
+"""Random numbers that stay where they are when something is added beside them."""
+
+import numpy as np
+import pytest
+
+from train.simulate import streams
+
+
+def test_a_stream_is_the_same_on_every_machine():
+    # `printf noise | sha256sum` begins so; two words, low byte first.
+    said = bytes.fromhex("efe2a5c09e6d49d7")
+    assert streams.key("noise") == tuple(np.frombuffer(said, dtype="<u4").tolist())
+    first = streams.stream(1, "noise", "soft", 0).integers(0, 1 << 32, 3)
+    assert first.tolist() == streams.stream(1, "noise", "soft", 0).integers(0, 1 << 32, 3).tolist()
+
+
+@pytest.mark.parametrize(
+    "other", [(2, "noise", "soft", 0), (1, "drift", "soft", 0), (1, "noise", "hard", 0),
+              (1, "noise", "soft", 1), (1, "noise", "soft", None), (1, "soft", "noise", 0)]
+)  # fmt: skip
+def test_seed_name_condition_and_trial_each_give_another_stream(other):
+    one = streams.stream(1, "noise", "soft", 0).random(4)
+    assert not np.isin(streams.stream(*other).random(4), one).any()
+
+
+@pytest.mark.parametrize("kind", ["uniform", "normal"])
+def test_a_trial_s_draw_does_not_hang_on_the_trials_beside_it(kind):
+    every = streams.draws(3, "place", "soft", np.arange(50), kind)
+    some = np.array([7, 2, 31])
+    np.testing.assert_array_equal(streams.draws(3, "place", "soft", some, kind), every[some])
+    if kind == "uniform":
+        assert (every >= 0.0).all()
+        assert (every < 1.0).all()
+    else:
+        assert np.abs(streams.draws(3, "p", "s", np.arange(10_000), kind)).max() == 2.5
+
+
+def test_noise_is_normal_and_each_number_takes_two_bytes():
+    values = streams.noise(np.random.default_rng(0), (1000, 200))
+    assert values.dtype == np.float32
+    assert abs(float(values.mean())) < 4 / np.sqrt(values.size)
+    assert float(values.std()) == pytest.approx(1.0, abs=0.01)
+    assert float(np.abs(values).max()) < 4.4
+    again = np.random.default_rng(0)
+    again.bytes(2 * values.size)
+    fresh = np.random.default_rng(0)
+    streams.noise(fresh, (1000, 200))
+    assert fresh.random() == again.random()
