@@ -30,7 +30,7 @@ TOGETHER = {
     "train/simulate/test_simulate_scene.py": "scene scene_model schema reader",
     "train/simulate/test_simulate_paper.py": "run convergence",
     # Reports, by what stands in them.
-    "train/study/test_study_report.py": "beyond classify honest paper plots resolution run",
+    "train/study/test_study_report.py": "beyond classify context honest paper resolution run",
     "train/tradeoff/test_tradeoff.py": "accuracy board early plots prices run sections wires",
     "export/test_export_command.py": "api",
     "export/test_export_features.py": "api",

@@ -36,7 +36,10 @@ def graph():
     names = Names()
 
     def run(output, x):
-        sides = [helper.make_tensor_value_info(n, TensorProto.DOUBLE, [None, None]) for n in ("x", output)]
+        sides = [
+            helper.make_tensor_value_info(n, TensorProto.DOUBLE, [None, None])
+            for n in ("x", output)
+        ]
         made = helper.make_graph(names.nodes, "g", sides[:1], sides[1:], names.initial)
         opset = [helper.make_opsetid("", OPSET)]
         model = helper.make_model(made, opset_imports=opset, ir_version=8)

@@ -1,0 +1,69 @@
+"""What counts as the golden file's value: bounds, exact integers, what is not a number."""
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.model.model import Model
+from edge.model.verify import _close, _exact, verify
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    ("seen", "expected", "share"),
+    [
+        (0.5, 0.25, 0.5),  # below 1 the bound is absolute
+        (150.0, 100.0, 1.0),  # above, a share of the expected
+        (151.0, 100.0, 1.02),
+        (-150.0, -100.0, 1.0),
+        (NAN, NAN, 0.0),
+        (INF, INF, 0.0),
+        (NAN, 1.0, INF),
+        (1.0, NAN, INF),
+        (-INF, INF, INF),
+    ],
+)
+def test_a_bound_allows_its_share_of_what_is_expected(seen, expected, share):
+    check = _close("it", np.array([0.0, seen]), np.array([0.0, expected]), 0.5)
+    assert check.worst == pytest.approx(share)
+    assert check.passed == (share <= 1.0)
+    assert check.row == (1 if share else None)
+
+
+def test_a_bound_of_zero_allows_nothing():
+    one, other = np.array([1.0]), np.array([np.nextafter(1.0, 2.0)])
+    assert _close("it", one, one, 0.0).passed
+    assert not _close("it", other, one, 0.0).passed
+
+
+def test_whole_numbers_are_equal_or_not():
+    golden = np.array([[1, 2], [3, 4], [5, 6]])
+    assert _exact("it", golden.copy(), golden).passed
+    seen = golden.copy()
+    seen[1, 0] = 7
+    check = _exact("it", seen, golden)
+    assert (check.passed, check.row, check.seen, check.expected) == (False, 1, "[7 4]", "[3 4]")
+
+
+@pytest.mark.parametrize("compare", [_exact, lambda *a: _close(*a, 1.0)], ids=["exact", "close"])
+def test_another_shape_is_a_difference(compare):
+    check = compare("it", np.zeros((2, 3)), np.zeros((2, 4)))
+    assert not check.passed
+    assert (check.seen, check.expected) == ("shape (2, 3)", "(2, 4)")
+
+
+def test_a_model_meets_its_own_golden_file_in_everything(exported):
+    checks = verify(Model(exported / "model.onnx"), exported / "golden.npz")
+    assert all(check.passed for check in checks)
+    exact = [c for c in checks if c.name.endswith(("_label", "_neighbours", "counts", "length"))]
+    assert len(exact) == 6
+    assert all(check.worst == 0.0 for check in exact)
+
+
+def test_a_golden_file_of_another_width_is_refused(exported, tmp_path):
+    arrays = dict(np.load(exported / "golden.npz"))
+    arrays["vectors"] = np.pad(arrays["vectors"], [(0, 0), (0, 1)])
+    np.savez(tmp_path / "golden.npz", **arrays)
+    with pytest.raises(InputError, match=r"golden\.npz: .*export"):
+        verify(Model(exported / "model.onnx"), tmp_path / "golden.npz")
