@@ -32,8 +32,8 @@ TOGETHER = {
     # Reports, by what stands in them.
     "train/study/test_study_report.py": "beyond classify context honest paper resolution run",
     "train/tradeoff/test_tradeoff.py": "accuracy board early plots prices run sections wires",
-    "export/test_export_command.py": "api",
-    "export/test_export_features.py": "api",
+    "export/test_export_command.py": "golden",
+    "export/test_export_features.py": "graph",
     "train/test_more_features.py": "dataset pipeline",
 }
 """{test file of another name: the modules beside it, or below, that it specifies}."""

@@ -258,8 +258,9 @@ def _close(name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float) 
     same = (seen == expected) | (np.isnan(seen) & np.isnan(expected))
     with np.errstate(invalid="ignore"):
         gap = np.where(same, 0.0, np.abs(seen - expected))
-    gap = np.where(np.isnan(gap), np.inf, gap)
-    share = np.where(gap == 0.0, 0.0, gap / np.where(allowance > 0.0, allowance, 1e-300))
+        # Of infinite values only equal ones are near, however wide an infinite allowance is.
+        share = gap / np.where((allowance > 0.0) & (allowance < np.inf), allowance, 1e-300)
+    share = np.where(gap == 0.0, 0.0, np.where(np.isnan(gap), np.inf, share))
     flat = share.reshape(len(seen), -1)
     row, column = np.unravel_index(int(np.argmax(flat)), flat.shape)
     worst = float(flat[row, column])

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from edge.errors import InputError
-from train.operating_points import NAMES, SHIPPED, pick, read
+from train.operating_points import NAMES, SHIPPED, ParetoFront
 
 POINTS = [(100, 0.60), (200, 0.80), (900, 0.90)]
 
@@ -32,9 +32,9 @@ def front(tmp_path):
 
 
 def test_the_points_come_fastest_first(front):
-    task, points = read(front(text(POINTS[::-1])))
-    assert task == "object"
-    assert [(p.milliseconds, p.accuracy) for p in points] == POINTS
+    read = ParetoFront.read(front(text(POINTS[::-1])))
+    assert read.task == "object"
+    assert [(p.milliseconds, p.accuracy) for p in read.points] == POINTS
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_the_points_come_fastest_first(front):
     ],
 )
 def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wanted, milliseconds):
-    assert pick(read(front(text()))[1], wanted).milliseconds == milliseconds
+    assert ParetoFront.read(front(text())).pick(wanted).milliseconds == milliseconds
 
 
 @pytest.mark.parametrize(
@@ -69,29 +69,28 @@ def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wanted, millise
 )
 def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wanted, said):
     with pytest.raises(InputError, match="--front") as caught:
-        pick(read(front(text()))[1], wanted)
+        ParetoFront.read(front(text())).pick(wanted)
     assert said in str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("[]", "not a front.json"),
-        ("{", "not a front.json"),
-        ("[" * 100_000, "not a front.json"),
+        ("[]", "is not a front.json"),
+        ("{", "is not a front.json"),
+        ("[" * 100_000, "is not a front.json"),
         (text(points=[]), "no point to choose from"),
         (text().replace("III", "VII"), "no point to choose from"),
-        (text().replace("0.6,", '"much",').replace("0.6}", '"much"}'), "not a front.json"),
+        (text().replace("0.6,", '"much",').replace("0.6}", '"much"}'), "is not a front.json"),
     ],
 )
 def test_a_damaged_file_is_one_sentence(front, content, said):
     with pytest.raises(InputError, match=r"front\.json: ") as caught:
-        read(front(content))
+        ParetoFront.read(front(content))
     assert said in str(caught.value)
 
 
 def test_the_shipped_front_offers_every_name():
-    _, points = read(SHIPPED)
-    chosen = [pick(points, name) for name in NAMES]
+    chosen = [ParetoFront.read(SHIPPED).pick(name) for name in NAMES]
     assert [p.milliseconds for p in chosen] == sorted(p.milliseconds for p in chosen)
     assert [p.accuracy for p in chosen] == sorted(p.accuracy for p in chosen)
