@@ -13,10 +13,11 @@ import time
 import pytest
 
 from edge import recording
-from train.simulate.engine import Trial, run_batch
+from train.simulate.engine import run_batch
 from train.simulate.explain import costs
 from train.simulate.run import kinds, recordings
 from train.simulate.scene import COLUMN_ANGLES_DEG, from_dict
+from train.simulate.scene_model import TrialSpec
 from train.simulate.schema import EFFECTS
 
 BATCH = 256
@@ -162,6 +163,6 @@ def bench_effect(benchmark, note, effect):
         "object": [thing],
     }
     scene = from_dict(table)
-    trial = Trial(scene.objects[0], "movable", 0)
+    trial = TrialSpec(scene.objects[0], "movable", 0)
     found = benchmark.pedantic(costs, (scene, (trial,), 0.01), rounds=1, iterations=1)
     note("us a trial", found[effect], "-")

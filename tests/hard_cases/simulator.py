@@ -15,6 +15,7 @@ from tests.train.simulate.test_simulate_stability import (
     naive_push,
     tilt_cases,
     tilt_error,
+    tilt_loads,
 )
 from train.simulate import contact
 from train.simulate.effects import tilt
@@ -70,16 +71,16 @@ def between_usual() -> str:
 
 
 def tilt_worst(seed: int, count: int) -> float:
-    state, free, c = tilt_cases(count, seed)
-    return float(tilt_error(state, free, c, tilt.solve(state, free, c)).max())
+    beds, free, c = tilt_cases(count, seed)
+    return float(tilt_error(beds, free, c, tilt_loads(beds, free, c)).max())
 
 
 def tilt_usual() -> str:
-    state, free, c = tilt_cases(4000, 1)
+    beds, free, c = tilt_cases(4000, 1)
     guarded = tilt.guarded
     try:
-        tilt.guarded = lambda state, y, free, c, open_: y  # type: ignore[assignment]
-        left = tilt_error(state, free, c, tilt.solve(state, free, c))
+        tilt.guarded = lambda bed, lever, y, free, c, open_: y  # type: ignore[assignment]
+        left = tilt_error(beds, free, c, tilt_loads(beds, free, c))
     finally:
         tilt.guarded = guarded
     return (

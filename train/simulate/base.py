@@ -4,16 +4,14 @@ and the image of the load. Effects add to it, or take the place of one of its fu
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from train.simulate.arm import cross, dot
 from train.simulate.contact import (
     Array,
-    State,
+    Coordinates,
     closed_form,
-    line_forces,
     relieve,
     share_out,
     sort_bed,
@@ -21,11 +19,8 @@ from train.simulate.contact import (
     total,
     touching,
 )
-
-if TYPE_CHECKING:
-    from train.simulate.plan import Build
-
-solve = closed_form
+from train.simulate.plan import Build
+from train.simulate.state import Bed, State
 
 # Ranks within the stages; effects put themselves between.
 SPRINGS, WINDOW, BED, ORDER = 10, 30, 40, 60
@@ -36,6 +31,7 @@ BEAR, IMAGE = 10, 30
 
 def add(build: Build) -> None:
     """Put the base's functions into the plan."""
+    build.wrap(solve)
     build.put("setup", 0, place)
     build.put("setup", SPRINGS, springs)
     build.put("setup", WINDOW, window)
@@ -49,9 +45,14 @@ def add(build: Build) -> None:
     build.put("sample", IMAGE, image)
 
 
+def solve(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
+    """The force of the bed as it stands, in closed form."""
+    return closed_form(state.bed.slopes, state.bed.intercepts, y, c)
+
+
 def equilibrium(state: State, t: float | Array) -> Array:
     """(dof, n) equilibrium angles at time t."""
-    return np.asarray(state["start"] + state["rate"] * np.minimum(t, state["travel_s"]))
+    return np.asarray(state.start + state.rate * np.minimum(t, state.travel_s))
 
 
 def place(state: State) -> None:
@@ -60,53 +61,50 @@ def place(state: State) -> None:
     Before the contact each joint lags its equilibrium point by d/k of its speed: the steady
     answer of d q' + k (q - q_eq) = 0 to a ramp.
     """
-    p, scene, kinematics = state["values"], state["scene"], state["kinematics"]
-    n = state["n"]
+    p, scene, kinematics = state.values, state.scene, state.kinematics
+    n = state.n
     k = np.array(scene.stiffness)[:, None]
     d = np.array(scene.damping)[:, None]
     start = np.repeat(np.array(scene.start)[:, None], n, axis=1)
     start[-1] += np.radians(p["roll_deg"])
-    state["start"] = start
-    state["rate"] = np.array(scene.rate)[:, None]
-    state["travel_s"] = scene.travel_s
-    lag = d / k * state["rate"]
-    h = state["h"]
-    state["held"] = d / h
-    state["give"] = 1.0 / (d / h + k)
-    state["joint_k"] = k
-    state["q"] = equilibrium(state, 0.0) - lag
-    state["t"] = 0.0
-    skin = scene.skin
-    pitch = skin.pitch_m[0] if isinstance(skin.pitch_m, tuple) else skin.pitch_m
-    state["row_pitch"] = pitch
-    state["row_z"] = (skin.row0_z_m - pitch * np.arange(skin.rows))[:, None]
-    low, high = float(state["row_z"].min()), float(state["row_z"].max())
-    state["z"] = np.clip(scene.place_m + p["place_m"], low, high)
+    state.start = start
+    state.rate = np.array(scene.rate)[:, None]
+    state.travel_s = scene.travel_s
+    lag = d / k * state.rate
+    h = state.h
+    state.held = d / h
+    state.give = 1.0 / (d / h + k)
+    state.joint_k = k
+    state.q = equilibrium(state, 0.0) - lag
+    state.t = 0.0
+    skin = state.skin
+    state.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
+    low, high = float(state.row_z.min()), float(state.row_z.max())
+    state.z = np.clip(scene.place_m + p["place_m"], low, high)
     pose = kinematics.pose(equilibrium(state, p["lead_s"]) - lag)
     along = pose.rotation[:, 2]
-    point = pose.origin + along * state["z"]
+    point = pose.origin + along * state.z
     arms = cross(pose.axes, (point[:, None] - pose.origins))
-    speed = dot(np.moveaxis(arms, 1, 0), np.broadcast_to(state["rate"][:, :, None], (len(k), 1, n)))
+    speed = dot(np.moveaxis(arms, 1, 0), np.broadcast_to(state.rate[:, :, None], (len(k), 1, n)))
     speed = speed - along * dot(speed, along)
     size = np.sqrt(dot(speed, speed))
-    state["approach"] = size
+    state.approach = size
     normal = speed / size
     yaw = np.radians(p["yaw_deg"])
     normal = normal * np.cos(yaw) + along * np.sin(yaw)
-    state["normal"] = normal
-    state["face"] = point + skin.radius_m * (speed / size)
-    state["along_face"] = along * np.cos(yaw) - (speed / size) * np.sin(yaw)
-    state["meeting_angle"] = np.arctan2(
+    state.normal = normal
+    state.face = point + skin.radius_m * (speed / size)
+    state.along_face = along * np.cos(yaw) - (speed / size) * np.sin(yaw)
+    state.meeting_angle = np.arctan2(
         dot(speed, pose.rotation[:, 1]), dot(speed, pose.rotation[:, 0])
     )
-    state["force"] = np.zeros(n)
-    state["loads"] = (np.zeros(n),)
+    state.force = np.zeros(n)
+    state.loads = (np.zeros(n),)
 
 
 def springs(state: State) -> None:
     """Each taxel is a spring; covers and foundations join it in series."""
-    state["bed"] = line_forces
-    state["taxel_k"] = state["values"]["taxel_n_m"]
+    state.taxel_k = state.values["taxel_n_m"]
 
 
 WINDOW_HALF = 6
@@ -116,21 +114,21 @@ cylinder has no more surface to press."""
 
 def window(state: State) -> None:
     """The columns that can touch: their gaps R (1 - cos theta) at zero depth."""
-    skin = state["scene"].skin
+    skin = state.skin
     angles = np.radians(np.array(skin.column_angles_deg))[:, None]
-    away = angles - state["meeting_angle"]
+    away = angles - state.meeting_angle
     away = np.abs(away - 2.0 * math.pi * np.round(away / (2.0 * math.pi)))
     nearest = np.argmin(away, axis=0)
-    half = min(WINDOW_HALF, (skin.cols - 1) // 2)
-    state["columns"] = (nearest + np.arange(-half, half + 1)[:, None]) % skin.cols
-    away = np.take_along_axis(away, state["columns"], axis=0)
-    state["gaps"] = skin.radius_m * (1.0 - np.cos(away))
+    beside = min(WINDOW_HALF, (skin.cols - 1) // 2)
+    state.columns = (nearest + np.arange(-beside, beside + 1)[:, None]) % skin.cols
+    away = np.take_along_axis(away, state.columns, axis=0)
+    state.column_gaps = skin.radius_m * (1.0 - np.cos(away))
     reach = np.where(away < 0.5 * math.pi, 1.0, 0.0)
     # A narrow face ends among the columns; no face is narrower than a taxel.
     pitch = skin.radius_m * 2.0 * math.pi / skin.cols
-    half = 0.5 * np.maximum(state["values"]["breadth_m"], pitch)
+    half = 0.5 * np.maximum(state.values["breadth_m"], pitch)
     across = skin.radius_m * np.sin(away)
-    state["reach"] = reach * np.clip((half + 0.5 * pitch - across) / pitch, 0.0, 1.0)
+    state.reach = reach * np.clip((half + 0.5 * pitch - across) / pitch, 0.0, 1.0)
 
 
 FLAT_M = 1e6
@@ -139,53 +137,55 @@ FLAT_M = 1e6
 
 def lay_bed(state: State) -> None:
     """Lines are the skin's rows, as far as the object's face covers each."""
-    offset = state["row_z"] - state["z"]
-    state["weight"] = covered(offset, state)
-    curved = (state["values"]["radius_m"] < FLAT_M).any()
-    state["line_gap"] = curve_gap(offset, state) if curved else np.zeros((1, 1))
-    state["stiffness"] = state["reach"] * state["taxel_k"]
-    state["lines"] = slice(0, len(offset))
+    offset = state.row_z - state.z
+    curved = (state.values["radius_m"] < FLAT_M).any()
+    state.bed = Bed(
+        gaps=state.column_gaps,
+        stiffness=state.reach * state.taxel_k,
+        weight=covered(offset, state),
+        line_gap=curve_gap(offset, state) if curved else np.zeros((1, 1)),
+        lines=slice(0, len(offset)),
+    )
 
 
 def covered(offset: Array, state: State) -> Array:
     """(L, n) which part of each row, `offset` metres from the face's middle, the face covers."""
-    pitch = state["row_pitch"]
-    half = 0.5 * np.maximum(state["values"]["width_m"], pitch)
+    pitch = state.skin.row_pitch_m
+    half = 0.5 * np.maximum(state.values["width_m"], pitch)
     return np.asarray(np.clip((half + 0.5 * pitch - np.abs(offset)) / pitch, 0.0, 1.0))
 
 
 def curve_gap(offset: Array, state: State) -> Array:
     """(L, n) how far a face curved along the forearm has drawn back: l^2 / (2 r)."""
-    return np.asarray(offset * offset / (2.0 * state["values"]["radius_m"]))
+    return np.asarray(offset * offset / (2.0 * state.values["radius_m"]))
 
 
 def order_bed(state: State) -> None:
     """The bed's law as lines K a - B; a flat face needs one for each column only."""
-    gaps, stiffness, weight = state["gaps"], state["stiffness"], state["weight"]
-    if len(state["line_gap"]) == 1 < len(weight):
-        covered_rows = total(weight)
-        state["slopes"], state["intercepts"] = sort_bed(gaps, stiffness * covered_rows)
+    bed = state.bed
+    if len(bed.line_gap) == 1 < len(bed.weight):
+        covered_rows = total(bed.weight)
+        bed.slopes, bed.intercepts = sort_bed(bed.gaps, bed.stiffness * covered_rows)
         return
-    n = gaps.shape[-1]
-    all_gaps = (state["line_gap"][:, None] + gaps[None]).reshape(-1, n)
-    all_stiffness = (weight[:, None] * stiffness[None]).reshape(-1, n)
-    state["slopes"], state["intercepts"] = sort_bed(all_gaps, all_stiffness)
+    all_gaps = (bed.line_gap[:, None] + bed.gaps[None]).reshape(-1, state.n)
+    all_stiffness = (bed.weight[:, None] * bed.stiffness[None]).reshape(-1, state.n)
+    bed.slopes, bed.intercepts = sort_bed(all_gaps, all_stiffness)
 
 
 def locate(state: State) -> None:
     """Depth, its Jacobian and what the step's loads take off it, at the frame's joint angles."""
-    pose = state["kinematics"].pose(state["q"])
-    state["pose"] = pose
+    pose = state.kinematics.pose(state.q)
+    state.pose = pose
     along = pose.rotation[:, 2]
-    point = pose.origin + along * state["z"]
-    normal = state["normal"]
-    state["crossed"] = cross(normal[:, None], pose.axes)
-    jacobian = dot(point[:, None] - pose.origins, state["crossed"])
-    state["q_frame"] = state["q"]
-    state["jacobian"] = (jacobian,)
-    depth = dot(point - state["face"], normal) + state["scene"].skin.radius_m
-    state["y_frame"] = (depth,)
-    state["compliance"] = (dot(jacobian * jacobian, state["give"]),)
+    point = pose.origin + along * state.z
+    normal = state.normal
+    crossed = cross(normal[:, None], pose.axes)
+    jacobian = dot(point[:, None] - pose.origins, crossed)
+    state.q_frame = state.q
+    state.jacobian = (jacobian,)
+    depth = dot(point - state.face, normal) + state.skin.radius_m
+    state.y_frame = (depth,)
+    state.compliance = (dot(jacobian * jacobian, state.give),)
 
 
 def predict(state: State) -> None:
@@ -193,43 +193,41 @@ def predict(state: State) -> None:
 
     Each joint obeys d q' + k (q - q_eq) = -J^T F; backward Euler in closed form.
     """
-    state["t"] = state["t"] + state["h"]
-    target = equilibrium(state, state["t"])
-    state["q_free"] = (state["held"] * state["q"] + state["joint_k"] * target) * state["give"]
-    moved = state["q_free"] - state["q_frame"]
-    state["y"] = tuple(
-        y + dot(j, moved) for y, j in zip(state["y_frame"], state["jacobian"], strict=True)
-    )
+    state.t = state.t + state.h
+    target = equilibrium(state, state.t)
+    state.q_free = (state.held * state.q + state.joint_k * target) * state.give
+    moved = state.q_free - state.q_frame
+    state.y = tuple(y + dot(j, moved) for y, j in zip(state.y_frame, state.jacobian, strict=True))
 
 
 def press(state: State) -> None:
     """The contact's loads with the object at rest."""
-    state["loads"] = state["solve"](state, state["y"], state["compliance"])
+    state.loads = state.solve(state, state.y, state.compliance)
 
 
 def settle(state: State) -> None:
     """The joints give way to the loads."""
-    loads = state["loads"]
-    torque = state["jacobian"][0] * loads[0]
-    for jacobian, load in zip(state["jacobian"][1:], loads[1:], strict=True):
+    loads = state.loads
+    torque = state.jacobian[0] * loads[0]
+    for jacobian, load in zip(state.jacobian[1:], loads[1:], strict=True):
         torque = torque + jacobian * load
-    state["q"] = state["q_free"] - state["give"] * torque
-    state["depth"] = relieve(state["y"], state["compliance"], loads)
+    state.q = state.q_free - state.give * torque
+    state.depth = relieve(state.y, state.compliance, loads)
 
 
 def bear(state: State) -> None:
     """The force that the skin bears, and each line's depth."""
-    state["force"] = state["loads"][0]
-    state["line_depth"] = state["depth"][0] - state["line_gap"]
+    state.force = state.loads[0]
+    state.line_depth = state.depth[0] - state.bed.line_gap
 
 
 def image(state: State) -> None:
     """The force shared out among taxels: (rows, columns, n) newtons, the skin's rows `lines`
     and the window's columns from `image_from` on; those beside them bear nothing."""
-    depth = np.broadcast_to(state["line_depth"], state["weight"].shape)
-    held = np.where(state["force"] > 0.0, depth.max(axis=0), -np.inf)
-    some = touching(state["gaps"], held)
-    gaps = state["gaps"][some]
-    loads = spring_loads(depth, gaps, state["stiffness"][some], state["weight"])
-    state["image"] = share_out(state["force"], loads)
-    state["image_from"] = some.start
+    bed = state.bed
+    depth = np.broadcast_to(state.line_depth, bed.weight.shape)
+    held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
+    some = touching(bed.gaps, held)
+    loads = spring_loads(depth, bed.gaps[some], bed.stiffness[some], bed.weight)
+    state.image = share_out(state.force, loads)
+    state.image_from = some.start

@@ -11,13 +11,10 @@ or (F, M); C = (c00,) or (c00, c01, c11) is what a unit load takes off y within 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-State = dict[str, Any]
 Coordinates = tuple[Array, ...]
 
 
@@ -52,13 +49,13 @@ def sort_bed(gaps: Array, stiffness: Array) -> tuple[Array, Array]:
     return running_sum(stiffness), running_sum(stiffness * gaps)
 
 
-def closed_form(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
-    """The force F = phi(y - c F): exact, without iteration, and never negative.
+def closed_form(slopes: Array, intercepts: Array, y: Coordinates, c: Coordinates) -> Coordinates:
+    """The force F = phi(y - c F) of a bed with this law: exact, without iteration, and never
+    negative.
 
     F = max(0, max_s (K_s y - B_s) / (1 + c K_s)), the closed form of the notes on physics:
     along each line of phi the equation is linear, and of the lines the largest answer holds.
     """
-    slopes, intercepts = state["slopes"], state["intercepts"]
     force = slopes * y[0]
     force -= intercepts
     force /= slopes * c[0] + 1.0
@@ -72,18 +69,6 @@ def touching(gaps: Array, deepest: Array) -> slice:
     """
     touched = np.nonzero(np.any(gaps < deepest, axis=1))[0]
     return slice(int(touched[0]), int(touched[-1]) + 1) if touched.size else slice(0, 0)
-
-
-def line_forces(state: State, depths: Array) -> tuple[Array, Array]:
-    """(L, n) force and stiffness of each line at its depth (L, n)."""
-    some = touching(state["gaps"], depths.max(axis=0))
-    if some.stop == 0:
-        return np.zeros_like(depths), np.zeros_like(depths)
-    inside = depths - state["gaps"][some, None]
-    held = (inside > 0.0) * state["stiffness"][some, None]
-    inside *= held
-    weight = state["weight"]
-    return total(inside) * weight, total(held) * weight
 
 
 def spring_loads(depths: Array, gaps: Array, stiffness: Array, weight: Array) -> Array:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from train.simulate.arm import Array
-from train.simulate.engine import Batch, Trial, kind_of, run_batch
-from train.simulate.plan import make_plan
-from train.simulate.scene_model import Scene
+from train.simulate.assemble import make_plan
+from train.simulate.engine import Batch, kind_of, run_batch
+from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SPREAD
 
 HALVINGS = 6
@@ -34,11 +34,11 @@ class Convergence:
     step_s: float
 
 
-def middle_values(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
+def middle_values(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
     """{name: (n,)} of trials in the middle of every range, without spread."""
     out: dict[str, Array] = {}
-    for name in set.intersection(*(set(trial.thing.values) for trial in trials)):
-        out[name] = np.array([trial.thing.values[name].middle for trial in trials])
+    for name in set.intersection(*(set(trial.object.values) for trial in trials)):
+        out[name] = np.array([trial.object.values[name].middle for trial in trials])
     n = len(trials)
     out["lead_s"] = np.full(n, scene.lead.middle)
     out["taxel_n_m"] = np.full(n, scene.taxel_n_m.middle)
@@ -48,15 +48,15 @@ def middle_values(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
     return out
 
 
-def physics(scene: Scene, trials: tuple[Trial, ...], step_s: float) -> Batch:
+def physics(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> Batch:
     """The middle trials' forces and joints at a step."""
-    kind = kind_of(scene, trials[0].thing, trials[0].condition)
+    kind = kind_of(scene, trials[0].object, trials[0].condition)
     plan = make_plan(scene, kind.effects)
     values = middle_values(scene, trials)
     return run_batch(scene, trials, step_s, plan=plan, values=values, images=False)
 
 
-def measure(scene: Scene, trials: tuple[Trial, ...], halvings: int = HALVINGS) -> Convergence:
+def measure(scene: Scene, trials: tuple[TrialSpec, ...], halvings: int = HALVINGS) -> Convergence:
     """Halve the step of one kind's middle trials, one trial an object, and see what changes.
 
     The differences between neighbouring steps give the order p and, summed as the geometric
@@ -93,6 +93,6 @@ def _order(changes: list[float]) -> float:
     return float(np.clip(math.log2(before / last) if before > 0.0 else 0.5, 0.5, 4.0))
 
 
-def choose_step(scene: Scene, trials: tuple[Trial, ...]) -> Convergence:
+def choose_step(scene: Scene, trials: tuple[TrialSpec, ...]) -> Convergence:
     """The step of one kind of trials, from a measured convergence."""
     return measure(scene, trials)

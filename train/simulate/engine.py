@@ -10,26 +10,13 @@ from numpy.typing import NDArray
 
 from train.simulate import streams
 from train.simulate.arm import Array, Kinematics
-from train.simulate.contact import State
-from train.simulate.plan import Plan, make_plan
-from train.simulate.required_effects import callers
-from train.simulate.scene_model import Scene, SceneObject
+from train.simulate.assemble import make_plan
+from train.simulate.plan import Plan
+from train.simulate.required_effects import required_effects
+from train.simulate.scene_model import Scene, SceneObject, TrialSpec
 from train.simulate.schema import SPREAD, STIFFNESSES
-from train.simulate.sensor_frames import Film
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One trial of an object in a condition."""
-
-    thing: SceneObject
-    condition: str
-    number: int
-
-    @property
-    def key(self) -> str:
-        """Names the object and its condition in streams and files."""
-        return f"{self.thing.slug}-{self.condition}"
+from train.simulate.sensor_frames import SensorFrames
+from train.simulate.state import Readings, State
 
 
 @dataclass(frozen=True)
@@ -42,11 +29,11 @@ class Kind:
     stems: int
 
 
-def kind_of(scene: Scene, thing: SceneObject, condition: str) -> Kind:
+def kind_of(scene: Scene, item: SceneObject, condition: str) -> Kind:
     """What an object's trials have in common with others that can share their batch."""
-    effects = tuple(callers(scene, thing, condition))
-    curved = "radius_m" in thing.given and "tilt" not in effects
-    stems = int(thing.values["stem_count"].low) if "stem_count" in thing.values else 0
+    effects = tuple(required_effects(scene, item, condition))
+    curved = "radius_m" in item.given and "tilt" not in effects
+    stems = int(item.values["stem_count"].low) if "stem_count" in item.values else 0
     return Kind(effects, curved, stems)
 
 
@@ -62,11 +49,11 @@ class Batch:
         valid: (n, rows, cols) bool, or None.
         joints: (n, frames, dof) radians.
         force: (n, frames) newtons.
-        slide: (n, frames) metres that the object has moved; None where nothing can.
+        traces: {name: (n, frames)} of what the effects keep, such as `slide_m`.
         state: what the plan left behind.
     """
 
-    trials: tuple[Trial, ...]
+    trials: tuple[TrialSpec, ...]
     t: Array
     counts: NDArray[np.uint16]
     joints: Array
@@ -74,11 +61,11 @@ class Batch:
     times: Array | None
     kept: NDArray[np.bool_] | None
     valid: NDArray[np.bool_] | None
-    slide: Array | None
+    traces: dict[str, Array]
     state: State
 
 
-def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
+def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
     """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
 
     Where an object has no such value (a fixed one its mass), it is NaN and nothing reads it.
@@ -90,7 +77,7 @@ def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
     for key, members in groups.items():
         where = np.array(members)
         numbers = np.array([trials[i].number for i in members], dtype=np.int64)
-        thing = trials[members[0]].thing
+        item = trials[members[0]].object
 
         def spread(name: str, key: str = key, numbers: Any = numbers) -> Any:
             amount = scene.spread[name]
@@ -98,7 +85,7 @@ def values_of(scene: Scene, trials: tuple[Trial, ...]) -> dict[str, Array]:
                 return 0.0
             return amount * streams.draws(scene.seed, f"spread.{name}", key, numbers, "normal")
 
-        own = {**thing.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m}
+        own = {**item.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m}
         for name, value in own.items():
             drawn: Any = value.low
             if value.varies:
@@ -126,45 +113,48 @@ def frame_count(scene: Scene) -> int:
 
 
 def begin(
-    scene: Scene, plan: Plan, trials: tuple[Trial, ...], step_s: float, values: dict[str, Array]
+    scene: Scene, plan: Plan, trials: tuple[TrialSpec, ...], step_s: float, values: dict[str, Array]
 ) -> State:
     """The state of a batch before its first step."""
-    state: State = {
-        "scene": scene,
-        "trials": trials,
-        "n": len(trials),
-        "h": step_s,
-        "values": values,
-        "kinematics": Kinematics(scene.arm),
-        "solve": plan.solve,
-    }
+    state = State(
+        scene=scene,
+        skin=scene.cylinder,
+        trials=trials,
+        n=len(trials),
+        h=step_s,
+        values=values,
+        kinematics=Kinematics(scene.arm),
+        solve=plan.solve,
+    )
     for function in plan.setup:
         function(state)
     return state
 
 
 @dataclass(frozen=True)
-class Shot:
+class PhysicsRun:
     """The physics of a batch: what its skin bears, before any sensor reads it.
 
     Attributes:
-        film: the load on the taxels, frame by frame.
+        frames: the load on the taxels, frame by frame.
+        t: (frames,) seconds.
         joints: (n, frames, dof) radians.
         force: (n, frames) newtons.
-        slide: (n, frames) metres, or None.
+        traces: {name: (n, frames)}.
         state: what the plan left behind.
     """
 
-    film: Film
+    frames: SensorFrames
+    t: Array
     joints: Array
     force: Array
-    slide: Array | None
+    traces: dict[str, Array]
     state: State
 
 
 def run_batch(
     scene: Scene,
-    trials: tuple[Trial, ...],
+    trials: tuple[TrialSpec, ...],
     step_s: float,
     *,
     plan: Plan | None = None,
@@ -180,19 +170,20 @@ def run_batch(
         images: False for the physics alone (forces, joints); `counts` are then empty.
     """
     first = trials[0]
-    plan = plan or make_plan(scene, kind_of(scene, first.thing, first.condition).effects)
-    return read_out(shoot(scene, trials, step_s, plan=plan, values=values, images=images), plan)
+    plan = plan or make_plan(scene, kind_of(scene, first.object, first.condition).effects)
+    physics = run_physics(scene, trials, step_s, plan=plan, values=values, images=images)
+    return read_out(physics, plan)
 
 
-def shoot(
+def run_physics(
     scene: Scene,
-    trials: tuple[Trial, ...],
+    trials: tuple[TrialSpec, ...],
     step_s: float,
     *,
     plan: Plan,
     values: dict[str, Array] | None = None,
     images: bool = True,
-) -> Shot:
+) -> PhysicsRun:
     """The physics of `run_batch`, with the same arguments."""
     values = values_of(scene, trials) if values is None else values
     frames = frame_count(scene)
@@ -203,9 +194,9 @@ def shoot(
     n, dof = len(trials), len(scene.stiffness)
     joints = np.empty((frames, dof, n))
     force = np.zeros((frames, n))
-    slide = np.zeros((frames, n)) if "slide" in state else None
-    film = Film(scene, plan, state, frames if images else 0)
-    joints[0] = state["q"]
+    traces = {name: np.zeros((frames, n)) for name in plan.traces}
+    seen = SensorFrames(scene, plan, state, frames if images else 0)
+    joints[0] = state.q
     sample = plan.sample if images else plan.sample[:1]
     for k in range(1, frames):
         for function in plan.frame:
@@ -213,42 +204,50 @@ def shoot(
         for _ in range(substeps):
             for function in plan.step:
                 function(state)
-        state["t"] = k / rate_hz
+        state.t = k / rate_hz
         for function in sample:
             function(state)
-        joints[k] = state["q"]
-        force[k] = state["force"]
-        if slide is not None:
-            slide[k] = state["slide"]
+        joints[k] = state.q
+        force[k] = state.force
+        for name, quantity in plan.traces.items():
+            traces[name][k] = quantity(state)
         if images:
-            film.expose(k, state)
-    state["frame_t"] = np.arange(frames) / rate_hz
-    return Shot(
-        film=film,
+            seen.take(k, state)
+    return PhysicsRun(
+        frames=seen,
+        t=np.arange(frames) / rate_hz,
         joints=np.ascontiguousarray(joints.transpose(2, 0, 1)),
         force=np.ascontiguousarray(force.T),
-        slide=None if slide is None else np.ascontiguousarray(slide.T),
+        traces={name: np.ascontiguousarray(kept.T) for name, kept in traces.items()},
         state=state,
     )
 
 
-def read_out(shot: Shot, plan: Plan) -> Batch:
+def read_out(physics: PhysicsRun, plan: Plan) -> Batch:
     """The batch as a plan's sensor and clock show it.
 
-    One shot serves any plan that differs in these alone, as long as each of them has some: the
-    film is taken in whole counts where no sensor's effect is called for.
+    One run serves any plan that differs in these alone, as long as each of them has some: the
+    frames are kept in whole counts where no sensor's effect is called for.
     """
-    state = {**shot.state, "joints": shot.joints.copy()}
-    counts, times, kept, valid = shot.film.develop(state, plan)
+    state = physics.state
+    readings = Readings(
+        seed=state.scene.seed,
+        trials=state.trials,
+        t=physics.t,
+        counts=physics.frames.whole(state),
+        joints=physics.joints.copy(),
+    )
+    for function in (*plan.clock, *plan.sensor):
+        function(readings)
     return Batch(
-        trials=state["trials"],
-        t=state["frame_t"],
-        counts=counts,
-        joints=state["joints"],
-        force=shot.force,
-        times=times,
-        kept=kept,
-        valid=valid,
-        slide=shot.slide,
+        trials=state.trials,
+        t=physics.t,
+        counts=physics.frames.in_counts(readings.counts),
+        joints=readings.joints,
+        force=physics.force,
+        times=readings.times,
+        kept=readings.kept,
+        valid=readings.valid,
+        traces=physics.traces,
         state=state,
     )

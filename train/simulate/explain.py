@@ -7,12 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from train.simulate.assemble import make_plan
 from train.simulate.convergence import Convergence, measure
-from train.simulate.engine import Trial, kind_of, run_batch
-from train.simulate.plan import STAGES, Plan, make_plan
-from train.simulate.required_effects import callers
+from train.simulate.engine import kind_of, run_batch
+from train.simulate.plan import STAGES, Plan
+from train.simulate.required_effects import required_effects
 from train.simulate.run import kinds, steps
-from train.simulate.scene_model import Scene
+from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
 
 MEASURED = 64
@@ -20,7 +21,7 @@ MEASURED = 64
 REPEATS = 2
 
 
-class Clock:
+class Stopwatch:
     """Time spent in functions that call each other, each with its own share alone."""
 
     def __init__(self) -> None:
@@ -44,29 +45,29 @@ class Clock:
         return timed
 
 
-def timed_plan(scene: Scene, effects: tuple[str, ...], clock: Clock) -> Plan:
+def timed_plan(scene: Scene, effects: tuple[str, ...], stopwatch: Stopwatch) -> Plan:
     """A plan whose functions report their time under the effect that they belong to."""
-    plan = make_plan(scene, effects, around=clock.around)
+    plan = make_plan(scene, effects, around=stopwatch.around)
     stages: dict[str, Any] = {
-        stage: tuple(clock.around(plan.owners[f], f) for f in getattr(plan, stage))
+        stage: tuple(stopwatch.around(plan.owners[f], f) for f in getattr(plan, stage))
         for stage in STAGES
     }
     return replace(plan, **stages)
 
 
-def costs(scene: Scene, trials: tuple[Trial, ...], step_s: float) -> dict[str, float]:
+def costs(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> dict[str, float]:
     """{effect, or `base`: microseconds a trial} of one kind, the better of two runs.
 
     An effect that takes the place of a base function is charged with all that it does there.
     """
     first = trials[0]
-    effects = kind_of(scene, first.thing, first.condition).effects
+    effects = kind_of(scene, first.object, first.condition).effects
     many = tuple(replace(trials[i % len(trials)], number=i) for i in range(MEASURED))
     best: dict[str, float] = {}
     for _ in range(REPEATS):
-        clock = Clock()
-        run_batch(scene, many, step_s, plan=timed_plan(scene, effects, clock))
-        for name, spent in clock.spent.items():
+        stopwatch = Stopwatch()
+        run_batch(scene, many, step_s, plan=timed_plan(scene, effects, stopwatch))
+        for name, spent in stopwatch.spent.items():
             best[name] = min(best.get(name, spent), spent)
     return {name: best.get(name, 0.0) / MEASURED * 1e6 for name in ("base", *effects)}
 
@@ -86,7 +87,9 @@ def explain(scene: Scene) -> str:
         first = {trial.key: trial for trial in trials}
         for effect in kind.effects:
             seen.add(effect)
-            why = sorted({callers(scene, t.thing, t.condition)[effect] for t in first.values()})
+            why = sorted(
+                {required_effects(scene, t.object, t.condition)[effect] for t in first.values()}
+            )
             lines.append(f"  {effect:<16}{spent[effect]:>9.0f}  {', '.join(why)}")
         plan = make_plan(scene, kind.effects)
         lines.append("  functions: " + ", ".join(f"{len(getattr(plan, s))} {s}" for s in STAGES))

@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
-from train.simulate.contact import Array, Coordinates, State
+from train.simulate.contact import Array, Coordinates
+from train.simulate.state import State
 
 
-def give_way(state: State, drag: Array, inertia: Array) -> tuple[Array, Coordinates]:
+@dataclass
+class Mover:
+    """An object that can move along the push, (n,) each.
+
+    Attributes:
+        inertia: kilograms, as the contact feels it.
+        hold: newtons up to which it stays at rest.
+        drag: newtons against its motion.
+        speed: m/s.
+        slide: metres that it has moved.
+    """
+
+    inertia: Array
+    hold: Array
+    drag: Array
+    speed: Array
+    slide: Array
+
+
+def give_way(state: State, mover: Mover, drag: Array, inertia: Array) -> tuple[Array, Coordinates]:
     """The implicit step of an object that yields: its speed (n,) and the loads.
 
     Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is a further
@@ -18,21 +41,23 @@ def give_way(state: State, drag: Array, inertia: Array) -> tuple[Array, Coordina
         drag: (n,) newtons against the motion.
         inertia: (n,) kilograms.
     """
-    h = state["h"]
+    h = state.h
     soft = h / inertia * h
-    y, c = state["y"], state["compliance"]
-    eased = y[0] - h * state["speed"] + soft * drag
-    loads = state["solve"](state, (eased, *y[1:]), (c[0] + soft, *c[1:]))
-    return state["speed"] + h / inertia * (loads[0] - drag), loads
+    y, c = state.y, state.compliance
+    eased = y[0] - h * mover.speed + soft * drag
+    loads = state.solve(state, (eased, *y[1:]), (c[0] + soft, *c[1:]))
+    return mover.speed + h / inertia * (loads[0] - drag), loads
 
 
-def take(state: State, moved: Array, speed: Array, loads: Coordinates) -> None:
+def advance(
+    state: State, mover: Mover, moved: NDArray[np.bool_], speed: Array, loads: Coordinates
+) -> None:
     """Let the object move where `moved` (n,) says so."""
-    step = state["h"] * speed
-    state["speed"] = np.where(moved, speed, 0.0)
-    state["slide"] = np.where(moved, state["slide"] + step, state["slide"])
-    y = state["y"]
-    state["y"] = (np.where(moved, y[0] - step, y[0]), *y[1:])
-    state["loads"] = tuple(
-        np.where(moved, new, old) for new, old in zip(loads, state["loads"], strict=True)
+    step = state.h * speed
+    mover.speed = np.where(moved, speed, 0.0)
+    mover.slide = np.where(moved, mover.slide + step, mover.slide)
+    y = state.y
+    state.y = (np.where(moved, y[0] - step, y[0]), *y[1:])
+    state.loads = tuple(
+        np.where(moved, new, old) for new, old in zip(loads, state.loads, strict=True)
     )

@@ -78,7 +78,8 @@ class Reader:
             low, high = (self.number(v, key, limits) for v in value)
             if low > high:
                 raise self.fail(
-                    key, f"is a range turned round, [{low:g}, {high:g}]; write [{high:g}, {low:g}]"
+                    key,
+                    f"has a lower limit above the upper one, [{low:g}, {high:g}]; write [{high:g}, {low:g}]",
                 )
             return Value(low, high)
         number = self.number(value, key, limits)

@@ -1,4 +1,4 @@
-"""Which effects a scene calls for, and what called for each."""
+"""Which effects a scene required for, and what called for each."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ from train.simulate.scene_model import Scene, SceneObject
 from train.simulate.schema import EFFECTS, IMPLIED_BY_CONDITION, IMPLIED_BY_FAMILY
 
 
-def callers(scene: Scene, thing: SceneObject, condition: str) -> dict[str, str]:
+def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
     """{effect: what called for it} of one object in one condition, in the plan's order."""
-    calls: dict[str, str] = {}
-    for name in IMPLIED_BY_FAMILY.get(thing.family, ()):
-        calls[name] = f"family {thing.family}"
+    required: dict[str, str] = {}
+    for name in IMPLIED_BY_FAMILY.get(item.family, ()):
+        required[name] = f"family {item.family}"
     for name in IMPLIED_BY_CONDITION.get(condition, ()):
-        calls[name] = condition
+        required[name] = condition
     for name, info in EFFECTS.items():
-        if info.keys and all(key in thing.given for key in info.keys):
-            calls[name] = " and ".join(info.keys)
+        if info.keys and all(key in item.given for key in info.keys):
+            required[name] = " and ".join(info.keys)
     for name in scene.add:
-        if name not in calls and _supports(thing, condition, name):
-            calls[name] = "effects.add"
+        if name not in required and _supports(item, condition, name):
+            required[name] = "effects.add"
     for name in scene.leave_out:
-        calls.pop(name, None)
+        required.pop(name, None)
     while True:
-        gone = [n for n in calls if any(need not in calls for need in EFFECTS[n].needs)]
-        gone += [n for n in calls if any(other in calls for other in EFFECTS[n].excludes)]
+        gone = [n for n in required if any(need not in required for need in EFFECTS[n].needs)]
+        gone += [n for n in required if any(other in required for other in EFFECTS[n].excludes)]
         if not gone:
-            return {name: calls[name] for name in EFFECTS if name in calls}
+            return {name: required[name] for name in EFFECTS if name in required}
         for name in gone:
-            calls.pop(name, None)
+            required.pop(name, None)
 
 
-def _supports(thing: SceneObject, condition: str, name: str) -> bool:
+def _supports(item: SceneObject, condition: str, name: str) -> bool:
     info = EFFECTS[name]
     if any(name in names and condition != c for c, names in IMPLIED_BY_CONDITION.items()):
         return False
-    if info.families and thing.family not in info.families:
+    if info.families and item.family not in info.families:
         return False
-    return all(key in thing.values for key in info.keys)
+    return all(key in item.values for key in info.keys)
 
 
 def check_supported(scene: Scene, where: str) -> None:
@@ -46,9 +46,9 @@ def check_supported(scene: Scene, where: str) -> None:
     Raises:
         InputError: the sentence says what the effect needs.
     """
-    called = [callers(scene, o, c) for o in scene.objects for c in o.conditions]
+    found = [required_effects(scene, o, c) for o in scene.objects for c in o.conditions]
     for name in scene.add:
-        if any(name in calls for calls in called):
+        if any(name in required for required in found):
             continue
         info = EFFECTS[name]
         needs = []

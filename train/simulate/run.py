@@ -14,8 +14,8 @@ from edge import recording
 from edge.errors import InputError
 from edge.recording import Recording
 from train.simulate.convergence import choose_step
-from train.simulate.engine import Batch, Kind, Trial, kind_of, run_batch
-from train.simulate.scene_model import Scene
+from train.simulate.engine import Batch, Kind, kind_of, run_batch
+from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SOFT_FAMILIES
 
 BATCH = 256
@@ -23,13 +23,13 @@ BATCH = 256
 Named = tuple[str, Recording | None]
 
 
-def kinds(scene: Scene) -> dict[Kind, list[Trial]]:
+def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
     """The scene's trials by kind, in the scene's order."""
-    out: dict[Kind, list[Trial]] = {}
-    for thing in scene.objects:
-        for condition in thing.conditions:
-            trials = out.setdefault(kind_of(scene, thing, condition), [])
-            trials += [Trial(thing, condition, number) for number in range(scene.count)]
+    out: dict[Kind, list[TrialSpec]] = {}
+    for item in scene.objects:
+        for condition in item.conditions:
+            trials = out.setdefault(kind_of(scene, item, condition), [])
+            trials += [TrialSpec(item, condition, number) for number in range(scene.count)]
     return out
 
 
@@ -47,17 +47,17 @@ def steps(scene: Scene) -> dict[Kind, float]:
 def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a batch."""
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
-    values = batch.state["values"]
+    values = batch.state.values
     for i, trial in enumerate(batch.trials):
         kept = slice(None) if batch.kept is None else batch.kept[i]
         t = batch.t if batch.times is None else batch.times[i]
-        soft = "soft" if trial.thing.family in SOFT_FAMILIES else "rigid"
+        soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
         name = f"{trial.key}-{trial.number:0{len(str(max(scene.count - 1, 10)))}d}"
         meta: dict[str, Any] = {
             "labels": {
                 "category": f"{soft}-{trial.condition}",
                 "mobility": trial.condition,
-                "object": trial.thing.name,
+                "object": trial.object.name,
             },
             "skin": skin,
             "arm": arm,
@@ -66,8 +66,8 @@ def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str,
             "simulation": {
                 "seed": scene.seed,
                 "step_s": step_s,
-                "family": trial.thing.family,
-                "effects": list(kind_of(scene, trial.thing, trial.condition).effects),
+                "family": trial.object.family,
+                "effects": list(kind_of(scene, trial.object, trial.condition).effects),
                 "values": {k: float(v[i]) for k, v in values.items() if np.isfinite(v[i])},
             },
         }
@@ -84,7 +84,7 @@ def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str,
 
 
 def simulate_part(
-    scene: Scene, trials: tuple[Trial, ...], step_s: float, folder: str | None
+    scene: Scene, trials: tuple[TrialSpec, ...], step_s: float, folder: str | None
 ) -> list[Named]:
     """Simulate one batch; write it where `folder` is given, else give the recordings back."""
     batch = run_batch(scene, trials, step_s)
@@ -98,7 +98,7 @@ def simulate_part(
     return out
 
 
-def parts(scene: Scene, batch: int = BATCH) -> list[tuple[tuple[Trial, ...], float]]:
+def parts(scene: Scene, batch: int = BATCH) -> list[tuple[tuple[TrialSpec, ...], float]]:
     """The scene cut into batches: (trials, step) each."""
     if batch < 1:
         raise InputError(f"--batch must be at least 1, not {batch}")
@@ -164,7 +164,7 @@ def write(
 
 
 def _on_cores(
-    scene: Scene, work: list[tuple[tuple[Trial, ...], float]], folder: str, jobs: int
+    scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], folder: str, jobs: int
 ) -> Iterable[list[Named]]:
     if jobs == 1:
         return (simulate_part(scene, trials, step_s, folder) for trials, step_s in work)
@@ -178,7 +178,7 @@ def _on_cores(
 
 
 def _on_dask(
-    scene: Scene, work: list[tuple[tuple[Trial, ...], float]], address: str | None
+    scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], address: str | None
 ) -> Iterator[list[Named]]:
     try:
         distributed: Any = import_module("distributed")

@@ -12,7 +12,7 @@ from typing import Any
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
-from train.simulate import schema as fields
+from train.simulate import schema
 from train.simulate.reader import Reader, Value
 from train.simulate.required_effects import check_supported
 from train.simulate.scene_model import Scene, SceneObject
@@ -87,7 +87,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         read, read.table(table.get("motion", {}), "motion"), chain
     )
     skin, taxel = _skin(read, read.table(table.get("skin", {}), "skin"))
-    spread = _fields(read, table.get("spread", {}), "spread", fields.SPREAD)
+    spread = _fields(read, table.get("spread", {}), "spread", schema.SPREAD)
     objects = _objects(read, table.get("object"))
     add, leave_out, settings = _effects(read, table.get("effects", {}))
     scene = Scene(
@@ -127,15 +127,15 @@ def _fields(read: Reader, value: object, key: str, known: dict[str, Field]) -> d
 
 
 def _trials(read: Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], Value]:
-    read.known(table, "trials", tuple(fields.TRIALS))
+    read.known(table, "trials", tuple(schema.TRIALS))
     out = {
         name: read.number(table.get(name, limits.default), f"trials.{name}", limits)
-        for name, limits in fields.TRIALS.items()
+        for name, limits in schema.TRIALS.items()
         if name != "lead_s"
     }
     if out["count"] != int(out["count"]):
         raise read.fail("trials.count", f"must be a whole number, not {out['count']!r}")
-    limits = fields.TRIALS["lead_s"]
+    limits = schema.TRIALS["lead_s"]
     return out, read.value(table.get("lead_s", limits.default), "trials.lead_s", limits)
 
 
@@ -146,7 +146,7 @@ def _steps(read: Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, 
     frame = 1.0 / rate_hz
     out: dict[str, float] = {}
     for name, value in table.items():
-        step = read.number(value, f"step_s.{name}", fields.STEP)
+        step = read.number(value, f"step_s.{name}", schema.STEP)
         ratio = frame / step
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6 * ratio:
             raise read.fail(
@@ -205,10 +205,10 @@ def _motion(
 
 def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     shape = tuple(CODY_SKIN)
-    read.known(table, "skin", (*shape, *fields.SKIN))
+    read.known(table, "skin", (*shape, *schema.SKIN))
     layout: dict[str, Any] = {**CODY_SKIN, **{k: table[k] for k in shape if k in table}}
     for name in ("counts_per_newton", "threshold_counts", "onset_counts"):
-        limits = fields.SKIN[name]
+        limits = schema.SKIN[name]
         number = read.number(table.get(name, limits.default), f"skin.{name}", limits)
         if name != "counts_per_newton":
             if number != int(number):
@@ -220,9 +220,9 @@ def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     if skin.radius_m is None or skin.column_angles_deg is None or not skin.wraps:
         raise read.fail("skin", "must be a cylinder: radius_m, column_angles_deg, wraps = true")
     taxel = read.value(
-        table.get("taxel_n_m", fields.SKIN["taxel_n_m"].default),
+        table.get("taxel_n_m", schema.SKIN["taxel_n_m"].default),
         "skin.taxel_n_m",
-        fields.SKIN["taxel_n_m"],
+        schema.SKIN["taxel_n_m"],
     )
     return skin, taxel
 
@@ -246,39 +246,39 @@ def _object(read: Reader, entry: object, index: int) -> SceneObject:
         raise read.fail(key, "name needs a letter or a digit")
     plain = ("name", "family", "conditions")
     family = table.get("family")
-    if family not in fields.FAMILIES:
+    if family not in schema.FAMILIES:
         raise read.fail(
-            f"{key} family", f"must be one of {', '.join(fields.FAMILIES)}, not {family!r}"
+            f"{key} family", f"must be one of {', '.join(schema.FAMILIES)}, not {family!r}"
         )
     family = str(family)
     of_others = {
         k
-        for other, keys in fields.FAMILY_KEYS.items()
+        for other, keys in schema.FAMILY_KEYS.items()
         if other != family
         for k in keys
-        if k not in fields.FAMILY_KEYS[family]
+        if k not in schema.FAMILY_KEYS[family]
     }
-    allowed = tuple(k for k in fields.OBJECT if k not in of_others)
+    allowed = tuple(k for k in schema.OBJECT if k not in of_others)
     read.known(table, f"object {name!r}", (*plain, *allowed))
-    conditions = read.names(table.get("conditions"), f"{key} conditions", fields.CONDITIONS)
+    conditions = read.names(table.get("conditions"), f"{key} conditions", schema.CONDITIONS)
     if not conditions:
         raise read.fail(f"{key} conditions", "must name fixed, movable or both")
     values: dict[str, Value] = {}
     for k in allowed:
-        limits = fields.OBJECT[k]
+        limits = schema.OBJECT[k]
         if k in table:
             values[k] = read.value(table[k], f"{key} {k}", limits)
-        elif k in fields.FAMILY_KEYS[family]:
-            default = fields.FAMILY_KEYS[family][k]
+        elif k in schema.FAMILY_KEYS[family]:
+            default = schema.FAMILY_KEYS[family][k]
             values[k] = Value(default, default)
-        elif limits.default is not None and k not in fields.FAMILY_KEYS[fields.FOLIAGE]:
+        elif limits.default is not None and k not in schema.FAMILY_KEYS[schema.FOLIAGE]:
             values[k] = Value(limits.default, limits.default)
     if "movable" in conditions:
         for k in ("mass_kg", "friction_static", "friction_kinetic"):
             if k not in values:
                 raise read.fail(f"{key} {k}", "is missing: a movable object slides on it")
     _check_pairs(read, key, values)
-    return SceneObject(name, family, conditions, values, frozenset(table) & set(fields.OBJECT))
+    return SceneObject(name, family, conditions, values, frozenset(table) & set(schema.OBJECT))
 
 
 def _check_pairs(read: Reader, key: str, values: dict[str, Value]) -> None:

@@ -11,7 +11,7 @@ from train.simulate.reader import Value
 
 @dataclass(frozen=True)
 class SceneObject:
-    """A thing that the arm meets."""
+    """An object that the arm meets."""
 
     name: str
     family: str
@@ -24,6 +24,40 @@ class SceneObject:
     def slug(self) -> str:
         """The name, fit for a file."""
         return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """The skin's shape: `rows` rings of `cols` taxels around a forearm.
+
+    Attributes:
+        radius_m: of the forearm.
+        row_pitch_m, column_pitch_m: from taxel to taxel, along and around.
+        row0_z_m: z of the first row in the skin's link; the next rows lie below it.
+        column_angles_deg: where the columns' normals point.
+    """
+
+    rows: int
+    cols: int
+    radius_m: float
+    row_pitch_m: float
+    column_pitch_m: float
+    row0_z_m: float
+    column_angles_deg: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class TrialSpec:
+    """Which trial is to be simulated: an object, its condition, and a number that seeds it."""
+
+    object: SceneObject
+    condition: str
+    number: int
+
+    @property
+    def key(self) -> str:
+        """Names the object and its condition in streams and files."""
+        return f"{self.object.slug}-{self.condition}"
 
 
 @dataclass(frozen=True)
@@ -54,6 +88,18 @@ class Scene:
     add: tuple[str, ...]
     leave_out: tuple[str, ...]
     settings: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def cylinder(self) -> Cylinder:
+        """The skin's shape; `load` has made sure that it is a cylinder."""
+        skin = self.skin
+        radius, angles, pitch = skin.radius_m, skin.column_angles_deg, skin.pitch_m
+        along, around = pitch if isinstance(pitch, tuple) else (pitch, pitch)
+        assert radius is not None
+        assert angles is not None
+        assert along is not None
+        assert around is not None
+        return Cylinder(skin.rows, skin.cols, radius, along, around, skin.row0_z_m, tuple(angles))
 
     @property
     def count(self) -> int:

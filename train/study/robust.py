@@ -13,10 +13,10 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import FeatureSeries, TrackSettings
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
-from train.simulate.engine import Trial, kind_of, read_out, shoot
-from train.simulate.plan import make_plan
+from train.simulate.assemble import make_plan
+from train.simulate.engine import kind_of, read_out, run_physics
 from train.simulate.run import parts, recordings
-from train.simulate.scene_model import Scene
+from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
 from train.study.context import Context
 from train.study.score import evaluate, transfer
@@ -75,7 +75,7 @@ def groups(scenes: Mapping[str, Scene]) -> list[list[str]]:
 
 def measured(
     scenes: Mapping[str, Scene],
-    trials: tuple[Trial, ...],
+    trials: tuple[TrialSpec, ...],
     step_s: float,
     wanted: Collection[str],
     layout: SkinLayout,
@@ -98,15 +98,15 @@ def measured(
     """
     first = trials[0]
     plans = {
-        name: make_plan(scene, kind_of(scene, first.thing, first.condition).effects)
+        name: make_plan(scene, kind_of(scene, first.object, first.condition).effects)
         for name, scene in scenes.items()
     }
     shown = next(iter(scenes))
-    shot = shoot(scenes[shown], trials, step_s, plan=plans[shown])
+    physics = run_physics(scenes[shown], trials, step_s, plan=plans[shown])
     found: dict[str, dict[str, FeatureSeries | None]] = {}
     chain = None if chain is None else Remembering(chain)
     for name, scene in scenes.items():
-        batch = recordings(read_out(shot, plans[name]), scene, step_s)
+        batch = recordings(read_out(physics, plans[name]), scene, step_s)
         kept = {file: recording for file, recording in batch if file in wanted}
         contacts = follow(list(kept.values()), layout, tracking, chain)
         found[name] = dict(zip(kept, contacts, strict=True))

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from train.simulate import base
+from train.simulate.arm import Kinematics
 from train.simulate.effects import relaxation, sliding
+from train.simulate.motion import Mover
 from train.simulate.plan import Build
 from train.simulate.scene import from_dict
+from train.simulate.state import Bed, State
 
 
 @dataclass
@@ -59,27 +62,29 @@ class Rig:
         self.steps = [f for s, _, f in sorted(plan.entries, key=lambda e: e[1]) if s == "step"]
         h = np.broadcast_to(np.asarray(h, float), (n,))
         k, d = np.full((1, 1), arm_k), np.full((1, 1), arm_d)
-        self.state = {
-            "n": n,
-            "h": h,
-            "t": np.zeros(n),
-            "start": np.zeros((1, n)),
-            "rate": np.full((1, 1), speed),
-            "travel_s": travel_s,
-            "held": d / h,
-            "give": 1.0 / (d / h + k),
-            "joint_k": k,
-            "q": np.zeros((1, n)),
-            "q_frame": np.zeros((1, n)),
-            "y_frame": (np.zeros(n),),
-            "jacobian": (np.ones((1, n)),),
-            "compliance": (np.broadcast_to(1.0 / (d / h + k), (1, n))[0],),
-            "slopes": np.broadcast_to(slopes, (len(slopes), n)),
-            "intercepts": np.broadcast_to(intercepts, (len(intercepts), n)),
-            "loads": (np.zeros(n),),
-            "values": {key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)},
-            "solve": plan.solve,
-        }
+        scene = plan.scene
+        state = State(
+            scene=scene,
+            skin=scene.cylinder,
+            trials=(),
+            n=n,
+            h=h,
+            values={key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)},
+            kinematics=Kinematics(scene.arm),
+            solve=plan.solve,
+            t=np.zeros(n),
+        )
+        state.start, state.rate, state.travel_s = np.zeros((1, n)), np.full((1, 1), speed), travel_s
+        state.held, state.give, state.joint_k = d / h, 1.0 / (d / h + k), k
+        state.q = state.q_frame = np.zeros((1, n))
+        state.y_frame, state.jacobian = (np.zeros(n),), (np.ones((1, n)),)
+        state.compliance = (np.broadcast_to(state.give, (1, n))[0],)
+        state.loads = (np.zeros(n),)
+        none = np.zeros((1, n))
+        state.bed = Bed(none, none, none, none, slice(0, 1))
+        state.bed.slopes = np.broadcast_to(slopes, (len(slopes), n))
+        state.bed.intercepts = np.broadcast_to(intercepts, (len(intercepts), n))
+        self.state = state
         for s, _, f in sorted(plan.entries, key=lambda e: e[1]):
             if s == "setup" and f in (sliding.stand, relaxation.begin):
                 f(self.state)
@@ -87,18 +92,19 @@ class Rig:
     def run(self, steps: int) -> Trace:
         seen = {name: [] for name in ("t", "force", "q", "target", "slide", "speed", "depth")}
         state = self.state
-        n = state["n"]
+        n = state.n
+        still = Mover(*(np.zeros(n) for _ in range(5)))
         for _ in range(steps):
             for function in self.steps:
                 function(state)
             now = {
-                "t": state["t"],
-                "force": state["loads"][0],
-                "q": state["q"][0],
-                "target": base.equilibrium(state, state["t"])[0],
-                "slide": state.get("slide", np.zeros(n)),
-                "speed": state.get("speed", np.zeros(n)),
-                "depth": state["depth"][0],
+                "t": state.t,
+                "force": state.loads[0],
+                "q": state.q[0],
+                "target": base.equilibrium(state, state.t)[0],
+                "slide": state.own.get(Mover, still).slide,
+                "speed": state.own.get(Mover, still).speed,
+                "depth": state.depth[0],
             }
             for name, value in now.items():
                 seen[name].append(np.broadcast_to(value, (n,)))

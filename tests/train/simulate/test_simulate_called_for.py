@@ -13,9 +13,11 @@ import pytest
 
 from train.simulate import plan as plans
 from train.simulate import streams
+from train.simulate.assemble import make_plan
 from train.simulate.engine import begin, kind_of, run_batch, values_of
-from train.simulate.plan import STAGES, make_plan
-from train.simulate.required_effects import callers
+from train.simulate.motion import Mover
+from train.simulate.plan import STAGES
+from train.simulate.required_effects import required_effects
 from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
@@ -86,30 +88,17 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
         assert before[i].joints.tobytes() == after.joints.tobytes()
 
 
-def test_3_the_state_holds_the_called_effects_keys_alone():
-    bare = scene(leave_out=["sliding"])
-    keys = set(batch_of(bare)[0].state)
-    own = {
-        "sliding": {"inertia", "hold", "drag", "speed", "slide"},
-        "tipping": {"tips", "tip_force", "tip_travel"},
-        "tilt": {"guess", "settled", "lever"},
-        "impact": {"touched", "impact_decay", "impact_omega", "impact_height", "impact_wave"},
-        "relaxation": {
-            "relax_decay",
-            "relax_rise",
-            "relax_gain",
-            "relax_load",
-            "relax_lever",
-        },
-        "dead_taxels": {"valid"},
-        "jitter": {"times"},
-        "dropped_frames": {"kept"},
-        "pop": {"alive", "burst"},
-        "noise": set(),
-        "stribeck": set(),
-        "cover": set(),
-    }
-    assert not keys & set.union(*own.values())
+OWN = {
+    "sliding": {"Mover"},
+    "tipping": {"Tipping"},
+    "tilt": {"Tilt"},
+    "impact": {"Impact"},
+    "relaxation": {"Relaxation"},
+    "stems": {"Stems"},
+}
+
+
+def test_3_only_the_called_effects_state_exists():
     one = scene(
         "tilt",
         "impact",
@@ -119,15 +108,17 @@ def test_3_the_state_holds_the_called_effects_keys_alone():
         "dropped_frames",
         objects=[*everything()],
     )
-    for i, kind in enumerate(kinds(one)):
-        if "stems" in kind.effects:
-            continue
-        state = set(batch_of(one, i)[0].state)
-        expected = keys.union(*(own.get(name, set()) for name in kind.effects))
-        assert state - expected == set(), kind.effects
-        for name in own:
-            if name not in kind.effects:
-                assert not state & own[name], (name, kind.effects)
+    for i, kind in enumerate([*kinds(one)]):
+        batch = batch_of(one, i)[0]
+        expected = set().union(*(OWN.get(name, set()) for name in kind.effects))
+        assert {own.__name__ for own in batch.state.own} == expected, kind.effects
+        assert set(batch.traces) == ({"slide_m"} if "sliding" in kind.effects else set())
+        assert (type(batch.state.bed).__name__ == "BubbleBed") is ("pop" in kind.effects)
+        assert batch.kept is not None
+        assert batch.valid is not None
+    bare = batch_of(scene(leave_out=["sliding"]))[0]
+    assert (bare.state.own, bare.traces) == ({}, {})
+    assert bare.times is bare.kept is bare.valid is None
 
 
 def test_4_adding_an_effect_leaves_the_others_draws():
@@ -207,22 +198,22 @@ def test_6_results_depend_on_neither_batch_nor_chunk(sensor):
 def test_who_called_is_told():
     one = scene("noise", "stribeck", objects=everything())
     foam = next(o for o in one.objects if o.family == "foam")
-    called = callers(one, foam, "movable")
+    called = required_effects(one, foam, "movable")
     assert called["relaxation"] == "family foam"
     assert called["sliding"] == "movable"
     assert called["cover"] == "cover_n_m"
     assert called["tipping"] == "base_m and height_m"
     assert called["noise"] == "effects.add"
-    assert "sliding" not in callers(one, foam, "fixed")
-    assert "stribeck" not in callers(one, foam, "fixed")
+    assert "sliding" not in required_effects(one, foam, "fixed")
+    assert "stribeck" not in required_effects(one, foam, "fixed")
     assert kind_of(one, foam, "fixed") != kind_of(one, foam, "movable")
 
 
 def test_leaving_out_what_is_implied():
     one = scene(leave_out=["relaxation"], objects=everything())
     foam = next(o for o in one.objects if o.family == "foam")
-    assert "relaxation" not in callers(one, foam, "fixed")
-    assert "foundation" in callers(one, foam, "fixed")
+    assert "relaxation" not in required_effects(one, foam, "fixed")
+    assert "foundation" in required_effects(one, foam, "fixed")
 
 
 def test_the_plan_is_flat():
@@ -235,5 +226,5 @@ def test_the_plan_is_flat():
         values_of(scene("tilt"), t),
     )
     assert all(callable(f) for stage in STAGES for f in getattr(plan, stage))
-    assert state["slide"].shape == (3,)
+    assert state.of(Mover).slide.shape == (3,)
     assert plans.STAGES == STAGES

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ from train.simulate import arm, base, contact
 from train.simulate.convergence import measure
 from train.simulate.effects import impact
 from train.simulate.effects.sliding import GRAVITY
+from train.simulate.effects.tipping import Tipping
 from train.simulate.engine import run_batch
 from train.simulate.run import kinds
 from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, Scene, from_dict
@@ -105,15 +107,15 @@ class TestArm:
         batch = run(make(one_object(width_m=0.05)))
         state = batch.state
         poses = arm.Kinematics(Chain.cody()).pose(batch.joints[0].T)
-        point = poses.origin + poses.rotation[:, 2] * state["z"][0]
-        along = ((point - state["face"][:, :1]) * state["normal"][:, :1]).sum(axis=0) + RADIUS
+        point = poses.origin + poses.rotation[:, 2] * state.z[0]
+        along = ((point - state.face[:, :1]) * state.normal[:, :1]).sum(axis=0) + RADIUS
         touched = np.flatnonzero(batch.force[0] > 0.0)
         assert np.abs(along[touched]).max() < 2e-3
-        free = arm.Kinematics(Chain.cody()).pose(
-            base.equilibrium({**state, "start": state["start"][:, :1]}, batch.t[-1])
-        )
-        gone = free.origin[:, 0] + free.rotation[:, 2, 0] * state["z"][0]
-        assert (gone - state["face"][:, 0]) @ state["normal"][:, 0] + RADIUS > 0.12
+        one = copy(state)
+        one.start = state.start[:, :1]
+        free = arm.Kinematics(Chain.cody()).pose(base.equilibrium(one, batch.t[-1]))
+        gone = free.origin[:, 0] + free.rotation[:, 2, 0] * state.z[0]
+        assert (gone - state.face[:, 0]) @ state.normal[:, 0] + RADIUS > 0.12
 
 
 class TestSliding:
@@ -164,7 +166,7 @@ class TestSliding:
             width_m=0.05,
         )
         batch = run(make(thing))
-        start = batch.t[np.argmax(batch.slide[0] > 0.0)] - 0.2
+        start = batch.t[np.argmax(batch.traces["slide_m"][0] > 0.0)] - 0.2
         assert start == pytest.approx(seconds, rel=0.25)
 
     def test_above_six_kilograms_it_does_not_move_in_the_window(self):
@@ -172,7 +174,7 @@ class TestSliding:
             conditions=["movable"], mass_kg=7.0, friction_static=0.4, friction_kinetic=0.35
         )
         batch = run(make(thing))
-        assert batch.slide[0, batch.t < 0.2 + 1.2].max() == 0.0
+        assert batch.traces["slide_m"][0, batch.t < 0.2 + 1.2].max() == 0.0
 
     def test_it_tips_before_it_slides_where_mu_says_so(self):
         height = 0.4
@@ -187,8 +189,8 @@ class TestSliding:
                 width_m=0.05,
             )
             batch = run(make(thing))
-            assert bool(batch.state["tips"][0]) is tips
-            start = int(np.argmax(batch.slide[0] > 0.0))
+            assert bool(batch.state.of(Tipping).tips[0]) is tips
+            start = int(np.argmax(batch.traces["slide_m"][0] > 0.0))
             hold = min(mu, 0.36 / (2 * height)) * GRAVITY
             assert batch.force[0, start - 1] <= hold
             assert batch.force[0, start - 1] > 0.9 * hold
@@ -238,7 +240,7 @@ class TestRelaxation:
         least = np.zeros(40)
         before = force = np.zeros(40)
         for place in np.vstack([np.linspace(0.0, 0.005, 50)[:, None] + np.zeros(40), depth]):
-            rig.state["start"] = place[None]
+            rig.state.start = place[None]
             now = rig.run(1).force[0]
             assert (now >= 0.0).all()
             taken += 0.5 * (force + now) * (place - before)
@@ -256,16 +258,11 @@ class TestBed:
         z = (np.arange(rows) - (rows - 1) / 2.0)[:, None] * row_pitch
         angles = (np.arange(columns) + 0.5)[:, None] * (2.0 * math.pi / columns)
         away = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
-        state = {
-            "scene": SimpleNamespace(),
-            "row_pitch": row_pitch,
-            "weight": np.ones((rows, 1)),
-            "values": {"radius_m": np.array([curve or 1e6])},
-            "stiffness": np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0),
-            "gaps": RADIUS * (1.0 - np.cos(away)),
-        }
+        stiffness = np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
+        gaps = RADIUS * (1.0 - np.cos(away))
+        state = SimpleNamespace(values={"radius_m": np.array([curve or 1e6])})
         depths = depth - base.curve_gap(z, state)
-        loads = contact.spring_loads(depths, state["gaps"], state["stiffness"], state["weight"])
+        loads = contact.spring_loads(depths, gaps, stiffness, np.ones((rows, 1)))
         return loads.sum(), (loads > 0.0).sum() * pitch * row_pitch, rows * row_pitch
 
     @staticmethod
@@ -310,8 +307,9 @@ class TestBed:
             c = float(2.0 ** rng.integers(-12, 2))
             free = float(rng.integers(1, 4000)) / 1024.0
             slopes, intercepts = contact.sort_bed(gaps[:, None], k[:, None])
-            state = {"slopes": slopes, "intercepts": intercepts}
-            (force,) = contact.closed_form(state, (np.array([free]),), (np.array([c]),))
+            (force,) = contact.closed_form(
+                slopes, intercepts, (np.array([free]),), (np.array([c]),)
+            )
             best = Fraction(0)
             total_k = total_b = Fraction(0)
             for g, s in zip(gaps, k, strict=True):
@@ -328,9 +326,9 @@ class TestImpact:
         quiet = run(make(one_object(width_m=0.08), rate_hz=1000, after_s=0.3), 0.001)
         pulse = batch.force[0] - quiet.force[0]
         state = batch.state
-        mass, zeta, v = 1.5, 0.3, state["approach"][0]
-        k = impact.rebound_stiffness(state, 0.5 * mass * state["approach"] ** 2)[0]
-        t = batch.t - state["touched"][0]
+        mass, zeta, v = 1.5, 0.3, state.approach[0]
+        k = impact.rebound_stiffness(state, 0.5 * mass * state.approach**2)[0]
+        t = batch.t - state.of(impact.Impact).touched[0]
         omega = math.sqrt(k / mass)
         want = solve_ivp(
             lambda _, y: [y[1], -2 * zeta * omega * y[1] - omega**2 * y[0]],

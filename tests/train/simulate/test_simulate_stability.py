@@ -10,6 +10,7 @@ import pytest
 from train.simulate import contact
 from train.simulate.effects import tilt
 from train.simulate.effects.sliding import GRAVITY
+from train.simulate.state import Bed
 
 MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
 
@@ -237,11 +238,11 @@ class TestTraps:
         np.testing.assert_allclose(shared[held], force[held], rtol=1e-14)
 
     def test_newton_on_the_tilt_needs_its_line_search(self, monkeypatch):
-        state, free, c = tilt_cases(600, seed=1)
-        left = tilt_error(state, free, c, tilt.solve(state, free, c))
+        beds, free, c = tilt_cases(600, seed=1)
+        left = tilt_error(beds, free, c, tilt_loads(beds, free, c))
         assert left.max() < 1e-9
-        monkeypatch.setattr(tilt, "guarded", lambda state, y, free, c, open_: y)
-        without = tilt_error(state, free, c, tilt.solve(state, free, c))
+        monkeypatch.setattr(tilt, "guarded", lambda bed, lever, y, free, c, open_: y)
+        without = tilt_error(beds, free, c, tilt_loads(beds, free, c))
         assert (without > 1e-6).sum() >= 1
 
     def test_backward_euler_at_10_ms_loses_stick_slip_and_1_ms_keeps_it(self, tools):
@@ -328,23 +329,25 @@ def tilt_cases(n, seed):
     lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
     c00 = 10.0 ** rng.uniform(-3, 0, n)
     c11 = 10.0 ** rng.uniform(-2, 0.5, n)
-    state = {
-        "n": n,
-        "lever": lever,
-        "line_gap": lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
-        "gaps": 0.046 * (1.0 - np.cos(angles)) + np.zeros(n),
-        "stiffness": 10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1)),
-        "weight": np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
-        "lines": slice(0, 16),
-        "bed": contact.line_forces,
-        "guess": (np.zeros(n), np.zeros(n)),
-    }
+    bed = Bed(
+        line_gap=lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
+        gaps=0.046 * (1.0 - np.cos(angles)) + np.zeros(n),
+        stiffness=10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1)),
+        weight=np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
+        lines=slice(0, 16),
+    )
     free = (rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n))
     c = (c00, rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11), c11)
-    return state, free, c
+    return (bed, lever), free, c
 
 
-def tilt_error(state, free, c, loads):
+def tilt_loads(beds, free, c):
+    """The simulator's loads, searched for from none."""
+    nothing = np.zeros_like(free[0])
+    return tilt.search(*beds, (nothing, nothing), free, c)
+
+
+def tilt_error(beds, free, c, loads):
     """Distance from the one answer, metres at the skin: the step that exact Newton would take.
 
     The energy is strictly convex, so a point with no step left is its minimum.
@@ -353,6 +356,6 @@ def tilt_error(state, free, c, loads):
         free[0] - (c[0] * loads[0] + c[1] * loads[1]),
         free[1] - (c[1] * loads[0] + c[2] * loads[1]),
     )
-    bed, h = tilt.answer(state, y)
+    bed, h = tilt.answer(*beds, y)
     p = tilt.newton_step(c, tilt.residual(y, free, c, bed), h)
     return np.abs(p[0]) + 0.1 * np.abs(p[1])

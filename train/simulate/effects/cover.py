@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import State
 
 
 def add(build: Build) -> None:
@@ -17,20 +17,20 @@ def add(build: Build) -> None:
 
 def soften(state: State) -> None:
     """The sleeve in series with what is there."""
-    state["taxel_k"] = 1.0 / (1.0 / state["taxel_k"] + 1.0 / state["values"]["cover_n_m"])
+    state.taxel_k = 1.0 / (1.0 / state.taxel_k + 1.0 / state.values["cover_n_m"])
 
 
 def spread(state: State) -> None:
     """Each neighbour takes its part of a taxel's load; none is lost at the skin's ends."""
-    part, seen = state["values"]["cover_spread"], state["image"]
+    part, seen = state.values["cover_spread"], state.image
     if not seen.shape[1]:
         return
-    rows = state["scene"].skin.rows
+    rows = state.skin.rows
     image = np.zeros((rows, *seen.shape[1:]))
-    image[state["lines"]] = seen
-    state["lines"] = slice(0, rows)
-    first, last = state["image_from"] - 1, state["image_from"] + image.shape[1]
-    window = len(state["columns"])
+    image[state.bed.lines] = seen
+    state.bed.lines = slice(0, rows)
+    first, last = state.image_from - 1, state.image_from + image.shape[1]
+    window = len(state.columns)
     moved = image * part
     wide = np.zeros((image.shape[0], image.shape[1] + 2, image.shape[2]))
     wide[:, 1:-1] = image - 4.0 * moved
@@ -46,4 +46,4 @@ def spread(state: State) -> None:
     if last >= window:
         wide[:, -2] += wide[:, -1]
         wide = wide[:, :-1]
-    state["image"], state["image_from"] = wide, first
+    state.image, state.image_from = wide, first

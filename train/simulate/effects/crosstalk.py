@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
     """Add it to the frames."""
     part = np.float32(build.settings("crosstalk")["part"])
 
-    def couple(state: State) -> None:
+    def couple(readings: Readings) -> None:
         """Counts + part * (sum of the neighbours' counts)."""
-        counts = state["counts"]
+        counts = readings.counts
         leak = counts * part
         counts[:, :, 1:] += leak[:, :, :-1]
         counts[:, :, :-1] += leak[:, :, 1:]
         counts += np.roll(leak, 1, axis=3)
         counts += np.roll(leak, -1, axis=3)
 
-    build.put("sensor", 10, couple)
+    build.read("sensor", 10, couple)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
     """Add it to the frames."""
     band = np.float32(build.settings("dead_band")["counts"])
 
-    def silence(state: State) -> None:
+    def silence(readings: Readings) -> None:
         """Zero below the band."""
-        counts = state["counts"]
+        counts = readings.counts
         counts *= counts >= band
 
-    build.put("sensor", 60, silence)
+    build.read("sensor", 60, silence)

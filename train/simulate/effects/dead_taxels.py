@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import streams
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
     """Add it to the frames."""
     settings = build.settings("dead_taxels")
 
-    def kill(state: State) -> None:
+    def kill(readings: Readings) -> None:
         """Zero where dead."""
-        counts, seed = state["counts"], state["scene"].seed
+        counts, seed = readings.counts, readings.seed
         valid = np.empty((len(counts), *counts.shape[2:]), dtype=bool)
-        for i, trial in enumerate(state["trials"]):
+        for i, trial in enumerate(readings.trials):
             generator = streams.stream(seed, "dead_taxels", trial.key, trial.number)
             valid[i] = generator.random(counts.shape[2:]) >= settings["part"]
         counts *= valid[:, None]
         if settings["known"]:
-            state["valid"] = valid
+            readings.valid = valid
 
-    build.put("sensor", 80, kill)
+    build.read("sensor", 80, kill)

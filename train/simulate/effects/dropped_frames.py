@@ -5,23 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import streams
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
     """Drop frames."""
     part = build.settings("dropped_frames")["part"]
 
-    def drop(state: State) -> None:
+    def drop(readings: Readings) -> None:
         """Which frames (n, frames) arrive; the first one always does."""
-        frames = len(state["frame_t"])
-        kept = np.ones((state["n"], frames), dtype=bool)
-        for i, trial in enumerate(state["trials"]):
-            generator = streams.stream(
-                state["scene"].seed, "dropped_frames", trial.key, trial.number
-            )
+        frames = len(readings.t)
+        kept = np.ones((len(readings.trials), frames), dtype=bool)
+        for i, trial in enumerate(readings.trials):
+            generator = streams.stream(readings.seed, "dropped_frames", trial.key, trial.number)
             kept[i, 1:] = generator.random(frames - 1) >= part
-        state["kept"] = kept
+        readings.kept = kept
 
-    build.put("clock", 20, drop)
+    build.read("clock", 20, drop)

@@ -7,8 +7,8 @@ bears F/L = (4/3) (E/H) d sqrt(2 R d) (Winkler's foundation; Johnson, Contact Me
 from __future__ import annotations
 
 from train.simulate import base
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import State
 
 
 def add(build: Build) -> None:
@@ -18,7 +18,7 @@ def add(build: Build) -> None:
 
 def soften(state: State) -> None:
     """The foam's column in series with the skin's taxel."""
-    values, skin = state["values"], state["scene"].skin
-    pitch = skin.pitch_m if isinstance(skin.pitch_m, tuple) else (skin.pitch_m,) * 2
-    column = values["modulus_pa"] * (pitch[0] * pitch[1]) / values["depth_m"]
-    state["taxel_k"] = 1.0 / (1.0 / state["taxel_k"] + 1.0 / column)
+    values, skin = state.values, state.skin
+    area = skin.row_pitch_m * skin.column_pitch_m
+    column = values["modulus_pa"] * area / values["depth_m"]
+    state.taxel_k = 1.0 / (1.0 / state.taxel_k + 1.0 / column)

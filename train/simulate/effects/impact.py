@@ -7,11 +7,27 @@ form of the time since the touch: the same peak at any step (a stepped impact gi
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import State
+from train.simulate.contact import Array
 from train.simulate.plan import Build
+from train.simulate.state import State
+
+
+@dataclass
+class Impact:
+    """The rebound of each trial: height * exp(-decay t) wave(omega t), t since `touched`."""
+
+    decay: Array
+    omega: Array
+    height: Array
+    wave: Callable[[Array], Any]
+    touched: Array
 
 
 def add(build: Build) -> None:
@@ -21,28 +37,32 @@ def add(build: Build) -> None:
     def ring(state: State) -> None:
         """Frequency and height of the rebound, from the bed's stiffness at its depth."""
         mass, zeta = settings["mass_kg"], settings["damping"]
-        speed = state["approach"]
+        speed = state.approach
         stiffness = rebound_stiffness(state, 0.5 * mass * speed * speed)
         omega = np.sqrt(stiffness / mass)
 
         damped = omega * np.sqrt(np.abs(1.0 - zeta * zeta)) if zeta != 1.0 else omega
-        state["impact_decay"] = zeta * omega
-        state["impact_omega"] = damped
-        state["impact_height"] = stiffness * speed / damped
-        state["impact_wave"] = np.sin if zeta < 1.0 else np.sinh if zeta > 1.0 else np.positive
-        state["touched"] = np.full(state["n"], np.inf)
+        state.keep(
+            Impact(
+                decay=zeta * omega,
+                omega=damped,
+                height=stiffness * speed / damped,
+                wave=np.sin if zeta < 1.0 else np.sinh if zeta > 1.0 else np.positive,
+                touched=np.full(state.n, np.inf),
+            )
+        )
 
     build.put("setup", base.ORDER + 5, ring)
     build.put("step", base.SETTLE - 5, touch)
     build.put("sample", base.BEAR + 10, rebound)
 
 
-def rebound_stiffness(state: State, energy: np.ndarray) -> np.ndarray:
+def rebound_stiffness(state: State, energy: Array) -> Array:
     """K (n,) of the linear spring that takes up `energy` (n,) at the depth at which the bed does.
 
     The bed's energy at depth a is max over its segments' sum; the depth is found by halving.
     """
-    slopes, intercepts = state["slopes"], state["intercepts"]
+    slopes, intercepts = state.bed.slopes, state.bed.intercepts
     steps = np.diff(slopes, axis=0, prepend=0.0)
     gaps = np.diff(intercepts, axis=0, prepend=0.0) / np.where(steps > 0.0, steps, 1.0)
     low = np.zeros_like(energy)
@@ -59,17 +79,19 @@ def rebound_stiffness(state: State, energy: np.ndarray) -> np.ndarray:
 
 def touch(state: State) -> None:
     """The first touch's time: when the free arm met the first spring, within the step."""
-    first = (state["loads"][0] > 0.0) & np.isinf(state["touched"])
+    own = state.of(Impact)
+    first = (state.loads[0] > 0.0) & np.isinf(own.touched)
     if first.any():
-        depth = state["y"][0] - state["intercepts"][0] / state["slopes"][0]
-        since = np.clip(depth / state["approach"], 0.0, state["h"])
-        state["touched"] = np.where(first, state["t"] - since, state["touched"])
+        depth = state.y[0] - state.bed.intercepts[0] / state.bed.slopes[0]
+        since = np.clip(depth / state.approach, 0.0, state.h)
+        own.touched = np.where(first, state.t - since, own.touched)
 
 
 def rebound(state: State) -> None:
     """Add the rebound; the skin can be pressed, never pulled."""
-    since = state["t"] - state["touched"]
+    own = state.of(Impact)
+    since = state.t - own.touched
     since = np.where(since > 0.0, since, 0.0)
-    wave = state["impact_wave"](state["impact_omega"] * since)
-    pulse = state["impact_height"] * np.exp(-state["impact_decay"] * since) * wave
-    state["force"] = np.maximum(state["force"] + pulse, 0.0)
+    wave = own.wave(own.omega * since)
+    pulse = own.height * np.exp(-own.decay * since) * wave
+    state.force = np.maximum(state.force + pulse, 0.0)

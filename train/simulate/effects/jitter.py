@@ -5,24 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import streams
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
     """Shift the frames' times."""
     size = build.settings("jitter")["s"]
 
-    def shift(state: State) -> None:
+    def shift(readings: Readings) -> None:
         """Load and joints between the neighbouring frames, at the shifted times."""
-        counts, joints, t = state["counts"], state["joints"], state["frame_t"]
+        counts, joints, t = readings.counts, readings.joints, readings.t
         frame = t[1] - t[0]
         part = np.zeros((len(joints), len(t)))
-        for i, trial in enumerate(state["trials"]):
-            generator = streams.stream(state["scene"].seed, "jitter", trial.key, trial.number)
+        for i, trial in enumerate(readings.trials):
+            generator = streams.stream(readings.seed, "jitter", trial.key, trial.number)
             drawn = generator.standard_normal(len(t) - 2) * (size / frame)
             part[i, 1:-1] = np.clip(drawn, -0.45, 0.45)
-        state["times"] = t + part * frame
+        readings.times = t + part * frame
         for values in (joints, counts) if counts.shape[1] else (joints,):
             weight = part.reshape(*part.shape, *(1,) * (values.ndim - 2))
             late = np.maximum(weight, 0.0).astype(values.dtype)
@@ -32,4 +32,4 @@ def add(build: Build) -> None:
             mixed[:, 1:] += values[:, :-1] * early[:, 1:]
             values[...] = mixed
 
-    build.put("clock", 10, shift)
+    build.read("clock", 10, shift)

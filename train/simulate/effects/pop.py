@@ -7,17 +7,51 @@ A burst bubble leaves the hard backing, b further on.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import Array, State, share_out, sort_bed, spring_loads, total, touching
+from train.simulate.contact import Array, share_out, sort_bed, spring_loads, total, touching
 from train.simulate.plan import Build
+from train.simulate.state import Bed, State
 
 SLOPES = (1.0, 4.0, 16.0)
 """Of the tangents, times k0."""
 BREAKS = (1.0 / 3.0, 2.0 / 3.0)
 """Depths at which they cross, times b."""
 SEGMENTS = len(SLOPES) + 1
+
+
+@dataclass
+class BubbleBed(Bed):
+    """A bed of which some springs are gone: those of burst bubbles.
+
+    Attributes:
+        alive: (rows, SEGMENTS * C, n) 1 where a spring bears, 0 where it is gone or still to come.
+        burst: a bubble has burst in the frame before.
+    """
+
+    alive: Array
+    burst: bool
+
+    def forces(self, depths: Array) -> tuple[Array, Array]:
+        """(L, n) force and stiffness of each line at its depth (L, n)."""
+        some = touching(self.gaps, depths.max(axis=0))
+        if some.stop == 0:
+            return np.zeros_like(depths), np.zeros_like(depths)
+        alive = self.alive[self.lines, some].swapaxes(0, 1)
+        inside = depths - self.gaps[some, None]
+        held = (inside > 0.0) * self.stiffness[some, None]
+        held *= alive
+        inside *= held
+        return total(inside) * self.weight, total(held) * self.weight
+
+
+def bubbles(state: State) -> BubbleBed:
+    """The bed, which is one of bubbles here."""
+    assert isinstance(state.bed, BubbleBed)
+    return state.bed
 
 
 def add(build: Build) -> None:
@@ -32,81 +66,74 @@ def add(build: Build) -> None:
 
 def inflate(state: State) -> None:
     """Each column becomes four springs: three tangents, and the backing for after the burst."""
-    values, skin = state["values"], state["taxel_k"]
+    values, skin = state.values, state.taxel_k
     k0, height = values["bubble_n_m"], values["bubble_m"]
     slopes = [1.0 / (1.0 / skin + 1.0 / (k0 * s)) for s in SLOPES]
     first = k0 * height * BREAKS[0] / slopes[0]
     second = first + k0 * SLOPES[1] * height * (BREAKS[1] - BREAKS[0]) / slopes[1]
-    gaps, reach = state["gaps"], state["reach"]
-    state["stiffness"] = np.concatenate(
-        [
-            reach * slopes[0],
-            reach * (slopes[1] - slopes[0]),
-            reach * (slopes[2] - slopes[1]),
-            reach * skin,
-        ]
-    )
-    state["gaps"] = np.concatenate([gaps, gaps + first, gaps + second, gaps + height])
-    rows, (columns, n) = len(state["weight"]), gaps.shape
+    gaps, reach = state.column_gaps, state.reach
+    rows, (columns, n) = len(state.bed.weight), gaps.shape
     alive = np.zeros((rows, SEGMENTS, columns, n))
     alive[:, :-1] = 1.0
-    state["alive"] = alive.reshape(rows, SEGMENTS * columns, n)
-    state["bed"] = line_forces
-    state["burst"] = False
+    state.bed = BubbleBed(
+        gaps=np.concatenate([gaps, gaps + first, gaps + second, gaps + height]),
+        stiffness=np.concatenate(
+            [
+                reach * slopes[0],
+                reach * (slopes[1] - slopes[0]),
+                reach * (slopes[2] - slopes[1]),
+                reach * skin,
+            ]
+        ),
+        weight=state.bed.weight,
+        line_gap=state.bed.line_gap,
+        lines=state.bed.lines,
+        alive=alive.reshape(rows, SEGMENTS * columns, n),
+        burst=False,
+    )
 
 
 def order(state: State) -> None:
     """The bed's law as lines K a - B, over the bubbles that are whole."""
-    n = state["n"]
-    stiffness = state["weight"][:, None] * (state["stiffness"][None] * state["alive"])
-    gaps = state["line_gap"][:, None] + np.broadcast_to(state["gaps"], stiffness.shape)
-    state["slopes"], state["intercepts"] = sort_bed(gaps.reshape(-1, n), stiffness.reshape(-1, n))
-
-
-def line_forces(state: State, depths: Array) -> tuple[Array, Array]:
-    """(L, n) force and stiffness of each line at its depth (L, n)."""
-    some = touching(state["gaps"], depths.max(axis=0))
-    if some.stop == 0:
-        return np.zeros_like(depths), np.zeros_like(depths)
-    alive = state["alive"][state["lines"], some].swapaxes(0, 1)
-    inside = depths - state["gaps"][some, None]
-    held = (inside > 0.0) * state["stiffness"][some, None]
-    held *= alive
-    inside *= held
-    return total(inside) * state["weight"], total(held) * state["weight"]
+    bed, n = bubbles(state), state.n
+    stiffness = bed.weight[:, None] * (bed.stiffness[None] * bed.alive)
+    gaps = bed.line_gap[:, None] + np.broadcast_to(bed.gaps, stiffness.shape)
+    bed.slopes, bed.intercepts = sort_bed(gaps.reshape(-1, n), stiffness.reshape(-1, n))
 
 
 def image(state: State) -> None:
     """The force shared out among springs, then the four springs of each taxel together."""
-    rows, n = state["weight"].shape
-    depth = np.broadcast_to(state["line_depth"], (rows, n))
-    held = np.where(state["force"] > 0.0, depth.max(axis=0), -np.inf)
-    columns = len(state["reach"])
-    some = touching(state["gaps"][:columns], held)
+    bed = bubbles(state)
+    rows, n = bed.weight.shape
+    depth = np.broadcast_to(state.line_depth, (rows, n))
+    held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
+    columns = len(state.reach)
+    some = touching(bed.gaps[:columns], held)
     kinds = (SEGMENTS, columns, n)
-    gaps = state["gaps"].reshape(kinds)[:, some].reshape(-1, n)
-    stiffness = state["stiffness"].reshape(kinds)[:, some].reshape(-1, n)
-    loads = spring_loads(depth, gaps, stiffness, state["weight"])
-    alive = state["alive"][state["lines"]].reshape(rows, *kinds)
+    gaps = bed.gaps.reshape(kinds)[:, some].reshape(-1, n)
+    stiffness = bed.stiffness.reshape(kinds)[:, some].reshape(-1, n)
+    loads = spring_loads(depth, gaps, stiffness, bed.weight)
+    alive = bed.alive[bed.lines].reshape(rows, *kinds)
     loads *= alive[:, :, some].reshape(loads.shape)
-    shared = share_out(state["force"], loads).reshape(rows, SEGMENTS, -1, n)
-    state["image"] = total(np.moveaxis(shared, 1, 0))
-    state["image_from"] = some.start
+    shared = share_out(state.force, loads).reshape(rows, SEGMENTS, -1, n)
+    state.image = total(np.moveaxis(shared, 1, 0))
+    state.image_from = some.start
 
 
 def burst(state: State) -> None:
     """Bubbles under more than they hold are gone from the next frame on."""
-    gone = state["image"] > state["values"]["pop_n"]
-    state["burst"] = bool(gone.any())
-    if state["burst"]:
-        some = slice(state["image_from"], state["image_from"] + gone.shape[1])
-        rows, _, n = state["alive"].shape
-        alive = state["alive"].reshape(rows, SEGMENTS, -1, n)[state["lines"]]
+    bed = bubbles(state)
+    gone = state.image > state.values["pop_n"]
+    bed.burst = bool(gone.any())
+    if bed.burst:
+        some = slice(state.image_from, state.image_from + gone.shape[1])
+        rows, _, n = bed.alive.shape
+        alive = bed.alive.reshape(rows, SEGMENTS, -1, n)[bed.lines]
         alive[:, :-1, some] *= ~gone[:, None]
         alive[:, -1, some] = np.maximum(alive[:, -1, some], gone)
 
 
 def reorder(state: State) -> None:
     """The law without them."""
-    if state["burst"]:
+    if bubbles(state).burst:
         order(state)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
     """Add it to the frames."""
     step = np.float32(build.settings("quantisation")["counts"])
 
-    def convert(state: State) -> None:
+    def convert(readings: Readings) -> None:
         """The nearest whole number of steps."""
-        counts = state["counts"]
+        counts = readings.counts
         counts /= step
         np.rint(counts, out=counts)
         counts *= step
 
-    build.put("sensor", 70, convert)
+    build.read("sensor", 70, convert)

@@ -7,11 +7,31 @@ z+ = e z + r phi (F_e+ - F_e), e = exp(-h / tau), phi = (1 - e) tau / h.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import Coordinates, State, relieve
+from train.simulate.contact import Array, Coordinates, relieve
 from train.simulate.plan import Build
+from train.simulate.state import State
+
+
+@dataclass
+class Relaxation:
+    """The second spring and its dashpot.
+
+    Attributes:
+        decay, rise, gain: (n,) e, r phi and 1 + r phi of a step.
+        load: (n,) newtons, Z: what is there before the elastic part answers.
+        lever: (n,) metres, of the moment to the force at the step before, where there is one.
+    """
+
+    decay: Array
+    rise: Array
+    gain: Array
+    load: Array
+    lever: Coordinates
 
 
 def add(build: Build) -> None:
@@ -24,8 +44,9 @@ def add(build: Build) -> None:
         Z is a load that is there already; the rest is the elastic law with its compliance
         scaled, so the closed form stays. A contact never pulls: there F = 0.
         """
-        gain, before = state["relax_gain"], state["relax_load"]
-        there = (before, *(before * lever for lever in state["relax_lever"]))
+        own = state.of(Relaxation)
+        gain, before = own.gain, own.load
+        there = (before, *(before * lever for lever in own.lever))
         loads = elastic(state, relieve(y, c, there), tuple(gain * ci for ci in c))
         total = gain * loads[0] + before
         holds = (loads[0] > 0.0) & (total > 0.0)
@@ -40,20 +61,26 @@ def add(build: Build) -> None:
 
 def begin(state: State) -> None:
     """No load yet; the step's factors."""
-    values = state["values"]
-    part = state["h"] / values["relax_s"]
-    state["relax_decay"] = np.exp(-part)
-    state["relax_rise"] = values["relax_ratio"] * (-np.expm1(-part) / part)
-    state["relax_gain"] = 1.0 + state["relax_rise"]
-    state["relax_load"] = np.zeros(state["n"])
-    state["relax_lever"] = tuple(np.zeros(state["n"]) for _ in state["loads"][1:])
+    values = state.values
+    part = state.h / values["relax_s"]
+    rise = values["relax_ratio"] * (-np.expm1(-part) / part)
+    state.keep(
+        Relaxation(
+            decay=np.exp(-part),
+            rise=rise,
+            gain=1.0 + rise,
+            load=np.zeros(state.n),
+            lever=tuple(np.zeros(state.n) for _ in state.loads[1:]),
+        )
+    )
 
 
 def relax(state: State) -> None:
     """What the step's loads leave behind for the next."""
-    force, *moments = state["loads"]
-    elastic = np.maximum((force - state["relax_load"]) / state["relax_gain"], 0.0)
+    own = state.of(Relaxation)
+    force, *moments = state.loads
+    elastic = np.maximum((force - own.load) / own.gain, 0.0)
     viscous = force - elastic
-    state["relax_load"] = state["relax_decay"] * viscous - state["relax_rise"] * elastic
+    own.load = own.decay * viscous - own.rise * elastic
     some = np.where(force > 0.0, force, 1.0)
-    state["relax_lever"] = tuple(moment / some for moment in moments)
+    own.lever = tuple(moment / some for moment in moments)

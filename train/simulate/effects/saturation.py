@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.contact import State
 from train.simulate.plan import Build
+from train.simulate.state import Readings
 
 
 def add(build: Build) -> None:
@@ -13,8 +13,8 @@ def add(build: Build) -> None:
     scale = build.scene.skin.counts_per_newton or 1.0
     limit = np.float32(build.settings("saturation")["newton"] * scale)
 
-    def clip(state: State) -> None:
+    def clip(readings: Readings) -> None:
         """At most the limit."""
-        np.minimum(state["counts"], limit, out=state["counts"])
+        np.minimum(readings.counts, limit, out=readings.counts)
 
-    build.put("sensor", 50, clip)
+    build.read("sensor", 50, clip)

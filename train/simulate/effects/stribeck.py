@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import State
 from train.simulate.effects.sliding import GRAVITY
+from train.simulate.motion import Mover
 from train.simulate.plan import Build
+from train.simulate.state import State
 
 
 def add(build: Build) -> None:
@@ -17,8 +18,9 @@ def add(build: Build) -> None:
 
 def ease(state: State) -> None:
     """mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), at the speed before the step."""
-    values = state["values"]
+    values = state.values
     kinetic, static = values["friction_kinetic"], values["friction_static"]
-    part = state["speed"] / values["stribeck_m_s"]
+    mover = state.of(Mover)
+    part = mover.speed / values["stribeck_m_s"]
     mu = kinetic + (static - kinetic) * np.exp(-(part * part))
-    state["drag"] = mu * (values["mass_kg"] * GRAVITY)
+    mover.drag = mu * (values["mass_kg"] * GRAVITY)

@@ -8,13 +8,17 @@ search on the slope takes over (`guarded`).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.errors import EdgeError
 from train.simulate import base
 from train.simulate.arm import cross, dot
-from train.simulate.contact import Array, Coordinates, State, total
+from train.simulate.contact import Array, Coordinates, total
 from train.simulate.plan import Build
+from train.simulate.state import Bed, State
 
 ROUNDS = 8
 """Plain Newton rounds before the line search takes over; two or three are usual."""
@@ -22,6 +26,21 @@ GUARDED_ROUNDS = 5000
 """A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
 CLOSE = (1e-14, 1e-13)
 """Metres and radians: a step below it is rounding."""
+
+
+@dataclass
+class Tilt:
+    """The pivoting forearm's own state.
+
+    Attributes:
+        guess: loads with which the next step's search begins.
+        settled: loads of the step before.
+        lever: (L, n) metres along the forearm from the face's middle to each line.
+    """
+
+    guess: Coordinates
+    settled: Coordinates
+    lever: Array
 
 
 def add(build: Build) -> None:
@@ -35,42 +54,40 @@ def add(build: Build) -> None:
 
 def upright(state: State) -> None:
     """No load yet."""
-    state["loads"] = state["guess"] = state["settled"] = (
-        np.zeros(state["n"]),
-        np.zeros(state["n"]),
-    )
+    state.loads = (np.zeros(state.n), np.zeros(state.n))
+    state.keep(Tilt(guess=state.loads, settled=state.loads, lever=np.zeros((1, state.n))))
 
 
 def pivot(state: State) -> None:
     """Depth and tilt against the object's face at the frame's joint angles, with their
     Jacobians; which rows the face covers, and their levers about its middle."""
-    skin = state["scene"].skin
-    pose = state["kinematics"].pose(state["q"])
-    state["pose"] = pose
-    along, normal = pose.rotation[:, 2], state["normal"]
-    row_z = state["row_z"]
-    away = pose.origin - state["face"]
+    skin = state.skin
+    pose = state.kinematics.pose(state.q)
+    state.pose = pose
+    along, normal = pose.rotation[:, 2], state.normal
+    row_z = state.row_z
+    away = pose.origin - state.face
     z = np.clip(-dot(away, along), float(row_z.min()), float(row_z.max()))
     tilt = dot(normal, along)
     upright = np.sqrt(1.0 - tilt * tilt)
-    on_face = dot(away, state["along_face"]) + row_z * dot(along, state["along_face"])
+    on_face = dot(away, state.along_face) + row_z * dot(along, state.along_face)
     weight = base.covered(on_face, state)
     rows = np.flatnonzero(weight.any(axis=1))
     lines = slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 1)
-    state["lines"] = lines
-    state["weight"] = weight[lines]
-    state["line_gap"] = base.curve_gap(on_face[lines], state)
-    state["lever"] = row_z[lines] - z
+    state.bed.lines = lines
+    state.bed.weight = weight[lines]
+    state.bed.line_gap = base.curve_gap(on_face[lines], state)
+    state.of(Tilt).lever = row_z[lines] - z
     depth = dot(away + along * z, normal) + skin.radius_m * upright
     crossed = cross(normal[:, None], pose.axes)
     turn = dot(along[:, None], crossed)
     push = dot((pose.origin + along * z)[:, None] - pose.origins, crossed)
     push = push - (skin.radius_m * tilt / upright) * turn
-    give = state["give"]
-    state["q_frame"] = state["q"]
-    state["jacobian"] = (push, turn)
-    state["y_frame"] = (depth, tilt)
-    state["compliance"] = (
+    give = state.give
+    state.q_frame = state.q
+    state.jacobian = (push, turn)
+    state.y_frame = (depth, tilt)
+    state.compliance = (
         dot(push * push, give),
         dot(push * turn, give),
         dot(turn * turn, give),
@@ -79,22 +96,21 @@ def pivot(state: State) -> None:
 
 def bear(state: State) -> None:
     """The force that the skin bears, and each line's depth."""
-    state["force"] = state["loads"][0]
-    depth, tilt = state["depth"]
-    state["line_depth"] = depth + state["lever"] * tilt - state["line_gap"]
+    state.force = state.loads[0]
+    depth, tilt = state.depth
+    state.line_depth = depth + state.of(Tilt).lever * tilt - state.bed.line_gap
 
 
 def remember(state: State) -> None:
     """The next step's loads will go on as these did."""
-    before, loads = state["settled"], state["loads"]
-    state["guess"] = tuple(2.0 * new - old for new, old in zip(loads, before, strict=True))
-    state["settled"] = loads
+    own, loads = state.of(Tilt), state.loads
+    own.guess = tuple(2.0 * new - old for new, old in zip(loads, own.settled, strict=True))
+    own.settled = loads
 
 
-def answer(state: State, y: Coordinates) -> tuple[Coordinates, Coordinates]:
+def answer(bed: Bed, lever: Array, y: Coordinates) -> tuple[Coordinates, Coordinates]:
     """Loads (F, M) at y, and the stiffness there: total, mean lever, spread about the mean."""
-    lever = state["lever"]
-    force, stiffness = state["bed"](state, y[0] + lever * y[1] - state["line_gap"])
+    force, stiffness = bed.forces(y[0] + lever * y[1] - bed.line_gap)
     whole = total(stiffness)
     mean = total(stiffness * lever) / np.where(whole > 0.0, whole, 1.0)
     off = lever - mean
@@ -126,13 +142,21 @@ def residual(y: Coordinates, free: Coordinates, c: Coordinates, f: Coordinates) 
 
 def solve(state: State, free: Coordinates, c: Coordinates) -> Coordinates:
     """The loads (F, M) at which arm and bed agree."""
-    force, moment = state["guess"]
+    own = state.of(Tilt)
+    return search(state.bed, own.lever, own.guess, free, c)
+
+
+def search(
+    bed: Bed, lever: Array, guess: Coordinates, free: Coordinates, c: Coordinates
+) -> Coordinates:
+    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them."""
+    force, moment = guess
     y: Coordinates = (
         free[0] - (c[0] * force + c[1] * moment),
         free[1] - (c[1] * force + c[2] * moment),
     )
     done = np.zeros(len(force), dtype=bool)
-    loads, h = answer(state, y)
+    loads, h = answer(bed, lever, y)
     for _ in range(ROUNDS):
         p = newton_step(c, residual(y, free, c, loads), h)
         # A trial that is done stays as it is, whatever its neighbours in the batch still need.
@@ -140,10 +164,10 @@ def solve(state: State, free: Coordinates, c: Coordinates) -> Coordinates:
         if done.all():
             break
         y = (np.where(done, y[0], y[0] - p[0]), np.where(done, y[1], y[1] - p[1]))
-        loads, h = answer(state, y)
+        loads, h = answer(bed, lever, y)
     else:
-        y = guarded(state, y, free, c, ~done)
-        loads, h = answer(state, y)
+        y = guarded(bed, lever, y, free, c, ~done)
+        loads, h = answer(bed, lever, y)
     return agree(y, free, c, loads, h[0])
 
 
@@ -163,7 +187,12 @@ def agree(
 
 
 def guarded(
-    state: State, y: Coordinates, free: Coordinates, c: Coordinates, open_: Array
+    bed: Bed,
+    lever: Array,
+    y: Coordinates,
+    free: Coordinates,
+    c: Coordinates,
+    open_: NDArray[np.bool_],
 ) -> Coordinates:
     """Newton with a line search, for the trials `open_` (n,) that plain Newton left.
 
@@ -171,26 +200,21 @@ def guarded(
     turned uphill by more than half of what it began with is cut back along its secant.
     """
     where = np.flatnonzero(open_)
-    part: State = {
-        key: state[key][..., where] if state[key].shape[-1] > 1 else state[key]
-        for key in ("lever", "line_gap", "gaps", "stiffness", "weight", "alive")
-        if key in state
-    }
-    part["bed"], part["lines"] = state["bed"], state["lines"]
+    part, levers = bed.take(where), lever[..., where]
     y_, free_ = tuple(v[where] for v in y), tuple(v[where] for v in free)
     c_ = tuple(np.broadcast_to(v, open_.shape)[where] for v in c)
     det = c_[0] * c_[2] - c_[1] * c_[1]
 
     def slope(at: Coordinates, p: Coordinates) -> Array:
         d0, d1 = at[0] - free_[0], at[1] - free_[1]
-        loads, _ = answer(part, at)
+        loads, _ = answer(part, levers, at)
         g0 = (c_[2] * d0 - c_[1] * d1) / det + loads[0]
         g1 = (c_[0] * d1 - c_[1] * d0) / det + loads[1]
         return -(p[0] * g0 + p[1] * g1)
 
     small = np.zeros(len(where), dtype=bool)
     for _ in range(GUARDED_ROUNDS):
-        loads, h = answer(part, y_)
+        loads, h = answer(part, levers, y_)
         p = newton_step(c_, residual(y_, free_, c_, loads), h)
         small |= (np.abs(p[0]) <= CLOSE[0]) & (np.abs(p[1]) <= CLOSE[1])
         if small.all():

@@ -8,13 +8,26 @@ taken explicitly makes no energy) and the rest implicitly.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from train.simulate import base
-from train.simulate.contact import State
+from train.simulate.contact import Array
 from train.simulate.effects import sliding
-from train.simulate.motion import give_way, take
+from train.simulate.motion import Mover, advance, give_way
 from train.simulate.plan import Build
+from train.simulate.state import State
+
+
+@dataclass
+class Tipping:
+    """Which trials' objects tip, the push that starts it, and the travel until they fall."""
+
+    tips: NDArray[np.bool_]
+    force: Array
+    travel: Array
 
 
 def add(build: Build) -> None:
@@ -29,26 +42,31 @@ def balance(state: State) -> None:
     The object is taken for a box twice as high as the contact: its moment of inertia about the
     edge is m (base^2 + 4 height^2) / 3, felt at the contact as that over height^2.
     """
-    values = state["values"]
+    values = state.values
     foot, height = values["base_m"], values["height_m"]
-    state["tips"] = values["friction_static"] > foot / (2.0 * height)
-    state["tip_force"] = values["mass_kg"] * sliding.GRAVITY * foot / (2.0 * height)
-    state["tip_travel"] = height * np.arctan2(foot, 2.0 * height)
+    own = Tipping(
+        tips=values["friction_static"] > foot / (2.0 * height),
+        force=values["mass_kg"] * sliding.GRAVITY * foot / (2.0 * height),
+        travel=height * np.arctan2(foot, 2.0 * height),
+    )
+    state.keep(own)
+    mover = state.of(Mover)
     turned = values["mass_kg"] * (foot * foot / (height * height) + 4.0) / 3.0
-    state["inertia"] = np.where(state["tips"], turned, values["mass_kg"])
-    state["hold"] = np.where(state["tips"], state["tip_force"], state["hold"])
+    mover.inertia = np.where(own.tips, turned, values["mass_kg"])
+    mover.hold = np.where(own.tips, own.force, mover.hold)
 
 
 def topple(state: State) -> None:
     """As `sliding.slip`, but a leaning object moves either way and rests on its foot alone."""
-    tips, slide = state["tips"], state["slide"]
-    leans = tips & (slide > 0.0)
-    moving = leans | (state["speed"] > 0.0) | (state["loads"][0] > state["hold"])
+    own, mover = state.of(Tipping), state.of(Mover)
+    slide = mover.slide
+    leans = own.tips & (slide > 0.0)
+    moving = leans | (mover.speed > 0.0) | (state.loads[0] > mover.hold)
     if not moving.any():
         return
-    left = np.maximum(1.0 - slide / state["tip_travel"], 0.0)
-    drag = np.where(tips, state["tip_force"] * left, state["drag"])
-    speed, loads = give_way(state, drag, state["inertia"])
-    lands = leans & (slide + state["h"] * speed <= 0.0)
-    take(state, moving & ((speed > 0.0) | leans) & ~lands, speed, loads)
-    state["slide"] = np.where(lands, 0.0, state["slide"])
+    left = np.maximum(1.0 - slide / own.travel, 0.0)
+    drag = np.where(own.tips, own.force * left, mover.drag)
+    speed, loads = give_way(state, mover, drag, mover.inertia)
+    lands = leans & (slide + state.h * speed <= 0.0)
+    advance(state, mover, moving & ((speed > 0.0) | leans) & ~lands, speed, loads)
+    mover.slide = np.where(lands, 0.0, mover.slide)

@@ -1,0 +1,167 @@
+"""What a batch of trials carries from step to step, and what its sensors make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from typing import Any, Self, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from train.simulate.arm import Array, Kinematics, Pose
+from train.simulate.contact import Coordinates, touching
+from train.simulate.contact import total as sum_first
+from train.simulate.scene_model import Cylinder, Scene, TrialSpec
+
+Own = TypeVar("Own")
+
+
+@dataclass
+class Bed:
+    """The springs between skin and object: L lines (rows, or stems) of C springs (columns).
+
+    Attributes:
+        gaps: (C, n) metres at which a spring is touched, at zero depth of its line.
+        stiffness: (C, n) newtons a metre.
+        weight: (L, n) the part of each line that the object covers.
+        line_gap: (L, n) metres by which the object's face draws back; (1, n) where it is flat.
+        lines: rows of the skin that the lines stand for.
+        slopes, intercepts: (E, n) the law of the whole bed, phi(a) = max_s (K_s a - B_s).
+    """
+
+    gaps: Array
+    stiffness: Array
+    weight: Array
+    line_gap: Array
+    lines: slice
+    slopes: Array = field(init=False)
+    intercepts: Array = field(init=False)
+
+    def forces(self, depths: Array) -> tuple[Array, Array]:
+        """(L, n) force and stiffness of each line at its depth (L, n)."""
+        some = touching(self.gaps, depths.max(axis=0))
+        if some.stop == 0:
+            return np.zeros_like(depths), np.zeros_like(depths)
+        inside = depths - self.gaps[some, None]
+        held = (inside > 0.0) * self.stiffness[some, None]
+        inside *= held
+        return sum_first(inside) * self.weight, sum_first(held) * self.weight
+
+    def take(self, where: NDArray[np.intp]) -> Self:
+        """The bed of some of the trials."""
+        part = object.__new__(type(self))
+        for item in fields(self):
+            value = getattr(self, item.name, None)
+            if isinstance(value, np.ndarray):
+                value = value[..., where] if value.shape[-1] > 1 else value
+            setattr(part, item.name, value)
+        return part
+
+
+@dataclass
+class State:
+    """A batch of n trials, from its first step to its last.
+
+    The base's functions set what is declared here; an effect keeps a dataclass of its own
+    (`own`), so the state of an effect that is not called for does not exist.
+
+    Attributes:
+        h: seconds, the step.
+        values: {name: (n,)} of what was drawn for each trial.
+        solve: (state, y, C) -> the loads at which arm and bed agree.
+        own: {class: instance}, the called effects' own state.
+        start, rate: (dof, n) and (dof, 1), the equilibrium point at t = 0 and its speed.
+        held, give, joint_k: (dof, 1) of a joint's step: what damping holds, the compliance
+            of the whole, the spring.
+        q, q_free, q_frame: (dof, n) radians: now, after the step without load, at the frame.
+        approach: (n,) m/s along the push before the contact.
+        normal, face, along_face: (3, n) the object's face: its normal, a point, the direction
+            along the forearm.
+        y, y_frame, loads, compliance, jacobian, depth: of the contact's coordinates
+            (`contact`).
+        force: (n,) newtons that the skin bears.
+        image: (rows, columns, n) newtons a taxel, from column `image_from` of `columns` on.
+    """
+
+    scene: Scene
+    skin: Cylinder
+    trials: tuple[TrialSpec, ...]
+    n: int
+    h: float | Array
+    values: dict[str, Array]
+    kinematics: Kinematics
+    solve: Solver
+    own: dict[type, Any] = field(default_factory=dict)
+
+    t: float | Array = 0.0
+    travel_s: float = field(init=False)
+    start: Array = field(init=False)
+    rate: Array = field(init=False)
+    held: Array = field(init=False)
+    give: Array = field(init=False)
+    joint_k: Array = field(init=False)
+    q: Array = field(init=False)
+    q_free: Array = field(init=False)
+    q_frame: Array = field(init=False)
+    pose: Pose = field(init=False)
+
+    row_z: Array = field(init=False)
+    z: Array = field(init=False)
+    approach: Array = field(init=False)
+    normal: Array = field(init=False)
+    face: Array = field(init=False)
+    along_face: Array = field(init=False)
+    meeting_angle: Array = field(init=False)
+    columns: NDArray[np.intp] = field(init=False)
+    column_gaps: Array = field(init=False)
+    reach: Array = field(init=False)
+    taxel_k: Array = field(init=False)
+    bed: Bed = field(init=False)
+
+    y: Coordinates = field(init=False)
+    y_frame: Coordinates = field(init=False)
+    jacobian: Coordinates = field(init=False)
+    compliance: Coordinates = field(init=False)
+    loads: Coordinates = field(init=False)
+    depth: Coordinates = field(init=False)
+
+    force: Array = field(init=False)
+    line_depth: Array = field(init=False)
+    image: Array = field(init=False)
+    image_from: int = field(init=False)
+
+    def of(self, kind: type[Own]) -> Own:
+        """An effect's own state."""
+        return cast(Own, self.own[kind])
+
+    def keep(self, own: object) -> None:
+        """Put an effect's own state where `of` finds it."""
+        self.own[type(own)] = own
+
+
+Solver = Callable[[State, Coordinates, Coordinates], Coordinates]
+
+
+@dataclass
+class Readings:
+    """What the sensors of a batch read, all frames at once.
+
+    Attributes:
+        seed: the scene's.
+        t: (frames,) seconds.
+        counts: (n, frames, rows, cols), float32 until every sensor effect has run.
+        joints: (n, frames, dof) radians.
+        times: (n, frames) seconds, where a clock effect shifts them.
+        kept: (n, frames) bool, where frames are lost.
+        valid: (n, rows, cols) bool, where taxels are known to be dead.
+    """
+
+    seed: int
+    trials: tuple[TrialSpec, ...]
+    t: Array
+    counts: NDArray[Any]
+    joints: Array
+    times: Array | None = None
+    kept: NDArray[np.bool_] | None = None
+    valid: NDArray[np.bool_] | None = None
