@@ -333,8 +333,8 @@ GUARDS = (
     ),
     Guard(
         "the tilt's Newton steps are cut back",
-        f"{TILT}:solve",
-        "y = guarded(state, y, free, c, ~done)",
+        f"{TILT}:search",
+        "y = guarded(bed, lever, y, free, c, ~done)",
         "pass",
         "tilt",
     ),

@@ -79,7 +79,8 @@ class Reader:
             if low > high:
                 raise self.fail(
                     key,
-                    f"has a lower limit above the upper one, [{low:g}, {high:g}]; write [{high:g}, {low:g}]",
+                    f"has a lower limit above the upper one, [{low:g}, {high:g}]; "
+                    f"write [{high:g}, {low:g}]",
                 )
             return Value(low, high)
         number = self.number(value, key, limits)
