@@ -1,4 +1,4 @@
-"""edge-classify: the robot computer's command."""
+"""edge-classify: the command of the robot's computer."""
 
 from __future__ import annotations
 
@@ -24,19 +24,18 @@ COMMANDS = (
     "bench",
     "demo",
 )
-"""Modules of `edge.commands`, in the order of the help; each has `add_parser(subparsers)`,
-which sets `run`: a function of the parsed arguments that returns the exit status."""
+"""Modules of `edge.commands`, in the order of the help. Each has `add_parser(subparsers)`, which
+sets `run`, a function of the parsed arguments that returns the exit status."""
 
 
 def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
-    """The command line of these commands.
+    """The command line with the commands `wanted`.
 
-    The command that was asked for is enough to parse it: the others' modules are not loaded,
-    which a slow board would notice.
+    To run one command, that one is enough: a slow board need not load the modules of the others.
     """
     top = argparse.ArgumentParser(
         prog="edge-classify",
-        description="Tells from a touch on a robot's skin what was touched.",
+        description="Tells what a robot touched from what its skin felt.",
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -46,11 +45,11 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""What writing answers where there is no room."""
+"""Errors of writing to a disk or a quota that is full."""
 
 
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
-    """Parse and run; what goes wrong on purpose is one sentence on stderr and exit status 2."""
+    """Parse and run; an expected error becomes one sentence on stderr and exit status 2."""
     arguments = top.parse_args(argv)
     try:
         status: int = arguments.run(arguments)
@@ -60,16 +59,16 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
         print(f"{top.prog}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        _discard_output()  # the reader of the lines has gone
+        _discard_output()  # whoever read the output has gone
         return 0
     except OSError as error:
-        # Files are written through `edge.files`, which says so itself.
+        # `edge.files` reports errors of the files that it writes.
         if error.filename is not None or error.errno not in FULL:
             raise
         _discard_output()
         print(
-            f"{top.prog}: standard output cannot be written: {error.strerror or error}; make room "
-            "or send it elsewhere",
+            f"{top.prog}: standard output cannot be written: {error.strerror or error}; free some "
+            "space or redirect the output elsewhere",
             file=sys.stderr,
         )
         return 2
@@ -78,12 +77,12 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
 
 def _discard_output() -> None:
-    """What is left in the buffer of stdout has nowhere to go."""
+    """Redirect stdout, so that flushing its buffer at exit cannot fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
+    """Run the command; returns 0 if all is well, 1 if a check failed, 2 for bad usage or input."""
     words = list(sys.argv[1:] if argv is None else argv)
     wanted = [word for word in words[:1] if word in COMMANDS]
     return dispatch(parser(wanted or COMMANDS), words)

@@ -1,11 +1,11 @@
-"""Errors a user can mend."""
+"""The base of all errors, and the errors that a user can correct."""
 
 
 class EdgeError(Exception):
-    """Whatever edge-classify reports on purpose; its text is one sentence for a person.
+    """The base of the errors that edge-classify raises; its text is one sentence for a person.
 
-    What a file brings into it, a name with a line break say, cannot break the line: all that
-    does not print stands as Python writes it, `\\n`.
+    The text stays on one line whatever a file contributes to it: characters that cannot be
+    printed are escaped as in Python, a line break as `\\n`.
     """
 
     def __str__(self) -> str:
@@ -14,4 +14,4 @@ class EdgeError(Exception):
 
 
 class InputError(EdgeError, ValueError):
-    """A file, an option or a value that cannot be used; the sentence names it and the mend."""
+    """A file, option or value that cannot be used; the sentence names it and the remedy."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from edge import __version__
 from edge.cli import dispatch
-from edge.commands.arm_option import add_arm, open_arm
+from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.model import Model, ModelInfo, Task
@@ -85,7 +85,7 @@ def parser() -> argparse.ArgumentParser:
         help="where the points are (build/tradeoff/front.json; where there is none, those of the "
         "simulated set)",
     )
-    add_arm(top, "of recordings with joint angles that name none (Cody's)")
+    add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
     top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (all cores)")
     top.set_defaults(run=run)
     return top

@@ -1,4 +1,4 @@
-"""README.md: its commands exist as they are written there, and its tables are the code's."""
+"""README.md and docs/: the commands exist as they are written there, and the tables are true."""
 
 import errno
 import re
@@ -18,7 +18,8 @@ from train.__main__ import main as train
 
 ROOT = Path(__file__).parents[1]
 GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps_856.npz"
-TEXT = (ROOT / "README.md").read_text()
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+TEXT = "\n".join(page.read_text() for page in PAGES)
 CODE = [" ".join(found.split()) for found in re.findall(r"`([^`]+)`", TEXT)]
 BOARD = [c for c in dict.fromkeys(CODE) if c.startswith("edge-classify ")]
 WORKSTATION = [c for c in dict.fromkeys(CODE) if c.startswith("python -m train ") and "--" in c]
@@ -84,7 +85,7 @@ def test_a_make_target_exists(target):
         pytest.fail(f"README.md names `make {target}`, the Makefile has none")
 
 
-@pytest.mark.parametrize("picture", re.findall(r"\]\((docs/[^)]+)\)", TEXT))
+@pytest.mark.parametrize("picture", re.findall(r"\]\((docs/[^)]+\.png)\)", TEXT))
 def test_each_picture_is_there_and_made_by_a_target(picture):
     assert (ROOT / picture).exists()
     assert re.search(rf"^{re.escape(picture)}:", (ROOT / "Makefile").read_text(), re.M)

@@ -136,7 +136,7 @@ def _load_all(paths: list[Path], progress: bool) -> tuple[list[Recording], str]:
             bad.append(str(error))
     if bad:
         more = f" (and {len(bad) - 1} more files)" if len(bad) > 1 else ""
-        raise InputError(f"{bad[0]}{more}; mend or remove it, nothing was fitted")
+        raise InputError(f"{bad[0]}{more}; repair or remove it, nothing was fitted")
     return recordings, digest.hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""`edge-classify bench`: what each stage costs on this machine."""
+"""`edge-classify bench`: how long each stage of a decision takes on this machine."""
 
 from __future__ import annotations
 
@@ -46,22 +46,24 @@ def add_parser(commands: Any) -> None:
         "bench",
         help="time each stage of a decision on this machine",
         description="Times each stage on a touch that grows over the model's skin, and writes "
-        "medians, 99th percentiles, memory and cold start as JSON: `make tradeoff "
-        "BOARD=board.json` reckons with them.",
+        "medians, 99th percentiles, memory and start-up time as JSON, for `make tradeoff "
+        "BOARD=board.json` on the workstation.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument("--out", required=True, metavar="board.json", help="the file to write")
     parser.add_argument(
-        "--skin", metavar="skin.toml", help="count this skin's wire time from its transactions"
+        "--skin",
+        metavar="skin.toml",
+        help="also count how long a frame of this skin takes on its wires",
     )
     parser.add_argument(
-        "--rounds", type=int, default=2000, help="how often a stage is timed (default: 2000)"
+        "--rounds", type=int, default=2000, help="how often each stage is timed (default: 2000)"
     )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, write, and print a line a stage on stderr."""
+    """Measure, write, and print one line per stage on stderr."""
     if not 20 <= arguments.rounds <= 1_000_000:
         raise InputError(f"--rounds must be 20 to 1000000, not {arguments.rounds}")
     model = Model(arguments.model)
@@ -90,12 +92,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
-    """All that board.json holds.
+    """The contents of board.json.
 
     Args:
         model: to time.
         rounds: how often each stage is timed.
-        skin: whose wire time is counted, or None.
+        skin: the skin whose wire time is counted, or None.
     """
     with garbage_aside():
         stages = time_stages(model, rounds)
@@ -151,10 +153,10 @@ def touch(model: Model, seconds: float) -> list[Frame]:
 def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     """Median and 99th percentile of each stage in microseconds.
 
-    `region`: the largest region of a frame. `track`: that, the arm's pose, and what the features
-    call for. `features`: a contact's series to its vector. `decision`: ONNX Runtime and the
-    answers of all tasks. `frame`: all that a frame in a contact costs. `last`: all that the
-    frame costs at which a decision falls due.
+    `region`: finding the largest region of a frame. `track`: the same, the arm's pose, and what
+    the features measure. `features`: from a contact's series to its vector. `decision`: ONNX
+    Runtime and the answers of all tasks. `frame`: everything that a frame in a contact costs.
+    `last`: everything that the frame costs at which a decision is due.
     """
     info = model.info
     frames = touch(model, info.window_s)
@@ -169,12 +171,14 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
         contact = tracker.push(frame)
         series = contact.series() if contact is not None else series
     if series is None:
-        raise EdgeError(f"{model.path}: no touch rises above its onset count; export it again")
+        raise EdgeError(
+            f"{model.path}: no touch rises above its onset_counts; export the model again"
+        )
     vector = feature_vector(series, info.window_s, info.samples, info.features)
     model.decide(vector)
 
     def pushed(make: Callable[[], Any], take: Callable[[list[float]], list[float]]) -> list[float]:
-        """Times of pushing the touch into what `make` gives, over and over."""
+        """Times of pushing the touch into fresh results of `make`; `take` selects those kept."""
         seen: list[float] = []
         while len(seen) < rounds:
             target = make()
@@ -223,7 +227,7 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
 
 
 def timed(call: Callable[[int], Any], rounds: int) -> list[float]:
-    """Microseconds of each of so many calls."""
+    """Microseconds that each of `rounds` calls takes."""
     times = []
     for i in range(rounds):
         began = time.perf_counter_ns()
@@ -233,7 +237,7 @@ def timed(call: Callable[[int], Any], rounds: int) -> list[float]:
 
 
 def summary(times: list[float]) -> Timings:
-    """Median, 99th percentile (nearest rank) and number of some times in microseconds."""
+    """Median, 99th percentile (nearest rank) and number of times given in microseconds."""
     ordered = sorted(times)
     rank = math.ceil(0.99 * len(ordered)) - 1
     return {
@@ -244,7 +248,7 @@ def summary(times: list[float]) -> Timings:
 
 
 def peak_memory_mb() -> float:
-    """Largest resident size of this process so far, megabytes."""
+    """The largest resident size of this process so far, in megabytes."""
     import resource
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -252,7 +256,7 @@ def peak_memory_mb() -> float:
 
 
 def cold_start_ms(path: str) -> float:
-    """Median milliseconds from starting Python to a watcher that is ready."""
+    """Median milliseconds from starting Python to a classifier that is ready."""
     times = []
     for _ in range(COLD_STARTS):
         began = time.perf_counter()
@@ -266,7 +270,7 @@ def cold_start_ms(path: str) -> float:
 
 
 def machine() -> dict[str, Any]:
-    """What this machine is."""
+    """A description of this machine."""
     return {
         "name": platform.node(),
         "kind": kind(),
@@ -304,7 +308,7 @@ def _onnxruntime_version() -> str:
 
 
 def wire(skin: SkinFile) -> dict[str, Any]:
-    """Wire time of a frame, counted from the drivers' own transactions over a counting bus."""
+    """The wire time of a frame, from the bits that the drivers send over a fake bus."""
     bits: NDArray[np.float64] = np.array(frame_bits(skin, FRAMES)) / FRAMES
     rate = frame_rate(bits.tolist(), [bus.clock_hz for bus in skin.buses])
     return {

@@ -1,4 +1,4 @@
-"""`edge-classify calibrate`: rest values and noise with nothing touching."""
+"""`edge-classify calibrate`: rest values and noise while nothing touches the skin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.commands.source import add_skin, open_skin
+from edge.commands.options import add_skin
+from edge.commands.source import open_skin
 from edge.errors import InputError
 from edge.runtime.loop import Loop
 from edge.skin.calibration import save_calibration
@@ -20,10 +21,11 @@ from edge.skin.file import TaxelCalibration
 from edge.skin.skin import Skin
 
 FRAMES = 1000
-"""As the lab took for its bias."""
+"""As many as the lab averaged for its own baseline."""
 LEAST_FRAMES = 20
 RESTLESS = 10.0
-"""A taxel whose noise is so many times the median's is being touched, or broken."""
+"""A taxel whose noise is this many times the median's (and `RESTLESS_COUNTS` more) is being
+touched, or broken."""
 RESTLESS_COUNTS = 5.0
 
 
@@ -31,13 +33,22 @@ def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "calibrate",
-        help="measure rest values and noise with nothing touching, into the skin file",
+        help="measure rest values and noise and write them into the skin file",
         description="Reads the skin while nothing touches it and writes each taxel's mean and "
-        "standard deviation into the skin file; the old file stays as skin.toml.bak.",
+        "standard deviation into the skin file; the old file is kept as skin.toml.bak.",
     )
     add_skin(parser)
-    parser.add_argument("--frames", type=int, default=FRAMES, help="default: %(default)s")
-    parser.add_argument("--force", action="store_true", help="write it even where a taxel moves")
+    parser.add_argument(
+        "--frames",
+        type=int,
+        default=FRAMES,
+        help="how many frames to average (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="write the calibration even if a taxel seems to be touched",
+    )
     parser.set_defaults(run=run)
 
 
@@ -47,10 +58,10 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCa
     Args:
         skin: started, and touched by nothing.
         frames: how many.
-        lasts_s: how long there is something to read.
+        lasts_s: for how many seconds there is something to read.
 
     Returns:
-        The calibration, and how many frames it is made of.
+        The calibration, and the number of frames behind it.
     """
     shape = skin.layout.shape
     n = np.zeros(shape, dtype=np.int64)
@@ -86,7 +97,7 @@ def mean_and_deviation(
 
 
 def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Taxels (row, col) that move far more than the others, worst first."""
+    """Taxels (row, col) whose values vary far more than the others', worst first."""
     limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
     places = np.argwhere(noise > limit)
     order = np.argsort(-noise[noise > limit], kind="stable")
@@ -94,24 +105,24 @@ def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, judge, write."""
+    """Measure, refuse a skin that is being touched, and write."""
     if arguments.skin is None:
-        raise InputError("give --skin skin.toml: the calibration is written into it")
+        raise InputError("give --skin skin.toml, the file into which the calibration is written")
     if arguments.frames < LEAST_FRAMES:
-        raise InputError(f"--frames: at least {LEAST_FRAMES}, not {arguments.frames}")
+        raise InputError(f"--frames must be at least {LEAST_FRAMES}, not {arguments.frames}")
     with open_skin(arguments, calibrated=False) as opened:
-        print("edge-classify: let nothing touch the skin", file=sys.stderr)
+        print("edge-classify: measuring; keep everything off the skin", file=sys.stderr)
         calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
         unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
     if seen < LEAST_FRAMES:
-        raise InputError(f"only {seen} frames could be read, {LEAST_FRAMES} are the least")
+        raise InputError(f"only {seen} frames could be read; at least {LEAST_FRAMES} are needed")
     moving = restless(calibration.noise)
     if moving and not arguments.force:
         row, col = moving[0]
         raise InputError(
-            f"{len(moving)} taxels move while they should rest, most of all [{row}, {col}] by "
-            f"{calibration.noise[row, col]:.1f} counts: let nothing touch the skin, name them "
-            "under dead in [signal], or write it with --force"
+            f"{len(moving)} taxels vary while they should be at rest, [{row}, {col}] the most, by "
+            f"{calibration.noise[row, col]:.1f} counts; keep everything off the skin, list broken "
+            "taxels under dead in [signal], or write the calibration with --force"
         )
     taken = datetime.now(UTC).replace(microsecond=0)
     backup = save_calibration(

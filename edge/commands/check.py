@@ -1,4 +1,4 @@
-"""`edge-classify check`: is a skin's file right, and what frame rate does its wire allow."""
+"""`edge-classify check`: whether a skin's file is right, and what frame rate its wires carry."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from edge.fake.player import frame_bits
 from edge.skin.file import frame_rate, load
 
 FRAMES = 100
-"""Counted together, so that what is sent only now and then counts by its share."""
+"""Counted together, so that transactions that not every frame needs count by their share."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "check",
-        help="say what is wrong with a skin file, and what frame rate its wire allows",
-        description="Reads a skin file and sends its drivers' own transactions over a fake bus "
-        "that counts bits. Exit status 1 where the wire does not carry the rate that the file "
-        "asks for.",
+        help="say what is wrong with a skin file, and what frame rate its wires carry",
+        description="Reads a skin file and runs its drivers over a fake bus that counts the "
+        "bits on the wire. The exit status is 1 if the wires cannot carry the frame rate that "
+        "the file asks for.",
     )
-    parser.add_argument("skin", metavar="skin.toml")
+    parser.add_argument("skin", metavar="skin.toml", help="the file that describes the skin")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print one line, and what is remarkable on stderr."""
+    """Print the result, and remarks on stderr."""
     file = load(arguments.skin)
     bits = [count / FRAMES for count in frame_bits(file, FRAMES)]
     clocks = [bus.clock_hz for bus in file.buses]

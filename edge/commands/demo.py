@@ -1,4 +1,4 @@
-"""`edge-classify demo`: decisions without a skin, a model or a recording of one's own."""
+"""`edge-classify demo`: decisions without any hardware, model or recording of your own."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "demo",
-        help="decide on touches that come with the program",
+        help="decide on recorded touches that come with the program",
         description="Plays the recordings that come with the program onto fake chips, reads "
-        "those with the real drivers, and decides with the model that comes with it: the whole "
-        "path but for the wires. Model and recordings are simulated.",
+        "them with the real drivers, and decides with the model that comes with the program: "
+        "everything runs as it would on a robot, except for the wires. The recordings are "
+        "simulated. The exit status is 1 if a decision is wrong.",
     )
     parser.set_defaults(run=run)
 
 
 def events(model: Model, recording: Recording) -> Iterator[Event]:
-    """What `edge-classify run` would say of a recording on fake chips."""
+    """What `edge-classify run` would answer to a recording on fake chips."""
     skin, playback = play(skin_file(recording.layout), recording)
     with skin:
         classifier = Classifier(model, skin.layout)
@@ -40,7 +41,7 @@ def events(model: Model, recording: Recording) -> Iterator[Event]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the events; 1 where a decision is not the recording's label."""
+    """Print the events; 1 if a decision differs from its recording's label."""
     model = Model(demo.MODEL)
     right = asked = 0
     for path in demo.recordings():

@@ -1,4 +1,4 @@
-"""`edge-classify record`: one labelled trial a contact."""
+"""`edge-classify record`: saves each contact as a labelled trial."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from edge.commands.arm_option import add_arm, open_arm
-from edge.commands.source import Opened, add_skin, open_joints, open_skin
+from edge.commands.options import add_arm, add_joints, add_skin, open_arm
+from edge.commands.source import Opened, open_joints, open_skin
 from edge.errors import InputError
 from edge.recording import Recording, save
 from edge.runtime.loop import Loop, stop_on
@@ -25,7 +25,7 @@ from edge.touch.track import Contact, Tracker, TrackSettings
 
 LEAD_S = 0.2
 LENGTH_S = 2.0
-"""The paper decides 1.2 s after onset; what comes later lets a longer window be tried."""
+"""The paper decides 1.2 s after onset; the rest allows longer windows to be tried."""
 
 
 def add_parser(commands: Any) -> None:
@@ -33,51 +33,61 @@ def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "record",
         help="wait for contacts and save each as a labelled trial",
-        description="Waits for a contact, saves it with a short lead-in as one .npz, and waits "
-        "for the next. Files that exist are never overwritten.",
+        description="Waits for a contact, saves it with a short lead-in as one .npz file, and "
+        "waits for the next. Existing files are never overwritten.",
     )
-    add_skin(parser, joint_options=True)
+    add_skin(parser)
+    add_joints(parser)
     parser.add_argument(
         "--label",
         action="append",
         default=[],
         type=_label,
         metavar="TASK=LABEL",
-        help="what is being touched, as object=box; more than once for more tasks",
+        help="what is being touched, such as object=box; repeat it to label several tasks",
     )
     parser.add_argument(
         "--out",
         default="recordings",
         metavar="FOLDER|FILE.npz",
-        help="where to: a folder for numbered trials (default: %(default)s), or the one file",
+        help="a folder for numbered trials (default: %(default)s), or the file for a single trial",
     )
-    parser.add_argument("--trials", type=int, default=None, help="stop after so many")
+    parser.add_argument("--trials", type=int, default=None, help="stop after this many trials")
     parser.add_argument(
-        "--lead", type=float, default=LEAD_S, help="seconds before onset (default: %(default)s)"
+        "--lead",
+        type=float,
+        default=LEAD_S,
+        help="seconds to keep from before onset (default: %(default)s)",
     )
     parser.add_argument(
         "--length",
         type=float,
         default=LENGTH_S,
-        help="seconds after onset at most (default: %(default)s)",
+        help="seconds to keep from after onset, at most (default: %(default)s)",
     )
-    parser.add_argument("--dof", type=int, default=None, help="joint angles a line, with --joints")
-    add_arm(parser, "kept with each trial (Cody's is taken where none is named)")
+    parser.add_argument(
+        "--dof",
+        type=int,
+        default=None,
+        help="with --joints but no --arm: how many angles each line has",
+    )
+    add_arm(parser, "stored in each trial (default: Cody's)")
     parser.set_defaults(run=run)
 
 
 def _label(text: str) -> tuple[str, str]:
     task, equals, label = text.partition("=")
     if not (task.strip() and equals and label.strip()):
-        raise argparse.ArgumentTypeError(f"must be TASK=LABEL, like object=box, not {text!r}")
+        raise argparse.ArgumentTypeError(f"must be TASK=LABEL, such as object=box, not {text!r}")
     return task.strip(), label.strip()
 
 
 class Trials:
-    """Cuts a stream of frames into trials, one a contact.
+    """Cuts a stream of frames into trials, one per contact.
 
     `push` returns the frames of a trial when it is complete: from the lead-in before onset to
-    the contact's end, or to `length_s` after onset; a contact that goes on is waited out.
+    the contact's end, or to `length_s` after onset. While a saved contact continues, no other
+    trial begins.
     """
 
     def __init__(self, tracker: Tracker, *, lead_frames: int, length_s: float) -> None:
@@ -106,7 +116,7 @@ class Trials:
         return math.inf if self._saved is None else self._saved.onset_s
 
     def rest(self) -> list[Frame] | None:
-        """What there is of a trial that has begun; then waits for the next contact."""
+        """The frames so far of a trial that has begun; then wait for the next contact."""
         frames, self._frames = self._frames, None
         self._before.clear()
         return frames
@@ -116,7 +126,7 @@ _DEBOUNCE = TrackSettings().debounce
 
 
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
-    """Frames as a recording; joint angles where every frame has them."""
+    """Frames as a recording, with joint angles if every frame has them."""
     valid = np.array(
         [np.ones(f.counts.shape, bool) if f.valid is None else f.valid for f in frames]
     )
@@ -131,10 +141,10 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
 
 
 def trial_path(out: str, labels: dict[str, str]) -> Path:
-    """The file for the next trial: `out` itself, or the first number that is free in it.
+    """The file for the next trial: `out` itself, or the first free number in that folder.
 
     Raises:
-        InputError: `out` is a file that exists.
+        InputError: `out` names a file that exists already.
     """
     path = Path(out)
     if path.suffix == ".npz":
@@ -150,12 +160,14 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Wait, save, say so."""
+    """Wait for contacts and save them; 1 if there was none."""
     labels = dict(arguments.label)
     if not labels:
-        raise InputError("give --label TASK=LABEL: a trial without a label teaches nothing")
+        raise InputError(
+            "give --label TASK=LABEL: nothing can be learnt from a trial without a label"
+        )
     if len(labels) < len(arguments.label):
-        raise InputError("--label: a task is named twice")
+        raise InputError("--label names a task twice")
     if not 0.0 <= arguments.lead <= 60.0 or not 0.1 <= arguments.length <= 600.0:
         raise InputError("--lead must be 0 to 60 seconds, --length 0.1 to 600")
     single = Path(arguments.out).suffix == ".npz"
@@ -166,7 +178,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.dof not in (None, dof):
         raise InputError(f"--dof {arguments.dof}: {arguments.arm} has {dof} joints")
     if arguments.joints is not None and dof is None:
-        raise InputError("--joints needs --arm, or --dof: how many angles a line has")
+        raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
     with (
         stop_on(signal.SIGINT) as stop,
         open_skin(arguments) as opened,
@@ -176,7 +188,7 @@ def run(arguments: argparse.Namespace) -> int:
             have = opened.playback.dof if opened.playback is not None else None
             if have != dof:
                 raise InputError(
-                    f"{opened.source}: gives {have or 'no'} joint angles, the arm of "
+                    f"{opened.source} gives {have or 'no'} joint angles, but the arm of "
                     f"{arguments.arm} has {dof}; name their source with --joints"
                 )
         skin = opened.skin
@@ -199,7 +211,7 @@ def run(arguments: argparse.Namespace) -> int:
                 _save(frames, arguments.out, labels, opened, arm, complete=False)
                 done += 1
     if done == 0:
-        print("edge-classify: no contact, nothing saved", file=sys.stderr)
+        print("edge-classify: there was no contact, so nothing was saved", file=sys.stderr)
         return 1
     return 0
 

@@ -1,4 +1,4 @@
-"""`edge-classify replay`: the board's own path over recordings."""
+"""`edge-classify replay`: decides on recordings, as the board would."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier, Event
+from edge.commands.options import add_error, check_error
 from edge.commands.summary import Summary
-from edge.commands.sure import add_error, check_error
 from edge.errors import InputError
 from edge.model.model import Model, require_joints
 from edge.recording import Recording, find, load
@@ -21,15 +21,15 @@ def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "replay",
         help="decide on recordings, frame by frame",
-        description="Runs the board's own path over recordings and prints one JSON object a "
-        "line. A file that cannot be used is named on stderr and the others are still run; the "
-        "exit status is then 2.",
+        description="Decides on recordings as `edge-classify run` decides live. A file that "
+        "cannot be used is named on stderr and the others are still replayed; the exit status "
+        "is then 2.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
         "--summary",
         action="store_true",
-        help="accuracy and a confusion matrix per task on stderr, where recordings are labelled",
+        help="print the accuracy and a confusion matrix for each task, if recordings are labelled",
     )
     add_error(parser)
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
@@ -39,7 +39,7 @@ def add_parser(commands: Any) -> None:
 def decide(
     model: Model, recording: Recording, name: str, error: float | None = None
 ) -> list[Event]:
-    """All events of one recording, decided early where an error rate is given.
+    """All events of one recording, with early decisions if an error rate is given.
 
     Raises:
         InputError: the recording does not suit the model; the sentence names `name`.
@@ -58,7 +58,7 @@ def decide(
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the events; 2 where a file could not be used."""
+    """Print the events; 2 if a file could not be used."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
     summary = Summary(model.info.tasks)
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _paths(texts: list[str]) -> list[Path]:
-    """The recordings named; a path that is missing is left to `load`, which says so."""
+    """The recordings named; `load` reports a path that does not exist."""
     paths: list[Path] = []
     for text in texts:
         paths += find([text])

@@ -1,4 +1,4 @@
-"""`edge-classify run`: live decisions."""
+"""`edge-classify run`: reads the skin and decides, live."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from contextlib import ExitStack
 from typing import Any
 
 from edge.classifier import Classifier, Event
-from edge.commands.source import add_skin, check_joints, open_joints, open_skin
-from edge.commands.sure import add_error, check_error
+from edge.commands.options import add_error, add_joints, add_skin, check_error
+from edge.commands.source import check_joints, open_joints, open_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
 from edge.runtime.loop import Loop, Schedule, stop_on
@@ -25,31 +25,37 @@ def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "run",
         help="read the skin and decide, live",
-        description="Reads the skin and prints one JSON object a line: contacts, decisions, "
-        "chips that fail and come back. Ctrl-C or SIGTERM ends it after the line at hand. "
-        "Under systemd it says when it is ready and that it is alive.",
+        description="Reads the skin and reports contacts, decisions, and chips that fail or "
+        "recover. Ctrl-C or SIGTERM ends it cleanly after the current frame; a second signal "
+        "terminates it at once. Under systemd it reports that it is ready and alive.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
     add_error(parser)
-    add_skin(parser, joint_options=True)
+    add_skin(parser)
+    add_joints(parser)
     parser.add_argument(
         "--without-joints",
         choices=("flag", "skin"),
         default="flag",
-        help="when angles are missing at a contact's onset: flag the decision missing_pose "
-        "(default), or measure that contact's motion on the skin and flag it skin_motion",
+        help="if joint angles are missing at a contact's onset: flag the decision missing_pose "
+        "(flag, the default), or measure that contact's motion on the skin and flag the decision "
+        "skin_motion (skin)",
     )
-    parser.add_argument("--udp", metavar="HOST:PORT", help="send each line as a datagram there too")
+    parser.add_argument(
+        "--udp",
+        metavar="HOST:PORT",
+        help="also send each event there, as a datagram of one JSON line",
+    )
     parser.add_argument(
         "--map",
         metavar="FILE",
-        help="follow every region on its own, and append each contact with its place to FILE",
+        help="follow several contacts at once, and append each with its position to FILE",
     )
     parser.set_defaults(run=run)
 
 
 def chip_event(status: ChipStatus, t: float) -> Event:
-    """A chip that failed or came back, as a line."""
+    """A chip that failed or recovered, as an event."""
     event = {
         "event": "chip",
         "t": t,
@@ -61,7 +67,7 @@ def chip_event(status: ChipStatus, t: float) -> Event:
 
 
 def end_event(schedule: Schedule, frames: int) -> Event:
-    """How the loop kept its period."""
+    """How well the loop kept its period, as an event."""
     return {
         "event": "end",
         "frames": frames,
@@ -75,7 +81,7 @@ def end_event(schedule: Schedule, frames: int) -> Event:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, watch, print, until the recording, the user or the service manager ends it."""
+    """Read, decide and print until the recording, the user or the service manager ends it."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
     chain = model.info.chain
@@ -115,7 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
             notifier.alive()
             emit([chip_event(status, frame.t) for status in skin.changes()])
             if on_skin:
-                # A contact keeps the chain that it finds at its first frame.
+                # A contact keeps the chain that is set at its first frame.
                 classifier.tracker.chain = None if frame.joints is None else chain
             emit(classifier.push(frame))
         notifier.stopping()

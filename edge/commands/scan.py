@@ -1,4 +1,4 @@
-"""`edge-classify scan`: which chips answer, as a map of the skin."""
+"""`edge-classify scan`: which chips answer, and where they are on the skin."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from edge.commands.source import add_skin, open_skin
+from edge.commands.options import add_skin
+from edge.commands.source import open_skin
 from edge.skin.file import UNUSED, SkinFile
 from edge.skin.skin import ChipStatus
 
@@ -18,16 +19,16 @@ def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "scan",
-        help="which chips answer, as a map of the skin",
-        description="Sets every chip up and prints one line a chip, and a map of the taxels on "
-        "stderr. Exit status 1 where a chip is missing.",
+        help="show which chips answer, as a map of the skin",
+        description="Sets up every chip, and prints the state of each and a map of the "
+        "taxels. The exit status is 1 if a chip does not answer.",
     )
     add_skin(parser)
     parser.set_defaults(run=run)
 
 
 def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:
-    """A line a row of the skin, elbow first: `#` answers, `.` does not, a space has no chip."""
+    """One line per row of the skin: `#` answers, `.` does not, a space has no chip."""
     marks = np.full(file.layout.rows * file.layout.cols, " ")
     for status in statuses:
         for taxel in status.taxels:
@@ -38,7 +39,7 @@ def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line a chip and the map."""
+    """Print each chip and the map; 1 if a chip does not answer."""
     with open_skin(arguments, calibrated=False) as opened:
         statuses = opened.skin.status()
         for status in statuses:

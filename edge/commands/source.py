@@ -1,9 +1,8 @@
-"""What the commands that read a skin share: its options, and opening it."""
+"""Opening the skin and the joint angles that a command's options name, real or fake."""
 
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -15,61 +14,12 @@ from edge.fake.clock import PacedClock, VirtualClock
 from edge.fake.player import Playback, play, skin_file
 from edge.model.model import Model, require_joints
 from edge.recording import load
-from edge.runtime import joint_stream as joints
+from edge.runtime import joint_stream
 from edge.runtime.loop import JointSource
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
 from edge.touch.track import for_device
-
-
-def add_skin(parser: argparse.ArgumentParser, *, joint_options: bool = False) -> None:
-    """Add the options that say which skin, real or fake, and where joint angles come from."""
-    parser.add_argument("--skin", metavar="skin.toml", help="the skin's file")
-    parser.add_argument(
-        "--fake",
-        metavar="REC.npz",
-        help="no hardware: play a recording onto fake chips, in virtual time; without --skin "
-        "they are laid out as its frames call for",
-    )
-    parser.add_argument(
-        "--real-time",
-        action="store_true",
-        help="play it no faster than it was recorded (a terminal's view always does)",
-    )
-    parser.add_argument("--loop", action="store_true", help="play the recording over and over")
-    parser.add_argument(
-        "--seconds", type=_seconds, default=math.inf, help="stop after so long (default: never)"
-    )
-    if joint_options:
-        parser.add_argument(
-            "--joints",
-            metavar="stdin|udp:[HOST:]PORT",
-            help='joint angles as JSON lines {"t": seconds, "q": [radians]}; a port without '
-            "a host is bound to loopback",
-        )
-        parser.add_argument(
-            "--joints-oldest",
-            type=_seconds,
-            default=joints.OLDEST_S,
-            metavar="SECONDS",
-            help="a pose older than this is not used (default: %(default)s)",
-        )
-        parser.add_argument(
-            "--joints-shared-clock",
-            action="store_true",
-            help="the lines' times are of this machine's monotonic clock",
-        )
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not 0.0 < seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"must be a number of seconds above 0, not {text!r}")
-    return seconds
 
 
 def touch_counts(model: Model | None, file: SkinFile) -> int | None:
@@ -89,9 +39,9 @@ class Opened:
 
     Attributes:
         skin: started.
-        lasts_s: how long there is something to read.
-        playback: what plays where it is fake.
-        source: what it is, for events and recordings.
+        lasts_s: for how many seconds there is something to read.
+        playback: the recording that is being played, where the skin is fake.
+        source: names the skin or the recording in events and recordings.
     """
 
     skin: Skin
@@ -102,14 +52,19 @@ class Opened:
 
 @contextmanager
 def open_skin(
-    arguments: argparse.Namespace, *, calibrated: bool = True, model: Model | None = None
+    arguments: argparse.Namespace,
+    *,
+    calibrated: bool = True,
+    paced: bool = False,
+    model: Model | None = None,
 ) -> Iterator[Opened]:
     """The skin that the options name, closed at the end of the block.
 
     Args:
-        arguments: parsed.
+        arguments: with the options of `options.add_skin`.
         calibrated: refuse a real skin that has no calibration.
-        model: its threshold says when a taxel is being touched, where it is the lower one.
+        paced: play a recording no faster than it was recorded, whatever the options say.
+        model: a taxel above its threshold counts as touched, if that is lower than the skin's.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
@@ -122,7 +77,7 @@ def open_skin(
                 file = skin_file(recording.layout)
             else:
                 file = skinfile.load(arguments.skin)
-            clock = PacedClock() if arguments.real_time else VirtualClock()
+            clock = PacedClock() if paced or arguments.real_time else VirtualClock()
             touch = touch_counts(model, file)
             skin, playback = play(
                 file, recording, loop=arguments.loop, clock=clock, touch_counts=touch
@@ -134,7 +89,7 @@ def open_skin(
             if arguments.loop or arguments.real_time:
                 raise InputError("--loop and --real-time need --fake, a recording to play")
             if arguments.skin is None:
-                raise InputError("give --skin skin.toml, or --fake REC.npz for no hardware")
+                raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
             file = skinfile.load(arguments.skin)
             touch = touch_counts(model, file)
             skin = stack.enter_context(Skin.open(file, calibrated=calibrated, touch_counts=touch))
@@ -149,10 +104,15 @@ def open_skin(
 def open_joints(
     arguments: argparse.Namespace, opened: Opened, dof: int | None
 ) -> Iterator[JointSource | None]:
-    """Where the options say that joint angles come from; a fake has its recording's.
+    """The source of joint angles that the options name; a fake skin has its recording's.
+
+    Args:
+        arguments: with the options of `options.add_joints`.
+        opened: the skin that is being read.
+        dof: how many angles a line must have, or None where none are wanted.
 
     Raises:
-        InputError: the options make no sense together.
+        InputError: the options contradict each other.
     """
     if arguments.joints is None:
         yield opened.playback if opened.playback is not None and opened.playback.dof else None
@@ -162,12 +122,12 @@ def open_joints(
     kind, _, address = arguments.joints.partition(":")
     listener: Any = None
     if kind == "stdin" and not address:
-        source = joints.from_file(sys.stdin.fileno())
+        source = joint_stream.from_file(sys.stdin.fileno())
     elif kind == "udp":
-        source, listener = joints.from_udp(address)
+        source, listener = joint_stream.from_udp(address)
     else:
         raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {arguments.joints!r}")
-    stream = joints.Joints(
+    stream = joint_stream.Joints(
         source,
         dof=dof,
         now=opened.skin.clock.now,
@@ -181,8 +141,8 @@ def open_joints(
             listener.close()
         if stream.malformed:
             print(
-                f"edge-classify: --joints: {stream.malformed} lines could not be used, "
-                f"the last because {stream.problem}",
+                f"edge-classify: --joints: {stream.malformed} lines could not be used; "
+                f"of the last: {stream.problem}",
                 file=sys.stderr,
             )
 
@@ -191,7 +151,7 @@ def check_joints(model: Model, arguments: argparse.Namespace, opened: Opened) ->
     """Refuse a source without the joint angles that the model needs.
 
     Raises:
-        InputError: it has none, or another number of them.
+        InputError: it has none, or a different number of them.
     """
     if arguments.joints is None:
         playback = opened.playback

@@ -1,4 +1,4 @@
-"""Decisions against labels: accuracy and confusion matrices for people."""
+"""Decisions compared with labels: accuracy and confusion matrices as text."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from edge.classifier import AS_TRAINED
 from edge.model.model import Task
 
 NONE = "(none)"
-"""The column of trials in which no decision was made."""
+"""The column of trials without a decision."""
 
 
 class Summary:
-    """Counts each recording's first decision per task against its label."""
+    """Compares each recording's first decision for each task with its label."""
 
     def __init__(self, tasks: Mapping[str, Task]) -> None:
         self._tasks = tasks
         self._pairs: dict[str, Counter[tuple[str, str]]] = {task: Counter() for task in tasks}
         self.recordings = 0
         self.as_trained = 0
-        """Recordings just like one that the model learnt from."""
+        """Recordings whose features equal those of a training trial."""
 
     def add(self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]) -> None:
         """Take in the events of one recording and its labels."""
@@ -44,18 +44,18 @@ class Summary:
         return sum(n for (truth, said), n in pairs.items() if truth == said), pairs.total()
 
     def text(self) -> str:
-        """A table a task: rows are what was touched, columns what was said."""
+        """One table per task: rows are what was touched, columns what was decided."""
         parts = [f"{self.recordings} recordings"]
         if self.as_trained:
             parts.append(
-                f"{self.as_trained} of them are to the last bit as trials that the model learnt "
-                "from, most likely the same: they say nothing of new touches (what `make export` "
-                "printed, leave-one-out, does)"
+                f"{self.as_trained} of them equal a training trial to the last bit and are most "
+                "likely the same recordings, so this accuracy does not apply to new touches; the "
+                "leave-one-out accuracy that `make export` printed does"
             )
         for task in self._tasks:
             right, total = self.accuracy(task)
             if total == 0:
-                parts.append(f"{task}: no recording is labelled")
+                parts.append(f"{task}: no recording has a label")
                 continue
             low, high = wilson(right, total)
             parts.append(
@@ -69,7 +69,7 @@ class Summary:
         truths = sorted({truth for truth, _ in pairs})
         said = sorted({label for _, label in pairs} | set(truths))
         width = max(map(len, truths))
-        # Wide matrices get numbered columns, so that 36 objects still fit a screen.
+        # The columns of a wide matrix are numbered, so that 36 objects still fit on a screen.
         short = sum(len(label) + 2 for label in said) > 100
         heads = [str(i + 1) for i in range(len(said))] if short else said
         sizes = [max(len(head), 3) for head in heads]

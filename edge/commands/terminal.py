@@ -1,4 +1,4 @@
-"""The skin as text: ANSI half-blocks, two rows of taxels to a line."""
+"""The skin drawn with ANSI half-blocks, two rows of taxels per line."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from edge.touch.region import Region
 
 CLEAR, HOME, HIDE, SHOW, PLAIN = "\x1b[2J", "\x1b[H", "\x1b[?25l", "\x1b[?25h", "\x1b[0m"
 REST = tuple(range(233, 242))
-"""256-colour greys: taxels outside of every region, by force."""
+"""256-colour greys for taxels outside every region, by force."""
 TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
-"""Dark red to white: taxels of a region, by force."""
+"""Dark red to white for the taxels of a region, by force."""
 LOST = 18
-"""Dark blue: a taxel that cannot be read."""
+"""Dark blue for a taxel that cannot be read."""
 
 
 def colours(
     frame: Frame, regions: Sequence[Region], threshold: int, full: int
 ) -> NDArray[np.uint8]:
-    """256-colour numbers (rows, cols): forces on a logarithmic scale up to `full` counts."""
+    """256-colour numbers (rows, cols), by force on a logarithmic scale up to `full` counts."""
     counts = frame.counts.astype(np.float64)
     rest = np.log1p(np.minimum(counts, threshold)) / math.log1p(max(threshold, 1))
     out: NDArray[np.uint8] = np.array(REST, dtype=np.uint8)[(rest * (len(REST) - 1)).astype(int)]
@@ -41,11 +41,12 @@ def colours(
 
 
 def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
-    """Lines of half-blocks from colour numbers (rows, cols); colours are set where they change.
+    """Lines of half-blocks; an escape sequence is written only where the colour changes.
+
 
     Args:
-        colour: numbers of the 256-colour palette.
-        wide: characters a taxel.
+        colour: (rows, cols) numbers in the 256-colour palette.
+        wide: characters per taxel.
     """
     lines = []
     rows = colour.shape[0]
@@ -64,7 +65,7 @@ def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
 
 
 def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
-    """One line on the largest region and on what cannot be read."""
+    """One line about the largest region and about taxels that cannot be read."""
     parts = [f"{frame.t:9.2f} s"]
     if regions:
         region = regions[0]
@@ -82,5 +83,5 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
 
 
 def screen(lines: Sequence[str]) -> str:
-    """Lines from the upper left corner on; each clears what was there before."""
+    """Lines from the upper left corner on, each clearing what was there before."""
     return HOME + "".join(f"{line}\x1b[K\n" for line in "\n".join(lines).split("\n"))

@@ -1,4 +1,4 @@
-"""`edge-classify verify`: is this machine's answer the golden one?"""
+"""`edge-classify verify`: whether this machine computes what the workstation did."""
 
 from __future__ import annotations
 
@@ -15,17 +15,20 @@ def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "verify",
-        help="run a golden file and compare, bit for bit where integers allow",
-        description="Runs the frames and vectors of a golden file on this machine and compares "
-        "every result with the one stored. Exit status 1 where one falls short.",
+        help="check that this machine computes what the workstation did",
+        description="Runs the frames and feature vectors of a golden file on this machine and "
+        "compares every result with the stored one: integers must be equal, and floats agree "
+        "within their stated bounds. The exit status is 1 if one differs.",
     )
     parser.add_argument("--model", required=True, help="model.onnx")
-    parser.add_argument("--golden", required=True, help="golden.npz, written with the model")
+    parser.add_argument(
+        "--golden", required=True, help="golden.npz, which was written together with the model"
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line a quantity; 1 where one falls short."""
+    """Print one line per quantity; 1 if one differs."""
     checks = verify(Model(arguments.model), arguments.golden)
     for check in checks:
         line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
@@ -43,5 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if not failed:
-        print(f"edge-classify: {len(checks)} quantities are as in the golden file", file=sys.stderr)
+        print(
+            f"edge-classify: {len(checks)} quantities agree with the golden file", file=sys.stderr
+        )
     return 1 if failed else 0

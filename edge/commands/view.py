@@ -1,4 +1,4 @@
-"""`edge-classify view`: the skin live in a terminal."""
+"""`edge-classify view`: shows the skin live in a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 
 from edge.classifier import Classifier, Event
 from edge.commands import terminal
-from edge.commands.source import add_skin, check_joints, open_joints, open_skin
+from edge.commands.options import add_joints, add_skin
+from edge.commands.source import check_joints, open_joints, open_skin
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.runtime.loop import Loop, stop_on
@@ -19,7 +20,8 @@ from edge.touch.region import find_regions
 
 RATE_HZ = 10.0
 FULL_NEWTONS, FULL_FACTOR = 17.0, 50
-"""White: where the lab no longer trusts a reading, or so many times the threshold."""
+"""White stands for the force above which the lab no longer trusted its readings; where the scale
+is unknown, for this many times the threshold."""
 
 
 def add_parser(commands: Any) -> None:
@@ -27,15 +29,16 @@ def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "view",
         help="show the skin live in a terminal",
-        description="Draws the skin with its regions, and the last decision where a model is "
-        "given. Red to white is a region's force, grey is less than contact, blue cannot be "
-        "read. Two rows to a line, the elbow on top.",
+        description="Draws the skin and, with --model, the latest decisions. Taxels in contact "
+        "are red to white by force, those below the contact threshold grey, and those that "
+        "cannot be read blue. Each line shows two rows of taxels; row 0 is at the top.",
     )
-    parser.add_argument("--model", help="model.onnx, to show decisions too")
+    parser.add_argument("--model", help="model.onnx, to show its decisions too")
     parser.add_argument(
         "--rate", type=float, default=RATE_HZ, help="pictures a second (default: %(default)s)"
     )
-    add_skin(parser, joint_options=True)
+    add_skin(parser)
+    add_joints(parser)
     parser.set_defaults(run=run)
 
 
@@ -51,19 +54,18 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[st
 
 
 def spoken(event: Event) -> str:
-    """A decision for a person."""
+    """A decision as text."""
     text = f"{event['label']} ({event['confidence']:.0%})"
     return f"{text} [{', '.join(event['flags'])}]" if event["flags"] else text
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read at the skin's rate, draw at the terminal's."""
+    """Read at the skin's rate, and draw at the rate that the options ask for."""
     if not 0.1 <= arguments.rate <= 60.0:
         raise InputError(f"--rate must be 0.1 to 60 pictures a second, not {arguments.rate:g}")
-    arguments.real_time |= arguments.fake is not None and sys.stdout.isatty()
     model = None if arguments.model is None else Model(arguments.model)
     chain = None if model is None else model.info.chain
-    with stop_on(signal.SIGINT) as stop, open_skin(arguments) as opened:
+    with stop_on(signal.SIGINT) as stop, open_skin(arguments, paced=sys.stdout.isatty()) as opened:
         if model is not None:
             check_joints(model, arguments, opened)
         dof = None if chain is None else chain.dof

@@ -1,4 +1,4 @@
-"""Events to other programs: JSON lines on stdout, and the same lines by UDP."""
+"""Writes events for other programs: JSON lines on stdout, and the same lines by UDP."""
 
 from __future__ import annotations
 

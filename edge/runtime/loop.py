@@ -134,7 +134,7 @@ class Stop:
 
 @contextmanager
 def stop_on(*signals: int) -> Iterator[Stop]:
-    """Let signals end the loop after the frame at hand; a second one is as violent as ever."""
+    """Let signals end the loop after the current frame; a second signal terminates at once."""
     stop = Stop()
     before: dict[int, Any] = {}
 

@@ -1,6 +1,6 @@
-"""A map of touch: where the robot touched what, one JSON line a contact.
+"""A map of touch: what the robot touched where, one JSON line per contact.
 
-The first line of a run says what its lines are about: `{"event": "map", "frame": "...",
+The first line of a run describes the lines that follow: `{"event": "map", "frame": "...",
 "unit": "metre", "tasks": [...]}`; `frame` is the arm's base, or `skin`. A contact's line has
 `contact`, `onset_s`, `place` [x, y, z], `labels` and `confidence` {task: ...} and `flags`.
 Lines are appended, each in one piece: what was written stays, whatever happens next.

@@ -350,7 +350,8 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
             place = (chip.mux, chip.channel, chip.address)
             if place in seen:
                 raise InputError(
-                    f"{where}: bus {b} chip {c} has the place of chip {seen[place]}, {chip.route}"
+                    f"{where}: bus {b} chip {c} has the same address as chip {seen[place]}, "
+                    f"{chip.route}"
                 )
             if chip.mux is not None and chip.address in direct | muxes:
                 raise InputError(

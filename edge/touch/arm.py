@@ -237,7 +237,10 @@ def _check_joint(joint: Joint) -> None:
     if joint.kind != "fixed" and math.hypot(*joint.axis) < 1e-9:
         raise InputError(f"joint {joint.name}: its axis is zero; give a direction")
     if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
-        raise InputError(f"joint {joint.name}: its limits {joint.limits} are turned round")
+        raise InputError(
+            f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its upper limit "
+            f"{joint.limits[1]:g}"
+        )
 
 
 def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

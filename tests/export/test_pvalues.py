@@ -250,7 +250,7 @@ def test_an_error_rate_that_too_few_trials_can_tell_is_remarked_on(looked, touch
     given = ["replay", "--model", str(looked / "model.onnx"), "--error", "0.05"]
     assert edge_classify([*given, str(touches / "hard_00.npz")]) == 0
     out = capsys.readouterr()
-    assert "calibrated with 40 trials, which tell errors from 0.111 on" in out.err
+    assert "calibrated with 40 trials, which resolve error rates down to 0.111" in out.err
     decisions = [json.loads(line) for line in out.out.splitlines() if "decision" in line]
     assert [d["window_s"] for d in decisions] == [1.2, 1.2]
     assert all("unsure" in d["flags"] for d in decisions)

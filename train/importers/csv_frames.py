@@ -19,7 +19,7 @@ from edge.errors import InputError
 from edge.recording import Recording
 
 FASTEST_HZ = 1_000_000
-"""Frames a second beyond which a rate is a slip of the pen."""
+"""Frames per second above which a rate must be a mistake."""
 
 
 def trials(path: Path) -> Iterator[tuple[str, Recording]]:

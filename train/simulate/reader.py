@@ -1,4 +1,4 @@
-"""What a scene's file may hold: numbers, ranges, names; each complaint names file, key and mend."""
+"""Reads the values of a scene file: numbers, ranges, names. An error names file, key and remedy."""
 
 from __future__ import annotations
 

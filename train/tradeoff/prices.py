@@ -126,7 +126,7 @@ def section(prices: Prices, dataset: DataSet, task: str) -> Section:
         raise InputError(f"the prices are not of models of these {n} trials; measure them again")
     least, most = (edge(one.us for one in ours) for edge in (min, max))
     return Section(
-        "The price of arithmetic",
+        "What arithmetic costs",
         [
             f"One decision of {task} over 1.2 s, one number varied at a time, on "
             f"{prices.machine}. At these {n} trials all numbers of components and neighbours cost "

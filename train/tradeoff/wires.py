@@ -33,7 +33,7 @@ class Wire:
     frame_s: float
 
     def every(self, rate_hz: float) -> int:
-        """Frames that arrive at a rate are carried by this wire one in so many (1: all of them)."""
+        """n, where this bus can carry every n-th of the frames that come at the given rate."""
         return max(1, math.ceil(self.frame_s * rate_hz - 1e-9))
 
 

@@ -39,7 +39,7 @@ def test_a_folder_is_replayed_and_summed_up(replay, recordings):
     assert all(e["label"] == e["expected"] for e in decisions if e["task"] == "category")
     assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
     assert "rigid-fixed            8           ." in err
-    assert "16 of them are to the last bit as trials that the model learnt from" in err
+    assert "16 of them equal a training trial to the last bit" in err
 
 
 def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_path):
@@ -95,7 +95,7 @@ def test_the_golden_file_is_met(exported, capsys):
         *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances")),
     ]
     assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
-    assert "12 quantities are as in the golden file" in err
+    assert "12 quantities agree with the golden file" in err
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_what_is_not_said_has_a_default():
         ("mux = 0x70", "mux = 0x60", "bus 0 chip 0: mux must be 0x70 to 0x77, not 96"),
         ("mux = 0x70", "", "bus 0 chip 0: channel needs mux"),
         ("channel = 0, address = 0x2D", "channel = 8, address = 0x2D", "channel must be a whole"),
-        ("address = 0x2D", "address = 0x2C", "bus 0 chip 1 has the place of chip 0"),
+        ("address = 0x2D", "address = 0x2C", "bus 0 chip 1 has the same address as chip 0"),
         ("address = 0x2D", "address = 0x5A", "bus 0 chip 1: address must be 0x2c to 0x2f, not 90"),
         ("address = 0x2D, ", "", "bus 0 chip 1: address is missing"),
         ("first = [0, 3]", "first = [0, 2]", "taxel [0, 2] is bus 0 chip 0's too"),
