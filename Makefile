@@ -10,22 +10,22 @@ export OPENBLAS_NUM_THREADS := 1
   board-test hard-cases hard-cases-versions mutants bench faults soak clean
 
 help:
-	@echo "make test     what CI runs: lint, types, tests"
-	@echo "make export   DATA=folder of recordings (the simulated set without it) OUT=build"
-	@echo "make demo     export, then replay: decisions on a small simulated set"
-	@echo "make study    every analysis of the paper, ours beside it: build/study/report.html; DATA= for yours"
-	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
-	@echo "make wheel-test   the wheel in an empty environment, away from here"
-	@echo "make board-test   the wheel on an emulated aarch64: numbers, tests, instruction counts"
-	@echo "make demo-data    the model and touches that the wheel carries"
+	@echo "make test     what CI runs: lint, types and tests"
+	@echo "make export   fit a model; DATA=folder of recordings (default: the simulated set) OUT=build"
+	@echo "make demo     fit a model on a small simulated set, then decide on touches it has not seen"
+	@echo "make study    the paper's analyses beside ours: build/study/report.html; DATA= for yours"
 	@echo "make tradeoff what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json for"
-	@echo "              a board's figures (edge-classify bench), else this machine's; DATA= for yours"
+	@echo "              a board's timings (edge-classify bench; default: this machine's), DATA= for yours;"
 	@echo "              then make export FRONT=fast|balanced|accurate|milliseconds|accuracy"
+	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
+	@echo "make wheel-test   tests the wheel in an empty environment, outside the checkout"
+	@echo "make board-test   tests the wheel on an emulated aarch64 and counts its instructions"
+	@echo "make demo-data    renews the model and the touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
-	@echo "make hard-cases   what each hard case costs us and the usual stack, as a table"
+	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
-	@echo "make mutants  each guard taken out in turn: does a test notice?"
+	@echo "make mutants  removes each guard in turn and checks that a test fails"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
