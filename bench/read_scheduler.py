@@ -23,8 +23,9 @@ from edge.runtime.loop import Loop
 from edge.skin import file as skinfile
 from edge.skin.file import BusSpec, SkinFile
 from edge.touch.arm import Chain
+from edge.touch.contact import Contact
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
-from edge.touch.track import Contact, Tracker
+from edge.touch.track import ContactTracker
 
 WINDOW_S = 1.2
 
@@ -69,12 +70,12 @@ def follow(
     playback = Playback(recording)
     skin = fake_skin(file, playback, timed=True)
     playback.start = skin.clock.now()
-    tracker = Tracker(recording.layout, chain=chain, horizon_s=window_s)
+    tracker = ContactTracker(recording.layout, chain=chain, horizon_s=window_s)
     contact: Contact | None = None
     with skin:
         loop = Loop(skin, lasts_s=playback.ends, joints=playback if chain else None)
         for frame in loop.frames():
-            contact = tracker.push(frame) or contact
+            contact = next(iter(tracker.push(frame)), contact)
             if contact is not None and frame.t - contact.onset_s > window_s + 0.05:
                 break
     if contact is None:

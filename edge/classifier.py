@@ -9,11 +9,11 @@ from typing import Any
 from edge.errors import InputError
 from edge.model.model import Decision, Model
 from edge.model.prediction_set import NOVELTY_RATE, UNKNOWN, PredictionSet, check_rate
+from edge.touch.contact import Contact
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout
-from edge.touch.track import Contact, Tracker, for_device
-from edge.touch.tracks import Tracks
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker
 
 AS_TRAINED = "as_trained"
 """Flag of a decision whose features are those of a training trial to the last bit: nearly always
@@ -62,9 +62,9 @@ class Classifier:
     `out_of_range` (`label` is
     None: the features are too large to be measured against the training rows).
 
-    With `several`, every region is followed on its own, and each event says of which `contact`
-    it is (counted from 1 in the order of their events); a decision then has its `place` too
-    ([x, y, z], see `edge.touch.track.Contact.place`), None where it is not known.
+    With `max_contacts` above 1, every region is followed on its own, and each event says of which
+    `contact` it is (counted from 1 in the order of their events); a decision then has its `place`
+    too ([x, y, z], see `Contact.position`), None where it is not known.
     """
 
     def __init__(
@@ -74,7 +74,8 @@ class Classifier:
         *,
         error: float | None = None,
         novelty_rate: float = NOVELTY_RATE,
-        several: bool = False,
+        max_contacts: int = 1,
+        motion_on_skin: bool = False,
     ) -> None:
         """Watch with a model.
 
@@ -84,7 +85,10 @@ class Classifier:
             error: how often a label may be wrong, in (0, 1), to decide as soon as that allows;
                 None decides at the full window.
             novelty_rate: how often a trained thing may be called unknown for lying far from all.
-            several: follow every region, not the largest alone.
+            max_contacts: how many regions to follow at once; with 1, the largest alone.
+            motion_on_skin: decide a contact whose first frame has no joint angles by motion on
+                the skin, flagged `skin_motion`; else by what else is known, flagged
+                `missing_pose`.
 
         Raises:
             InputError: the skin is not the one that the model was made for, a rate is outside
@@ -101,18 +105,20 @@ class Classifier:
                 )
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
-        self.several = several
-        self.tracker = (Tracks if several else Tracker)(
+        self.several = max_contacts > 1
+        self.tracker = ContactTracker(
             self.layout,
             info.tracking,
             chain=info.chain,
             horizon_s=info.window_s,
             features=info.features,
+            max_contacts=max_contacts,
+            motion_on_skin=motion_on_skin,
         )
         self.error, self.novelty_rate = error, novelty_rate
         self._waiting: list[_Waiting] = []
-        self._current: dict[int, Contact] = {}
-        """Contacts under way by their number."""
+        self._numbers: dict[Contact, int] = {}
+        """The contacts under way."""
         self._begun = 0
 
     def _begin(self, contact: Contact, number: int) -> _Waiting:
@@ -133,16 +139,16 @@ class Classifier:
         """
         began = time.perf_counter()
         events: list[Event] = []
-        for contact in self.tracker.follow(frame):
-            number = self._number(contact)
+        for contact in self.tracker.push(frame):
+            number = self._numbers.get(contact)
             if number is None:
                 self._begun += 1
                 number = self._begun
-                self._current[number] = contact
+                self._numbers[contact] = number
                 self._waiting.append(self._begin(contact, number))
                 events.append({"event": "onset", **self._which(number), "onset_s": contact.onset_s})
             if contact.ended:
-                del self._current[number]
+                del self._numbers[contact]
                 events.append(
                     {
                         "event": "release",
@@ -158,12 +164,6 @@ class Classifier:
             if not waiting.tasks:
                 self._waiting.remove(waiting)
         return events
-
-    def _number(self, contact: Contact) -> int | None:
-        for number, known in self._current.items():
-            if known is contact:
-                return number
-        return None
 
     def _which(self, number: int) -> Event:
         return {"contact": number} if self.several else {}
@@ -189,8 +189,8 @@ class Classifier:
             "onset_s": contact.onset_s,
         }
         if self.several:
-            place = contact.place()
-            common["place"] = None if place is None else [round(x, 6) for x in place.tolist()]
+            position = contact.position()
+            common["place"] = None if position is None else [round(x, 6) for x in position.tolist()]
         flags = [
             flag
             for flag, raised in (

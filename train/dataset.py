@@ -16,10 +16,10 @@ from edge.errors import InputError
 from edge.recording import Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
-from edge.touch.contacts import first_contact
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
-from edge.touch.layout import SkinLayout
-from edge.touch.track import FeatureSeries, Tracker, TrackSettings, for_device
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, TrackSettings, first_contact
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,9 @@ def load_trials(
     for recording, path in tqdm(both, desc="following", unit=" trials", disable=not progress):
         try:
             layout = for_device(reference, recording.layout)
-            tracker = Tracker(layout, settings, chain=chain, horizon_s=horizon_s, features=names)
+            tracker = ContactTracker(
+                layout, settings, chain=chain, horizon_s=horizon_s, features=names
+            )
             found = first_contact(recording, tracker)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None

@@ -30,7 +30,7 @@ from edge.skin.file import SkinFile, frame_rate, load
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from edge.touch.track import Tracker
+from edge.touch.track import ContactTracker
 
 FORMAT = 1
 RATE_HZ = 100.0
@@ -163,13 +163,13 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     layout = Classifier(model).layout
     inside = frames[1:-2]
     settings = {"threshold": layout.threshold_counts, "valid": None, "wraps": layout.wraps}
-    tracker = Tracker(
+    tracker = ContactTracker(
         layout, info.tracking, chain=info.chain, horizon_s=info.window_s, features=info.features
     )
     series = None
     for frame in frames:
-        contact = tracker.push(frame)
-        series = contact.series() if contact is not None else series
+        for contact in tracker.push(frame):
+            series = contact.series()
     if series is None:
         raise EdgeError(
             f"{model.path}: no touch rises above its onset_counts; export the model again"
@@ -190,8 +190,8 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
             seen += take(times)
         return seen
 
-    def fresh() -> Tracker:
-        return Tracker(
+    def fresh() -> ContactTracker:
+        return ContactTracker(
             layout, info.tracking, chain=info.chain, horizon_s=info.window_s, features=info.features
         )
 

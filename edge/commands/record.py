@@ -20,8 +20,9 @@ from edge.errors import InputError
 from edge.recording import Recording, save
 from edge.runtime.loop import Loop, stop_on
 from edge.touch.arm import Chain
+from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.track import Contact, Tracker, TrackSettings
+from edge.touch.track import ContactTracker, TrackSettings
 
 LEAD_S = 0.2
 LENGTH_S = 2.0
@@ -90,7 +91,7 @@ class Trials:
     trial begins.
     """
 
-    def __init__(self, tracker: Tracker, *, lead_frames: int, length_s: float) -> None:
+    def __init__(self, tracker: ContactTracker, *, lead_frames: int, length_s: float) -> None:
         self._tracker, self._length = tracker, length_s
         self._before: deque[Frame] = deque(maxlen=max(lead_frames, 0) + _DEBOUNCE)
         self._frames: list[Frame] | None = None
@@ -98,7 +99,7 @@ class Trials:
 
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame."""
-        contact = self._tracker.push(frame)
+        contact = next(iter(self._tracker.push(frame)), None)
         if self._frames is None:
             self._before.append(frame)
             if contact is None or contact is self._saved:
@@ -192,7 +193,7 @@ def run(arguments: argparse.Namespace) -> int:
                     f"{arguments.arm} has {dof}; name their source with --joints"
                 )
         skin = opened.skin
-        tracker = Tracker(skin.layout, TrackSettings(), horizon_s=0.0)
+        tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead = round(arguments.lead / skin.period_s)
         trials = Trials(tracker, lead_frames=lead, length_s=arguments.length)
         loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)

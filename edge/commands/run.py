@@ -18,6 +18,7 @@ from edge.runtime.loop import Loop, Schedule, stop_on
 from edge.runtime.systemd import Notifier
 from edge.runtime.touch_map import MapFile
 from edge.skin.skin import ChipStatus
+from edge.touch.track import MAX_CONTACTS
 
 
 def add_parser(commands: Any) -> None:
@@ -97,7 +98,11 @@ def run(arguments: argparse.Namespace) -> int:
         dof = None if chain is None else chain.dof
         joints = stack.enter_context(open_joints(arguments, opened, dof))
         classifier = Classifier(
-            model, skin.layout, error=arguments.error, several=arguments.map is not None
+            model,
+            skin.layout,
+            error=arguments.error,
+            max_contacts=1 if arguments.map is None else MAX_CONTACTS,
+            motion_on_skin=on_skin,
         )
         touch_map = None
         if arguments.map is not None:
@@ -120,9 +125,6 @@ def run(arguments: argparse.Namespace) -> int:
             frames += 1
             notifier.alive()
             emit([chip_event(status, frame.t) for status in skin.changes()])
-            if on_skin:
-                # A contact keeps the chain that is set at its first frame.
-                classifier.tracker.chain = None if frame.joints is None else chain
             emit(classifier.push(frame))
         notifier.stopping()
         emit(classifier.finish())

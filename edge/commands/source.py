@@ -19,7 +19,7 @@ from edge.runtime.loop import JointSource
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
-from edge.touch.track import for_device
+from edge.touch.layout import for_device
 
 
 def touch_counts(model: Model | None, file: SkinFile) -> int | None:

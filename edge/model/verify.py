@@ -30,10 +30,10 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.model.model import Model, require_joints
 from edge.recording import Recording, load_arrays, load_meta
-from edge.touch.contacts import first_contact
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
-from edge.touch.layout import SkinLayout
-from edge.touch.track import FeatureSeries, Tracker, for_device
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, first_contact
 
 PARTS = ("label", "neighbours", "scores", "distances")
 
@@ -67,7 +67,7 @@ class Check:
 def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeries] | None:
     """Onset and series of a recording's first contact, by the board's own path."""
     info = model.info
-    tracker = Tracker(
+    tracker = ContactTracker(
         for_device(info.layout, recording.layout),
         info.tracking,
         chain=info.chain,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch import measures
+from edge.touch.contact import FeatureSeries
 from edge.touch.measures import (
     AREA,
     COLS,
@@ -23,7 +24,6 @@ from edge.touch.measures import (
     ROWS_ROWS,
     Feature,
 )
-from edge.touch.track import FeatureSeries
 
 FEATURES = measures.PAPER
 SAMPLES = 40

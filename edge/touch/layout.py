@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -191,3 +191,31 @@ class SkinLayout:
             return cls(**known)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
+
+
+def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
+    """The device's geometry and scale with the model's thresholds, brought to its counts.
+
+    The taxels known to be dead are the model's: what else the device lacks is missing.
+
+    Raises:
+        InputError: the device is another skin than the model's.
+    """
+    for name, what in (("rows", "rows"), ("cols", "columns"), ("wraps", "wrap-around")):
+        ours, theirs = getattr(device, name), getattr(model, name)
+        if ours != theirs:
+            raise InputError(f"this skin has {what} {ours}, the model was made for {theirs}")
+    if device.force_unit != model.force_unit or device.length_unit != model.length_unit:
+        raise InputError(
+            f"this skin measures {device.force_unit} and {device.length_unit}, "
+            f"the model was made for {model.force_unit} and {model.length_unit}"
+        )
+    ratio = 1.0
+    if device.counts_per_newton is not None and model.counts_per_newton is not None:
+        ratio = device.counts_per_newton / model.counts_per_newton
+    return replace(
+        device,
+        threshold_counts=min(round(model.threshold_counts * ratio), 65535),
+        onset_counts=min(round(model.onset * ratio), 65535),
+        dead=model.dead,
+    )

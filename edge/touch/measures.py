@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import Region, find_regions
+from edge.touch.region import ActiveTaxels, Region
 
 PAPER = ("max_force", "contact_area", "contact_motion")
 """The three features of the paper's section III-B, in its order."""
@@ -142,15 +141,16 @@ class Measurer:
         force_motion: its force-weighted centroid is followed.
         regions: the regions are counted.
         zones: where integers are measured, in the order of `ZONES`.
+        width: how many whole numbers `measure` gives a frame.
+        columns: {zone: which of them are its own}.
     """
 
-    def __init__(self, layout: SkinLayout, wanted: Sequence[str], connectivity: int = 4) -> None:
+    def __init__(self, layout: SkinLayout, wanted: Sequence[str]) -> None:
         types = features(wanted)
         self.layout = layout
         self.motion = any(f.quantity == "motion" for f in types)
         self.force_motion = any(f.quantity == "force_motion" for f in types)
         self.regions = any(f.quantity == "regions" for f in types)
-        self._connectivity = connectivity
         self._plan: list[tuple[str, slice, bool, bool]] = []
         half = layout.cols // 2
         parts = {"left": slice(0, half), "right": slice(half, layout.cols)}
@@ -163,6 +163,10 @@ class Measurer:
             if weighted or peak or area:
                 self._plan.append((zone, parts.get(zone, slice(None)), peak or area, weighted))
         self.zones = tuple(zone for zone, *_ in self._plan)
+        self.width = WIDTH * len(self._plan) + self.regions
+        self.columns = {
+            zone: slice(WIDTH * i, WIDTH * (i + 1)) for i, zone in enumerate(self.zones)
+        }
         self._whole = any(zone in ("skin", "left", "right") for zone in self.zones)
         self._others = self.regions or "second" in self.zones
         rows, cols = np.arange(layout.rows), np.arange(layout.cols)
@@ -180,28 +184,29 @@ class Measurer:
         fits = largest * 65535 * layout.rows * layout.cols < 1 << 63
         self._exact: Any = np.int64 if fits else object
 
-    def measure(self, frame: Frame, contact: Region | None) -> list[int]:
+    def measure(self, active: ActiveTaxels, contact: Region | None) -> list[int]:
         """`WIDTH` whole numbers a zone, then the number of regions where it is asked for.
 
         Args:
-            frame: of the skin.
-            contact: the region followed; None where no taxel of the frame is active.
+            active: the frame's active taxels.
+            contact: the region followed; None where no taxel of it is active.
         """
         if contact is None:
-            return [0] * (WIDTH * len(self._plan) + self.regions)
-        whole = frame.counts * self._active(frame) if self._whole else frame.counts
-        others = self._find(frame) if self._others else []
+            return [0] * self.width
+        counts = active.counts
+        whole = counts * active.mask if self._whole else counts
+        others = active.regions() if self._others else []
         row: list[int] = []
         for zone, part, extent, weighted in self._plan:
             if zone == "contact":
-                held = frame.counts * contact.mask
+                held = counts * contact.mask
                 row += (contact.peak, contact.area)
             elif zone == "second":
                 rest = [other for other in others if other.bits != contact.bits]
                 if not rest:
                     row += NOTHING
                     continue
-                held = frame.counts * rest[0].mask
+                held = counts * rest[0].mask
                 row += (rest[0].peak, rest[0].area)
             else:
                 held = whole[:, part]
@@ -213,21 +218,6 @@ class Measurer:
         if self.regions:
             row.append(len(others))
         return row
-
-    def _active(self, frame: Frame) -> NDArray[np.bool_]:
-        active: NDArray[np.bool_] = frame.counts > self.layout.threshold_counts
-        if frame.valid is not None:
-            active &= frame.valid
-        return active
-
-    def _find(self, frame: Frame) -> list[Region]:
-        return find_regions(
-            frame.counts,
-            self.layout.threshold_counts,
-            valid=frame.valid,
-            wraps=self.layout.wraps,
-            connectivity=self._connectivity,
-        )
 
     def _moments(self, held: NDArray[np.uint16], part: slice) -> tuple[int, ...]:
         """Force and its sums over the columns `part` of counts (rows, columns)."""

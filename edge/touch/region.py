@@ -1,190 +1,18 @@
 """Contact regions of a frame: threshold, connected components, the largest one.
 
-A frame's active taxels are the bits of one Python integer, so that neighbours are shifts, sets
-are ands and ors, and areas are population counts. A row takes cols + 1 bits: the last one is
-always clear, and keeps a shift or a carry from running into the next row. Everything that is
+A frame's active taxels are the bits of one integer (see `edge.touch.grid`). Everything that is
 counted here is an integer and the same on every machine.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-
-PLAIN_STEPS = 6
-"""Steps of one taxel that a flood takes before it goes on by whole runs."""
-
-
-class Grid:
-    """Masks of a rows x cols grid; `wraps` joins its last column to its first.
-
-    Connectivity is 4 (taxels that share an edge) or 8 (a corner is enough).
-    """
-
-    __slots__ = (
-        "_col_planes",
-        "_columns",
-        "_halves",
-        "_row_planes",
-        "cols",
-        "connectivity",
-        "rows",
-        "stride",
-        "wraps",
-    )
-
-    def __init__(self, rows: int, cols: int, wraps: bool, connectivity: int) -> None:
-        if connectivity not in (4, 8):
-            raise InputError(f"connectivity must be 4 or 8, not {connectivity!r}")
-        self.rows, self.cols, self.wraps, self.connectivity = rows, cols, wraps, connectivity
-        self.stride = stride = cols + 1
-        first = sum(1 << (row * stride) for row in range(rows))
-        self._columns = [first << col for col in range(cols)]
-        line = (1 << cols) - 1
-        self._row_planes = [
-            sum(line << (row * stride) for row in range(rows) if row >> plane & 1)
-            for plane in range((rows - 1).bit_length())
-        ]
-        self._col_planes = [
-            sum(self._columns[col] for col in range(cols) if col >> plane & 1)
-            for plane in range((cols - 1).bit_length())
-        ]
-        half = cols // 2
-        self._halves = [
-            sum(self._columns) ^ sum(self._columns[start : start + half])
-            for start in (half // 2, 0, cols - half)
-        ]
-
-    def pack(self, active: NDArray[np.bool_]) -> int:
-        """The set of a bool array (rows, stride) whose last column is False."""
-        return int.from_bytes(np.packbits(active, None, "little").tobytes(), "little")
-
-    def unpack(self, bits: int) -> NDArray[np.bool_]:
-        """The set as a bool array (rows, cols)."""
-        size = self.rows * self.stride
-        packed = np.frombuffer(bits.to_bytes((size + 7) // 8, "little"), dtype=np.uint8)
-        flat = np.unpackbits(packed, count=size, bitorder="little").view(np.bool_)
-        return flat.reshape(self.rows, self.stride)[:, : self.cols]
-
-    def bit(self, index: int) -> int:
-        """The taxel of a flat index (row * cols + col)."""
-        return 1 << (index // self.cols * self.stride + index % self.cols)
-
-    def index(self, bits: int) -> int:
-        """Lowest flat index (row * cols + col) of a set."""
-        row, col = divmod((bits & -bits).bit_length() - 1, self.stride)
-        return row * self.cols + col
-
-    def seam(self, bits: int) -> int:
-        """The taxels across the seam from those of `bits` in the first and last columns."""
-        turn = self.cols - 1
-        return (bits & self._columns[0]) << turn | (bits & self._columns[-1]) >> turn
-
-    def touching(self, bits: int, seam: bool) -> int:
-        """The taxels next to one of `bits`; bits outside the grid may be set too.
-
-        Args:
-            bits: the set.
-            seam: step across the seam; False saves the work where nothing can cross it.
-        """
-        stride = self.stride
-        across = bits << 1 | bits >> 1
-        if seam:
-            across |= self.seam(bits)
-        if self.connectivity == 4:
-            return across | bits << stride | bits >> stride
-        both = across | bits
-        return across | both << stride | both >> stride
-
-    def lone(self, bits: int) -> int:
-        """The taxels of `bits` that touch no other of them."""
-        return bits & ~self.touching(bits, self.wraps and self.cols > 1)
-
-    def flood(self, seed: int, within: int) -> int:
-        """All taxels of `within` that are connected to `seed`."""
-        seam = bool(self.wraps and within & self._columns[0] and within & self._columns[-1])
-        region = seed
-        for _ in range(PLAIN_STEPS):
-            grown = (region | self.touching(region, seam)) & within
-            if grown == region:
-                return region
-            region = grown
-        # A large or winding region: each round now fills whole runs in the four directions
-        # (to higher columns by the carry of an addition), and a step of one taxel takes the
-        # corners and the seam.
-        left = _doublings(within, 1, self.cols, down=False)
-        down = _doublings(within, self.stride, self.rows, down=True)
-        up = _doublings(within, self.stride, self.rows, down=False)
-        while True:
-            grown = region | within & ~(within + region)
-            for shift, free in left:
-                grown |= grown >> shift & free
-            for shift, free in down:
-                grown |= grown << shift & free
-            for shift, free in up:
-                grown |= grown >> shift & free
-            grown |= self.touching(grown, seam) & within
-            if grown == region:
-                return region
-            region = grown
-
-    def row_sum(self, bits: int) -> int:
-        """Sum of the rows of all taxels of `bits`, a population count for each bit plane."""
-        total = 0
-        for plane, mask in enumerate(self._row_planes):
-            total += (bits & mask).bit_count() << plane
-        return total
-
-    def col_sum(self, bits: int) -> int:
-        """Sum of the columns of all taxels of `bits`; 0 <= sum < cols * area.
-
-        On a circle the columns are counted from the cut that makes their variance least (the
-        intrinsic mean of a circle: the mean of a set that spans less than half a turn is the
-        mean of its unrolled columns, wherever the seam lies). Of equal cuts the lowest column.
-        """
-        if self.wraps and all(bits & outside for outside in self._halves):
-            return self._circular_sum(bits)
-        total = 0
-        for plane, mask in enumerate(self._col_planes):
-            total += (bits & mask).bit_count() << plane
-        return total
-
-    def _circular_sum(self, bits: int) -> int:
-        turn = self.cols
-        counts = [(bits & column).bit_count() for column in self._columns]
-        area = sum(counts)
-        first = sum(col * n for col, n in enumerate(counts))
-        second = sum(col * col * n for col, n in enumerate(counts))
-        best, least = first, area * second - first * first
-        for col, n in enumerate(counts[:-1]):
-            first += turn * n
-            second += turn * (turn + 2 * col) * n
-            variance = area * second - first * first
-            if variance < least:
-                best, least = first, variance
-        return best - turn * area if best >= turn * area else best
-
-
-def _doublings(within: int, step: int, count: int, *, down: bool) -> list[tuple[int, int]]:
-    """Shifts of 1, 2, 4, ... steps, each with the taxels that it may fill (Kogge and Stone)."""
-    rounds: list[tuple[int, int]] = []
-    shift, free = step, within
-    while shift < step * count and free:
-        rounds.append((shift, free))
-        free &= free << shift if down else free >> shift
-        shift *= 2
-    return rounds
-
-
-@lru_cache(maxsize=16)
-def grid(rows: int, cols: int, wraps: bool, connectivity: int) -> Grid:
-    """The masks of a shape; they are constants, made once."""
-    return Grid(rows, cols, wraps, connectivity)
+from edge.touch.grid import Grid, grid
 
 
 class Region:
@@ -196,11 +24,12 @@ class Region:
         bits: the taxels as the bits of an integer (see `Grid`).
     """
 
-    __slots__ = ("_grid", "_sums", "area", "bits", "peak")
+    __slots__ = ("_grid", "_mask", "_sums", "area", "bits", "peak")
 
     def __init__(self, of: Grid, bits: int, peak: int) -> None:
         self._grid = of
         self._sums: tuple[int, int] | None = None
+        self._mask: NDArray[np.bool_] | None = None
         self.bits = bits
         self.area = bits.bit_count()
         self.peak = peak
@@ -221,7 +50,9 @@ class Region:
     @property
     def mask(self) -> NDArray[np.bool_]:
         """(rows, cols), True on the region's taxels."""
-        return self._grid.unpack(self.bits)
+        if self._mask is None:
+            self._mask = self._grid.unpack(self.bits)
+        return self._mask
 
     @property
     def index(self) -> int:
@@ -238,40 +69,102 @@ class Region:
         return f"Region(area={self.area}, peak={self.peak}, centroid=({row:.2f}, {col:.2f}))"
 
 
-def _prepare(
-    counts: NDArray[Any], valid: NDArray[np.bool_] | None, wraps: bool, connectivity: int
-) -> Grid:
-    if counts.ndim != 2 or counts.dtype.kind not in "ui":
-        raise InputError(
-            f"counts must be whole numbers (rows, cols), not {counts.dtype} {counts.shape}"
-        )
-    if valid is not None and (valid.shape != counts.shape or valid.dtype != np.bool_):
-        raise InputError(f"valid must be bool {counts.shape}, not {valid.dtype} {valid.shape}")
-    rows, cols = counts.shape
-    return grid(rows, cols, wraps, connectivity)
+class ActiveTaxels:
+    """The taxels of one frame above the threshold, and the regions that they form.
 
+    A frame is thresholded once, and only where something asks for it; whatever is found in it
+    is kept.
+    """
 
-def _active(
-    of: Grid,
-    counts: NDArray[Any],
-    threshold: int | NDArray[Any],
-    valid: NDArray[np.bool_] | None,
-) -> int:
-    active = np.zeros((of.rows, of.stride), dtype=np.bool_)
-    inside = active[:, : of.cols]
-    try:
-        np.greater(counts, threshold, out=inside)
-    except ValueError:
-        raise InputError(
-            f"threshold must be one number or {counts.shape}, not {np.shape(threshold)}"
-        ) from None
-    if valid is not None:
-        inside &= valid
-    return of.pack(active)
+    __slots__ = ("_bits", "_grid", "_mask", "_regions", "_threshold", "_valid", "counts")
 
+    def __init__(
+        self,
+        counts: NDArray[Any],
+        threshold: int | NDArray[Any],
+        *,
+        valid: NDArray[np.bool_] | None = None,
+        wraps: bool = True,
+        connectivity: int = 4,
+    ) -> None:
+        """Take the arguments of `find_regions`.
 
-def _peak(of: Grid, counts: NDArray[Any], bits: int) -> int:
-    return int(counts[of.unpack(bits)].max())
+        Raises:
+            InputError: the arrays' types or shapes make no sense.
+        """
+        if counts.ndim != 2 or counts.dtype.kind not in "ui":
+            raise InputError(
+                f"counts must be whole numbers (rows, cols), not {counts.dtype} {counts.shape}"
+            )
+        if valid is not None and (valid.shape != counts.shape or valid.dtype != np.bool_):
+            raise InputError(f"valid must be bool {counts.shape}, not {valid.dtype} {valid.shape}")
+        rows, cols = counts.shape
+        self.counts = counts
+        self._grid = grid(rows, cols, wraps, connectivity)
+        self._threshold, self._valid = threshold, valid
+        self._mask: NDArray[np.bool_] | None = None
+        self._bits: int | None = None
+        self._regions: list[Region] | None = None
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """(rows, cols), True on the active taxels."""
+        if self._mask is None:
+            of = self._grid
+            active = np.zeros((of.rows, of.stride), dtype=np.bool_)
+            inside = active[:, : of.cols]
+            try:
+                np.greater(self.counts, self._threshold, out=inside)
+            except ValueError:
+                raise InputError(
+                    f"threshold must be one number or {self.counts.shape}, "
+                    f"not {np.shape(self._threshold)}"
+                ) from None
+            if self._valid is not None:
+                inside &= self._valid
+            self._bits = of.pack(active)
+            self._mask = inside
+        return self._mask
+
+    @property
+    def bits(self) -> int:
+        """The active taxels as the bits of an integer (see `Grid`)."""
+        if self._bits is None:
+            _ = self.mask
+        assert self._bits is not None
+        return self._bits
+
+    def regions(self) -> list[Region]:
+        """All regions, as `find_regions` gives them."""
+        if self._regions is None:
+            of, bits = self._grid, self.bits
+            regions: list[Region] = []
+            while bits:
+                found = of.flood(bits & -bits, bits)
+                bits ^= found
+                regions.append(Region(of, found, _peak(of, self.counts, found)))
+            regions.sort(key=lambda region: (-region.area, -region.peak, region.index))
+            self._regions = regions
+        return self._regions
+
+    def largest(self, previous: Region | None = None) -> Region | None:
+        """The largest region, as `largest_region` gives it."""
+        counts = self.counts
+        place = int(counts.argmax())
+        highest = int(counts.item(place))
+        if isinstance(self._threshold, int) and highest <= self._threshold:
+            return None
+        of, bits = self._grid, self.bits
+        if not bits:
+            return None
+        # The region with the frame's peak is nearly always the largest one: it comes first, and
+        # what is left is looked at only where it is large enough to matter.
+        top = of.bit(place)
+        found = of.flood(top if bits & top else bits & -bits, bits)
+        rest = bits ^ found
+        if rest.bit_count() >= found.bit_count():
+            found = _largest(of, counts, found, rest, previous)
+        return Region(of, found, highest if found & top else _peak(of, counts, found))
 
 
 def find_regions(
@@ -294,15 +187,9 @@ def find_regions(
     Returns:
         Largest area first; equal areas by higher peak, then by lower index.
     """
-    of = _prepare(counts, valid, wraps, connectivity)
-    bits = _active(of, counts, threshold, valid)
-    regions: list[Region] = []
-    while bits:
-        found = of.flood(bits & -bits, bits)
-        bits ^= found
-        regions.append(Region(of, found, _peak(of, counts, found)))
-    regions.sort(key=lambda region: (-region.area, -region.peak, region.index))
-    return regions
+    return ActiveTaxels(
+        counts, threshold, valid=valid, wraps=wraps, connectivity=connectivity
+    ).regions()
 
 
 def largest_region(
@@ -319,22 +206,13 @@ def largest_region(
     Equal areas go to the larger overlap with `previous` (the region followed so far), then to
     the higher peak, then to the lower index. The other arguments are those of `find_regions`.
     """
-    of = _prepare(counts, valid, wraps, connectivity)
-    place = int(counts.argmax())
-    highest = int(counts.item(place))
-    if isinstance(threshold, int) and highest <= threshold:
-        return None
-    bits = _active(of, counts, threshold, valid)
-    if not bits:
-        return None
-    # The region with the frame's peak is nearly always the largest one: it comes first, and
-    # what is left is looked at only where it is large enough to matter.
-    top = of.bit(place)
-    found = of.flood(top if bits & top else bits & -bits, bits)
-    rest = bits ^ found
-    if rest.bit_count() >= found.bit_count():
-        found = _largest(of, counts, found, rest, previous)
-    return Region(of, found, highest if found & top else _peak(of, counts, found))
+    return ActiveTaxels(
+        counts, threshold, valid=valid, wraps=wraps, connectivity=connectivity
+    ).largest(previous)
+
+
+def _peak(of: Grid, counts: NDArray[Any], bits: int) -> int:
+    return int(counts[of.unpack(bits)].max())
 
 
 def _largest(of: Grid, counts: NDArray[Any], found: int, rest: int, previous: Region | None) -> int:

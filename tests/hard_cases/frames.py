@@ -9,11 +9,12 @@ import numpy as np
 import scipy.ndimage
 from hypothesis import strategies as st
 
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from edge.touch.track import FeatureSeries, Tracker, TrackSettings
+from edge.touch.track import ContactTracker, TrackSettings
 from tests.edge.touch.test_region import SHAPES, check_against_reference
 from tests.hard_cases.cases import Case
 
@@ -108,10 +109,10 @@ def seam_usual() -> str:
 
 
 def series_of(frames: list[np.ndarray], layout: SkinLayout = FOREARM) -> FeatureSeries:
-    tracker = Tracker(layout, TrackSettings(debounce=1))
+    tracker = ContactTracker(layout, TrackSettings(debounce=1))
     found = None
     for i, counts in enumerate(frames):
-        contact = tracker.push(Frame(0.01 * i, counts))
+        (contact,) = tracker.push(Frame(0.01 * i, counts)) or [None]
         found = found or contact
     assert found is not None
     return found.series()
@@ -189,10 +190,10 @@ def split_error(dead: int, length: int) -> float:
 def contact_error(lead: int, length: int, settings: int) -> float:
     """Onset, end and length of a contact against what the frames say."""
     peaks = [0] * lead + [100] * length + [0] * 8
-    tracker = Tracker(FOREARM, TrackSettings(debounce=settings))
+    tracker = ContactTracker(FOREARM, TrackSettings(debounce=settings))
     found = []
     for i, peak in enumerate(peaks):
-        contact = tracker.push(Frame(0.01 * i, taxels((3, 3), value=peak)))
+        (contact,) = tracker.push(Frame(0.01 * i, taxels((3, 3), value=peak))) or [None]
         if contact is not None and contact not in found:
             found.append(contact)
     if length < settings:
@@ -215,13 +216,13 @@ def times_error(seed: int, shortest: float) -> float:
     steps = 10.0 ** rng.uniform(math.log10(shortest), -0.5, 40)
     readings = np.cumsum(np.concatenate([[0.0], np.repeat(steps, rng.integers(1, 3, 40))]))
     readings = np.sort(np.concatenate([readings, readings[::5]]))  # some instants twice
-    tracker = Tracker(FOREARM, TrackSettings(debounce=1))
+    tracker = ContactTracker(FOREARM, TrackSettings(debounce=1))
     latest: dict[float, int] = {}
     contact = None
     for t in readings.tolist():
         peak = int(rng.integers(51, 65536))
         latest[t] = peak
-        contact = tracker.push(Frame(t, taxels((3, 3), value=peak))) or contact
+        (contact,) = tracker.push(Frame(t, taxels((3, 3), value=peak))) or [contact]
     assert contact is not None
     vector = feature_vector(contact.series(), 1.2)[:40]
     t, peaks = list(latest), list(latest.values())

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from edge.runtime.joint_stream import Joints
 from edge.touch.arm import Chain, Joint
 from edge.touch.frame import Frame
-from edge.touch.track import Tracker, TrackSettings
+from edge.touch.track import ContactTracker, TrackSettings
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, SEEDS, taxels
 
@@ -115,12 +115,14 @@ def line_error(angle: float, step: float) -> float:
 def moved_error(seed: int) -> float:
     """Motion of a region that stays in the world while the link turns under it by 2 pi."""
     layout = replace(FOREARM, radius_m=None, pitch_m=0.01)
-    tracker = Tracker(layout, TrackSettings(debounce=1), chain=Chain([Joint("j", (0.0, 0.0, 1.0))]))
+    tracker = ContactTracker(
+        layout, TrackSettings(debounce=1), chain=Chain([Joint("j", (0.0, 0.0, 1.0))])
+    )
     angle = float(np.random.default_rng(seed).uniform(-3, 3))
     contact = None
     for i in range(3):
         joints = np.array([angle + 2.0 * math.pi * i])
-        contact = tracker.push(Frame(0.01 * i, taxels((3, 7)), joints=joints)) or contact
+        (contact,) = tracker.push(Frame(0.01 * i, taxels((3, 7)), joints=joints)) or [contact]
     assert contact is not None
     return float(np.abs(contact.series().motion).max())
 

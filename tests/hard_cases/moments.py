@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from edge.model.model import Model
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
-from edge.touch.track import Tracker, TrackSettings
+from edge.touch.track import ContactTracker, TrackSettings
 from export.graph import to_onnx
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM
@@ -74,10 +74,10 @@ def moments(counts: NDArray[np.uint16]) -> list[mpmath.mpf]:
 def moment_error(name: str, value: int, seed: int) -> float:
     """Largest error of a moment, in the skin's larger side (its square for the slant)."""
     counts = shape(name, value, seed)
-    tracker = Tracker(FOREARM, TrackSettings(debounce=1), features=MOMENTS)
+    tracker = ContactTracker(FOREARM, TrackSettings(debounce=1), features=MOMENTS)
     contact = None
     for i in range(3):
-        contact = tracker.push(Frame(0.01 * i, counts))
+        (contact,) = tracker.push(Frame(0.01 * i, counts)) or [None]
     assert contact is not None
     seen = feature_vector(contact.series(), 0.02, 3, MOMENTS).reshape(len(MOMENTS), 3)
     side = max(FOREARM.shape)

@@ -20,7 +20,7 @@ from edge.touch.arm import Chain, Joint
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.track import Tracker
+from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, flicker_frames, series_of, taxels
 from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline
@@ -52,7 +52,7 @@ def stored(bad: float, key: str) -> None:
 def frame(bad: float, what: str) -> None:
     times = np.full((16, 24), bad if what == "times" else 0.0)
     joints = np.full(5, bad if what == "joints" else 0.0)
-    tracker = Tracker(FOREARM, chain=Chain.cody())
+    tracker = ContactTracker(FOREARM, chain=Chain.cody())
     t = bad if what == "t" else 0.0
     tracker.push(Frame(t, taxels((3, 3)), times=times, joints=joints))
 

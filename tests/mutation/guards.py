@@ -45,6 +45,7 @@ class Guard:
         return runner.Job(self.keeps, match.file, text, runner.stages(match.file, first))
 
 
+CONTACT, GRID = "edge/touch/contact.py", "edge/touch/grid.py"
 PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/touch/track.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
 TILT = "train/simulate/effects/tilt.py"
@@ -237,32 +238,32 @@ GUARDS = (
     ),
     Guard(
         "two readings of one instant are one",
-        f"{TRACK}:add",
-        "if self._t and t <= self._t[-1]: ...",
+        f"{CONTACT}:add",
+        "if self._n and age <= self._age: ...",
         "if False: ...",
     ),
     Guard(
         "motion counts from the reading that counts",
-        f"{TRACK}:add",
+        f"{CONTACT}:_forget_last",
         "self._starts.pop(which, None)",
         "pass",
     ),
     Guard(
         "a frame's time is finite",
-        f"{TRACK}:_take",
+        f"{TRACK}:_check",
         "if not math.isfinite(frame.t): ...",
         "if False: ...",
     ),
     Guard(
         "a chip's time is finite",
-        f"{TRACK}:_time",
+        f"{CONTACT}:region_time",
         "if not math.isfinite(t): ...",
         "if False: ...",
     ),
     Guard(
         "one frame alone begins no contact",
-        f"{TRACK}:_await",
-        "if self._run < of.settings.debounce: ...",
+        f"{TRACK}:push",
+        "if self._run < self._settings.debounce: ...",
         "if False: ...",
     ),
     Guard(
@@ -274,20 +275,20 @@ GUARDS = (
     ),
     Guard(
         "a taxel that could not be read is not in contact",
-        f"{REGION}:_active",
-        "inside &= valid",
+        f"{REGION}:mask",
+        "inside &= self._valid",
         "pass",
         "splits",
     ),
     Guard(
         "a region across the seam is averaged on the circle",
-        f"{REGION}:col_sum",
+        f"{GRID}:col_sum",
         "if self.wraps and all(bits & outside for outside in self._halves): ...",
         "if False: ...",
     ),
     Guard(
         "a clear bit after each row stops carries",
-        f"{REGION}:__init__",
+        f"{GRID}:__init__",
         "self.stride = stride = cols + 1",
         "self.stride = stride = cols",
     ),

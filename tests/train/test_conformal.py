@@ -7,9 +7,8 @@ import pytest
 
 from edge.errors import InputError
 from edge.model.prediction_set import PredictionSet
-from edge.touch.contacts import first_contact
 from edge.touch.features import feature_vector
-from edge.touch.track import Tracker
+from edge.touch.track import ContactTracker, first_contact
 from train.conformal import Ranking, SequentialClassifier, deal, ratios
 from train.importers import sdh2
 from train.pipeline import Choice
@@ -24,7 +23,7 @@ def vectors(recordings, chain, decision_points=DECISION_POINTS):
     """(decision_points, n, p) and the labels of recordings with a contact."""
     rows, labels = [], []
     for recording in recordings:
-        tracker = Tracker(recording.layout, chain=chain, horizon_s=decision_points[-1])
+        tracker = ContactTracker(recording.layout, chain=chain, horizon_s=decision_points[-1])
         found = first_contact(recording, tracker)
         if found is not None:
             rows.append([feature_vector(found[1], window) for window in decision_points])

@@ -13,11 +13,11 @@ from edge.errors import InputError
 from edge.files import write_whole
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.contacts import first_contact
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from edge.touch.track import FeatureSeries, Tracker
+from edge.touch.track import ContactTracker, first_contact
 from train.dataset import arm_of
 
 FRAMES = 6
@@ -52,7 +52,7 @@ def draw(
     chain = arm_of(recording, where)
     if scene and chain is None:
         raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
-    found = first_contact(recording, Tracker(layout, chain=chain, horizon_s=HORIZON_S))
+    found = first_contact(recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S))
     rows = 3 if scene else 2
     heights = [1.7, 3.2, 4.0][:rows]
     figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")

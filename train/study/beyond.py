@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
 from edge.recording import Recording
-from edge.touch.contacts import first_contact
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
+from edge.touch.layout import for_device
 from edge.touch.measures import feature, names
-from edge.touch.track import Tracker, for_device
+from edge.touch.track import ContactTracker, first_contact
 from train.pipeline import scale_of
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
@@ -103,7 +103,7 @@ def frame_cost(recordings: Sequence[Recording], context: Context, wanted: Sequen
         began = time.perf_counter()
         for recording in recordings:
             layout = for_device(data.layout, recording.layout)
-            tracker = Tracker(
+            tracker = ContactTracker(
                 layout, data.tracking, chain=data.chain, horizon_s=WINDOW_S, features=wanted
             )
             contact = first_contact(recording, tracker)

@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from edge.recording import Recording
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
-from edge.touch.track import FeatureSeries
 from train.dataset import DataSet
 from train.simulate.scene_model import Scene
 from train.study import skins

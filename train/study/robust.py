@@ -9,8 +9,9 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
+from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from edge.touch.track import FeatureSeries, TrackSettings
+from edge.touch.track import TrackSettings
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
 from train.simulate.assemble import make_plan

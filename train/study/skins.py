@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.contacts import first_contact
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
-from edge.touch.layout import SkinLayout
-from edge.touch.track import FeatureSeries, Tracker, TrackSettings, for_device
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, TrackSettings, first_contact
 
 BLOCK = (4, 3)
 """Taxels that one chip reads: rows and columns (Cody's skin: 32 chips of 12)."""
@@ -32,7 +32,7 @@ def follow(
     found: list[FeatureSeries | None] = []
     for recording in recordings:
         device = for_device(layout, recording.layout)
-        tracker = Tracker(device, tracking, chain=chain, horizon_s=horizon_s, features=names)
+        tracker = ContactTracker(device, tracking, chain=chain, horizon_s=horizon_s, features=names)
         contact = first_contact(recording, tracker)
         found.append(None if contact is None else contact[1])
     return found

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from edge.touch.track import FeatureSeries
+from edge.touch.contact import FeatureSeries
 from train.crossval import votes_right
 from train.pipeline import Choice, principal_axes, scale_of
 from train.study.score import Labels, Result, best_cell

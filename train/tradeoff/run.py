@@ -14,9 +14,9 @@ from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.files import write_whole
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
 from edge.touch.layout import SkinLayout
-from edge.touch.track import FeatureSeries
 from train.dataset import DataSet, load_trials
 from train.report.html import write
 from train.simulate import scene as scenes

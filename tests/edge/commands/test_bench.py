@@ -10,8 +10,7 @@ from edge.commands.bench import summary, touch
 from edge.model.model import Model
 from edge.recording import Recording
 from edge.skin.file import shipped
-from edge.touch.contacts import first_contact
-from edge.touch.track import Tracker
+from edge.touch.track import ContactTracker, first_contact
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +63,7 @@ def test_percentiles_are_by_nearest_rank():
 def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
     info = Model(exported / "model.onnx").info
     frames = touch(Model(exported / "model.onnx"), info.window_s)
-    tracker = Tracker(info.layout, info.tracking, chain=info.chain, horizon_s=info.window_s)
+    tracker = ContactTracker(info.layout, info.tracking, chain=info.chain, horizon_s=info.window_s)
     import numpy as np
 
     recording = Recording(

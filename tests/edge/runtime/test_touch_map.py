@@ -16,7 +16,7 @@ from edge.runtime import touch_map as touchmap
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.tracks import Tracks
+from edge.touch.track import MAX_CONTACTS, ContactTracker
 
 FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20)
 
@@ -29,8 +29,12 @@ def follow(tracks, pictures, t=0.0):
         for r, row in enumerate(picture.split("/")):
             for c, taxel in enumerate(row):
                 counts[r, c] = {"#": 100, "+": 15}.get(taxel, 0)
-        out.append(list(tracks.follow(Frame(t + i / 100, counts))))
+        out.append(list(tracks.push(Frame(t + i / 100, counts))))
     return out
+
+
+def every_region():
+    return ContactTracker(FLAT, max_contacts=MAX_CONTACTS)
 
 
 def areas(contact):
@@ -38,7 +42,7 @@ def areas(contact):
 
 
 def test_two_regions_are_two_contacts_with_their_own_onsets():
-    seen = follow(Tracks(FLAT), ["##", "##", "##.....###", "##.....###", "#......###"])
+    seen = follow(every_region(), ["##", "##", "##.....###", "##.....###", "#......###"])
     assert [len(contacts) for contacts in seen] == [0, 1, 1, 2, 2]
     first, second = seen[-1]
     assert (first.onset_s, second.onset_s) == (0.0, 0.02)
@@ -48,42 +52,42 @@ def test_two_regions_are_two_contacts_with_their_own_onsets():
 
 def test_the_larger_region_does_not_take_over_a_contact():
     """What following the largest region alone would do."""
-    seen = follow(Tracks(FLAT), ["##", "##", "##....####", "##....####"])
+    seen = follow(every_region(), ["##", "##", "##....####", "##....####"])
     assert areas(seen[-1][0]) == [2, 2, 2, 2]
 
 
 def test_a_region_that_moves_by_its_width_goes_on():
-    (contact,) = follow(Tracks(FLAT), ["#", "#", ".#", "..#", "..#"])[-1]
+    (contact,) = follow(every_region(), ["#", "#", ".#", "..#", "..#"])[-1]
     assert areas(contact) == [1] * 5
 
 
 def test_where_two_grow_into_one_the_older_goes_on_and_the_other_ends():
     apart, one = ".##...##", ".######"
-    seen = follow(Tracks(FLAT), [".##", apart, apart, *[one] * 5])
+    seen = follow(every_region(), [".##", apart, apart, *[one] * 5])
     assert [c.ended for c in seen[-1]] == [False, True]
     assert areas(seen[-1][0]) == [2, 2, 2, 6, 6, 6, 6, 6]
     assert areas(seen[-1][1]) == [2, 2, 0, 0, 0, 0, 0]
 
 
 def test_where_one_parts_in_two_the_larger_share_goes_on():
-    seen = follow(Tracks(FLAT), ["######", "######", "##.###", "##.###"])
+    seen = follow(every_region(), ["######", "######", "##.###", "##.###"])
     old, new = seen[-1]
     assert (areas(old), areas(new)) == ([6, 6, 3, 3], [2, 2])
 
 
 def test_a_region_below_the_onset_count_begins_nothing():
-    assert follow(Tracks(FLAT), ["++", "++", "++"])[-1] == []
+    assert follow(every_region(), ["++", "++", "++"])[-1] == []
 
 
 def test_a_contact_ends_by_itself_while_another_goes_on():
-    seen = follow(Tracks(FLAT), ["#....##"] * 2 + [".....##"] * 6)
+    seen = follow(every_region(), ["#....##"] * 2 + [".....##"] * 6)
     assert [len(contacts) for contacts in seen] == [0, 2, 2, 2, 2, 2, 2, 1]
     assert [contact.ended for contact in seen[6]] == [False, True]
 
 
 def test_a_skin_that_flickers_has_no_more_than_so_many_contacts():
     board = "/".join(["#." * 10, ".#" * 10] * 3)
-    assert len(follow(Tracks(FLAT), [board] * 3)[-1]) == Tracks.AT_MOST
+    assert len(follow(every_region(), [board] * 3)[-1]) == MAX_CONTACTS
 
 
 def test_a_single_contact_is_followed_as_by_the_largest_region():
@@ -91,7 +95,7 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
     model = Model(demo.MODEL)
     for path in demo.recordings():
         recording = load(path)
-        alone, several = Classifier(model), Classifier(model, several=True)
+        alone, several = Classifier(model), Classifier(model, max_contacts=8)
         expected, seen = ([e for f in recording for e in w.push(f)] for w in (alone, several))
         number = next(e["contact"] for e in seen if e["event"] == "decision")
         mine = [e for e in seen if e["contact"] == number]
@@ -156,13 +160,13 @@ def test_a_place_is_the_centroid_turned_and_moved_by_the_arm():
     layout = replace(FLAT, pitch_m=0.01)
     chain = Chain.cody()
     joints = np.array([0.1, -0.2, 0.3, 0.4, -0.5])
-    tracks = Tracks(layout, chain=chain)
+    tracks = ContactTracker(layout, chain=chain, max_contacts=2)
     counts = np.zeros(FLAT.shape, dtype=np.uint16)
     counts[2, 3:5] = 100
     for i in range(2):
-        (*_, contact) = [None, *tracks.follow(Frame(i / 100, counts, joints=joints))]
+        (*_, contact) = [None, *tracks.push(Frame(i / 100, counts, joints=joints))]
     expected = (chain.pose(joints) @ [0.035, 0.02, 0.0, 1.0])[:3]
-    assert contact.place() == pytest.approx(expected, abs=1e-15)
+    assert contact.position() == pytest.approx(expected, abs=1e-15)
 
 
 def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
-from edge.touch.track import FeatureSeries
 
 
 def series(t, peak, area=None, motion=None, scale=None, ended=False):

@@ -9,15 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import edge.touch.measures
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import QUANTITIES, ZONES, Measurer, feature, features, names
-from edge.touch.region import find_regions, largest_region
-from edge.touch.track import Tracker
+from edge.touch.region import ActiveTaxels, find_regions
+from edge.touch.track import ContactTracker
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
 ROUND = replace(FLAT, wraps=True)
@@ -91,12 +90,11 @@ def frame_of(seed: int, shape, density=0.4, high=65535) -> Frame:
 def test_whole_numbers_of_every_place_are_those_of_plain_sums(seed, density, high, wraps, shape):
     layout = SkinLayout(*shape, wraps=wraps, threshold_counts=10)
     frame = frame_of(seed, shape, density, high)
-    contact = largest_region(
-        frame.counts, layout.threshold_counts, valid=frame.valid, wraps=wraps, connectivity=4
-    )
+    active = ActiveTaxels(frame.counts, 10, valid=frame.valid, wraps=wraps)
+    contact = active.largest()
     measurer = Measurer(layout, ALL)
     assert measurer.zones == ZONES
-    row = measurer.measure(frame, contact)
+    row = measurer.measure(active, contact)
     if contact is None:
         assert row == [0] * 41
         return
@@ -111,7 +109,8 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     rows, cols = 1024, 1024
     layout = SkinLayout(rows, cols, wraps=wraps)
     frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
-    row = Measurer(layout, ["skin_length"]).measure(frame, largest_region(frame.counts, 0))
+    active = ActiveTaxels(frame.counts, 0)
+    row = Measurer(layout, ["skin_length"]).measure(active, active.largest())
     line = sum(range(cols))
     squares = sum(c * c for c in range(cols))
     assert row[2:] == [
@@ -125,19 +124,19 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
             rows * squares,
         )
     ]
-    tracker = Tracker(layout, features=["skin_spread_along", "skin_slant"])
+    tracker = ContactTracker(layout, features=["skin_spread_along", "skin_slant"])
     tracker.push(frame)
-    contact = tracker.push(replace(frame, t=1.0))
+    (contact,) = tracker.push(replace(frame, t=1.0)) or [None]
     vector = feature_vector(contact.series(), 1.0, 2, ["skin_spread_along", "skin_slant"])
     assert vector[0] == pytest.approx(np.sqrt((rows**2 - 1) / 12), rel=1e-15)
     assert vector[2] == 0.0
 
 
 def series_of(layout: SkinLayout, frames: list[Frame], wanted, chain=None):
-    tracker = Tracker(layout, features=wanted, chain=chain)
+    tracker = ContactTracker(layout, features=wanted, chain=chain)
     contact = None
     for frame in frames:
-        contact = tracker.push(frame) or contact
+        (contact,) = tracker.push(frame) or [contact]
     return contact.series()
 
 
@@ -268,9 +267,9 @@ def test_force_motion_without_a_pose_is_flagged_and_interpolated():
     layout = replace(ROUND, pitch_m=0.01, radius_m=0.05)
     counts = np.zeros((5, 7), dtype=np.uint16)
     counts[1, 1] = 50
-    tracker = Tracker(layout, features=["force_motion"], chain=chain)
+    tracker = ContactTracker(layout, features=["force_motion"], chain=chain)
     for t, known in ((0.0, joints), (0.5, None), (1.0, joints)):
-        contact = tracker.push(Frame(t, counts, joints=known))
+        (contact,) = tracker.push(Frame(t, counts, joints=known)) or [None]
     assert contact.missing_pose
     assert np.isnan(contact.series().force_motion).tolist() == [False, True, False]
     assert feature_vector(contact.series(), 1.0, 3, ["force_motion"]).tolist() == [0.0] * 3
@@ -295,7 +294,7 @@ def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
     counts = np.zeros((5, 7), dtype=np.uint16)
     counts[1, 1] = 50
     frames = [Frame(t, counts, joints=np.zeros(5)) for t in (0.0, 0.5)]
-    monkeypatch.setattr(edge.touch.measures, "find_regions", refuse)
+    monkeypatch.setattr(ActiveTaxels, "regions", refuse)
     series_of(FLAT, frames, ["skin_force", "left_length"])
     monkeypatch.setattr(Chain, "pose", refuse)
     series = series_of(FLAT, frames, ["skin_force"], chain=Chain.cody())

@@ -8,8 +8,8 @@ import pytest
 from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout
-from edge.touch.track import Tracker, TrackSettings, for_device
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, TrackSettings, first_contact
 
 FLAT = SkinLayout(4, 6, threshold_counts=10, onset_counts=20, pitch_m=0.01)
 
@@ -23,10 +23,10 @@ def frames(peaks, layout=FLAT, at=(1, 1), dt=0.01):
 
 def follow(peaks, settings=None, **keywords):
     """The contacts of a stream, each as (onset_s, peaks, ended)."""
-    tracker = Tracker(FLAT, settings, **keywords)
+    tracker = ContactTracker(FLAT, settings, **keywords)
     contacts = []
     for frame in frames(peaks):
-        contact = tracker.push(frame)
+        (contact,) = tracker.push(frame) or [None]
         if contact is not None and contact not in contacts:
             contacts.append(contact)
     return [(c.onset_s, c.series().peak.tolist(), c.ended) for c in contacts]
@@ -66,11 +66,11 @@ def test_nothing_is_kept_beyond_the_horizon():
 
 
 def test_of_two_readings_at_one_instant_the_later_counts():
-    tracker = Tracker(FLAT)
+    tracker = ContactTracker(FLAT)
     for t, peak in [(0.0, 30), (0.01, 31), (0.01, 32), (0.02, 33)]:
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
         counts[0, 0] = peak
-        contact = tracker.push(Frame(t, counts))
+        (contact,) = tracker.push(Frame(t, counts)) or [None]
     series = contact.series()
     assert series.t.tolist() == [0.0, 0.01, 0.02]
     assert series.peak.tolist() == [30, 32, 33]
@@ -78,22 +78,22 @@ def test_of_two_readings_at_one_instant_the_later_counts():
 
 def test_motion_counts_from_the_reading_that_counts():
     """Where the first instant was read twice, the later reading is the onset's place."""
-    tracker = Tracker(FLAT, TrackSettings(debounce=1))
+    tracker = ContactTracker(FLAT, TrackSettings(debounce=1))
     for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]:
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
         counts[1, col] = 50
-        contact = tracker.push(Frame(t, counts))
+        (contact,) = tracker.push(Frame(t, counts)) or [None]
     assert contact.series().motion == pytest.approx([0.0, 0.01], abs=1e-16)
 
 
 def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
-    tracker = Tracker(FLAT, TrackSettings(release=2))
+    tracker = ContactTracker(FLAT, TrackSettings(release=2))
     zones = [(1, 1), (1, 2), (2, 4), None, None]
     for i, place in enumerate(zones):
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
         if place:
             counts[place] = 50
-        contact = tracker.push(Frame(i * 0.01, counts))
+        (contact,) = tracker.push(Frame(i * 0.01, counts)) or [None]
     series = contact.series()
     far = np.hypot(0.01, 0.03)
     assert series.motion == pytest.approx([0.0, 0.01, far, far, far], abs=1e-16)
@@ -106,22 +106,22 @@ def test_motion_in_the_world_follows_the_joints():
     """A region that stays on the skin moves in the world as its link does."""
     layout = replace(FLAT, pitch_m=0.1)
     chain = Chain([Joint("turn", (0.0, 0.0, 1.0))])
-    tracker = Tracker(layout, chain=chain)
+    tracker = ContactTracker(layout, chain=chain)
     for i, angle in enumerate([0.0, 0.5, np.pi]):
         counts = np.zeros(layout.shape, dtype=np.uint16)
         counts[0, 2] = 50  # at x = 0.2 m from the axis
-        contact = tracker.push(Frame(i * 0.01, counts, joints=np.array([angle])))
+        (contact,) = tracker.push(Frame(i * 0.01, counts, joints=np.array([angle]))) or [None]
     expected = [0.0, 2 * 0.2 * np.sin(0.25), 0.4]
     assert contact.series().motion == pytest.approx(expected, abs=1e-15)
 
 
 def test_a_frame_without_a_pose_leaves_a_gap_in_motion_and_is_flagged():
     chain = Chain([Joint("turn", (0.0, 0.0, 1.0))])
-    tracker = Tracker(FLAT, chain=chain)
+    tracker = ContactTracker(FLAT, chain=chain)
     for i, joints in enumerate([None, np.array([0.0]), None, np.array([np.pi])]):
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
         counts[0, 2] = 50
-        contact = tracker.push(Frame(i * 0.01, counts, joints=joints))
+        (contact,) = tracker.push(Frame(i * 0.01, counts, joints=joints)) or [None]
     motion = contact.series().motion
     assert np.isnan(motion).tolist() == [True, False, True, False]
     assert motion[3] == pytest.approx(0.04)
@@ -134,25 +134,26 @@ def test_taxels_that_are_missing_are_flagged_unless_known_to_be_dead():
     valid = np.ones(FLAT.shape, dtype=bool)
     valid[3, 5] = False
     for layout, missing in ((FLAT, True), (replace(FLAT, dead=(23,)), False)):
-        tracker = Tracker(layout, TrackSettings(debounce=1))
-        assert tracker.push(Frame(0.0, counts, valid)).missing_taxels is missing
+        tracker = ContactTracker(layout, TrackSettings(debounce=1))
+        (contact,) = tracker.push(Frame(0.0, counts, valid))
+        assert contact.missing_taxels is missing
 
 
 def test_a_region_has_the_mean_time_of_its_taxels():
     """A frame is a rolling shutter: its chips are read one after another."""
-    tracker = Tracker(FLAT, TrackSettings(debounce=1))
+    tracker = ContactTracker(FLAT, TrackSettings(debounce=1))
     times = np.zeros(FLAT.shape)
     counts = np.zeros(FLAT.shape, dtype=np.uint16)
     counts[1, 1:3] = 50
     for i in range(2):
         times[1, 1], times[1, 2] = i * 0.02 + 0.004, i * 0.02 + 0.008
-        contact = tracker.push(Frame(i * 0.02, counts, times=times))
+        (contact,) = tracker.push(Frame(i * 0.02, counts, times=times)) or [None]
     assert contact.onset_s == pytest.approx(0.006)
     assert contact.series().t == pytest.approx([0.0, 0.02])
 
 
 def test_frames_of_another_shape_and_time_that_goes_back_are_refused():
-    tracker = Tracker(FLAT)
+    tracker = ContactTracker(FLAT)
     with pytest.raises(InputError, match="on a skin of"):
         tracker.push(Frame(0.0, np.zeros((2, 2), dtype=np.uint16)))
     tracker.push(Frame(1.0, np.zeros(FLAT.shape, dtype=np.uint16)))
@@ -164,9 +165,9 @@ def test_frames_of_another_shape_and_time_that_goes_back_are_refused():
 def test_times_that_are_not_finite_are_refused(t):
     counts = np.full(FLAT.shape, 50, dtype=np.uint16)
     with pytest.raises(InputError, match="time of a frame is not finite"):
-        Tracker(FLAT).push(Frame(t, counts))
+        ContactTracker(FLAT).push(Frame(t, counts))
     with pytest.raises(InputError, match="time of a taxel in contact is not finite"):
-        Tracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
+        ContactTracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
 
 
 @pytest.mark.parametrize("settings", [{"debounce": 0}, {"release": 1.5}, {"connectivity": 5}])
@@ -197,3 +198,19 @@ def test_another_scale_brings_the_thresholds_along():
 def test_another_skin_is_refused(device, word):
     with pytest.raises(InputError, match=word):
         for_device(SkinLayout(4, 6), device)
+
+
+def test_the_first_of_two_contacts_is_given_whole(make_touch, forearm):
+    one = make_touch(seconds=0.5, arm=False)
+    gap = np.zeros((30, *forearm.shape), dtype=np.uint16)
+    frames = np.concatenate([one.frames, gap, 2 * one.frames])
+    twice = replace(one, t=np.arange(len(frames)) / 100.0, frames=frames)
+    onset_s, series = first_contact(twice, ContactTracker(forearm))
+    assert onset_s == 0.2
+    assert series.ended
+    assert series.peak.max() == one.frames.max()
+
+
+def test_a_recording_without_a_contact_gives_none(make_touch, forearm):
+    still = make_touch(seconds=0.0, arm=False)
+    assert first_contact(still, ContactTracker(forearm)) is None

@@ -10,8 +10,8 @@ import pytest
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.skin import file as skinfile
+from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from edge.touch.track import FeatureSeries
 from export.__main__ import main as export
 from train.__main__ import main as train
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront

@@ -1,0 +1,241 @@
+"""One contact: what is measured on it frame by frame, and the series that features are made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.touch.arm import Chain
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import COLS, FORCE, ROWS, Measurer
+from edge.touch.region import ActiveTaxels, Region
+
+
+@dataclass(frozen=True)
+class FeatureSeries:
+    """What was measured on one contact, frame by frame from its onset.
+
+    Attributes:
+        t: (n,) seconds from onset, increasing, the first 0.
+        peak: (n,) largest count of the region; 0 without contact.
+        area: (n,) taxels of the region; 0 without contact.
+        sums: (n, 2) sums of rows and columns over the region's taxels: area times centroid;
+            0 where motion was not asked for.
+        motion: (n,) distance of the centroid from its place at onset, metres; its last value
+            is kept without contact; NaN where the arm's pose was not known; 0 where it was not
+            asked for.
+        counts_per_newton: scale of `peak`, or None.
+        ended: the contact ended with the last frame: force and area are zero from there on.
+        zones: {zone: (n, 8)} what was measured there, see `edge.touch.measures`.
+        regions: (n,) regions of the frame, or None.
+        force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
+        turn: columns of a whole turn where the skin wraps, or None.
+    """
+
+    t: NDArray[np.float64]
+    peak: NDArray[np.int64]
+    area: NDArray[np.int64]
+    sums: NDArray[np.int64]
+    motion: NDArray[np.float64]
+    counts_per_newton: float | None = None
+    ended: bool = False
+    zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    regions: NDArray[np.int64] | None = None
+    force_motion: NDArray[np.float64] | None = None
+    turn: int | None = None
+
+    @property
+    def integers(self) -> NDArray[np.int64]:
+        """(n, m) all that was counted: peak, area, sums, then the zones and the regions."""
+        more = [] if self.regions is None else [self.regions]
+        return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *more])
+
+    @property
+    def max_force(self) -> NDArray[np.float64]:
+        """(n,) newtons, or counts where the scale is unknown."""
+        scale = 1.0 if self.counts_per_newton is None else self.counts_per_newton
+        return np.asarray(self.peak / scale, dtype=np.float64)
+
+    @property
+    def contact_area(self) -> NDArray[np.int64]:
+        """(n,) taxels."""
+        return self.area
+
+    @property
+    def contact_motion(self) -> NDArray[np.float64]:
+        """(n,) metres (taxels where the pitch is unknown)."""
+        return self.motion
+
+
+ROWS_AT_FIRST = 256
+"""Frames that a contact has room for before its table grows: over two seconds at 100 Hz."""
+PLAIN = 4
+"""Whole numbers of every frame, before what the measurer adds: peak, area, sums of rows, cols."""
+
+
+class Contact:
+    """A contact being followed, one row of measurements a frame.
+
+    Attributes:
+        onset_s: when it began, on the frames' clock.
+        layout: the skin.
+        chain: the arm that its motion is measured with; None where it is measured on the skin.
+        ended: no more frames will come.
+        missing_taxels: a frame lacked taxels that are not known to be dead.
+        missing_pose: a frame came without the joint angles that motion needs.
+        region: the region followed so far.
+        joints: the joint angles (dof,) when the region was last seen; None where not known.
+    """
+
+    def __init__(
+        self, onset_s: float, layout: SkinLayout, measurer: Measurer, chain: Chain | None = None
+    ) -> None:
+        self.onset_s = onset_s
+        self.layout, self.chain = layout, chain
+        self.ended = self.missing_taxels = self.missing_pose = False
+        self.region: Region | None = None
+        self.joints: NDArray[np.float64] | None = None
+        self._measurer = measurer
+        self._rows = np.zeros(
+            ROWS_AT_FIRST,
+            dtype=[
+                ("t", np.float64),
+                ("motion", np.float64),
+                ("force_motion", np.float64),
+                ("counted", np.int64, (PLAIN + measurer.width,)),
+            ],
+        )
+        self._n = 0
+        self._age = 0.0
+        self._starts: dict[str, NDArray[np.float64]] = {}
+
+    @property
+    def last_s(self) -> float:
+        """Time of the last frame taken in, seconds."""
+        return self.onset_s + self._age
+
+    def add(self, frame: Frame, active: ActiveTaxels, region: Region | None) -> None:
+        """Take in a frame; `region` is None where nothing of the contact is above the threshold."""
+        age = max(region_time(frame, region) - self.onset_s, 0.0)
+        if self._n and age <= self._age:
+            # Two readings of one instant: the later one counts.
+            age = self._age
+            self._forget_last()
+        elif self._n == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        if frame.valid is not None and not self.missing_taxels:
+            self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
+        called = self._measurer
+        more = called.measure(active, region) if called.width else []
+        if region is None:
+            motions, sums = self._last_motions(), (0, 0)
+        else:
+            self.region, self.joints = region, frame.joints
+            motions, sums = self._moved(frame, region, more)
+        peak, area = (0, 0) if region is None else (region.peak, region.area)
+        self._rows[self._n] = (age, *motions, (peak, area, *sums, *more))
+        self._n += 1
+        self._age = age
+
+    def _forget_last(self) -> None:
+        self._n -= 1
+        for which in ("motion", "force_motion"):
+            if not np.isfinite(self._rows[which][: self._n]).any():
+                self._starts.pop(which, None)
+
+    def _last_motions(self) -> tuple[float, float]:
+        if not self._n:
+            return 0.0, 0.0
+        last = self._rows[self._n - 1]
+        return last["motion"], last["force_motion"]
+
+    def _moved(
+        self, frame: Frame, region: Region, more: list[int]
+    ) -> tuple[tuple[float, float], tuple[int, int]]:
+        """How far the two centroids have moved, and the sums that the plain one comes from."""
+        called = self._measurer
+        if not (called.motion or called.force_motion):
+            return (0.0, 0.0), (0, 0)
+        pose = self._pose(frame)
+        motion = force_motion = 0.0
+        sums = (0, 0)
+        if called.motion:
+            sums = region.sums
+            motion = self._distance("motion", region.centroid, pose)
+        if called.force_motion:
+            # The contact's zone comes first.
+            centroid = more[ROWS] / more[FORCE], more[COLS] / more[FORCE] % self.layout.cols
+            force_motion = self._distance("force_motion", centroid, pose)
+        return (motion, force_motion), sums
+
+    def _pose(self, frame: Frame) -> NDArray[np.float64] | None:
+        """The link's pose; None where the skin's own frame is used or joint angles lack."""
+        if self.chain is None:
+            return None
+        if frame.joints is None:
+            self.missing_pose = True
+            return None
+        return self.chain.pose(frame.joints)
+
+    def _distance(
+        self, which: str, centroid: tuple[float, float], pose: NDArray[np.float64] | None
+    ) -> float:
+        """From where this centroid was first seen; NaN where the pose is not known."""
+        if self.chain is not None and pose is None:
+            return math.nan
+        position = self.layout.position(*centroid)
+        if pose is not None:
+            position = pose[:3, :3] @ position + pose[:3, 3]
+        return math.dist(position, self._starts.setdefault(which, position))
+
+    def position(self) -> NDArray[np.float64] | None:
+        """(3,) where the region's centroid was last seen.
+
+        Metres (taxels where the pitch is unknown), in the frame of the arm's base; without an
+        arm in that of the link that carries the skin. None where joint angles were not known.
+        """
+        if self.region is None or (self.chain is not None and self.joints is None):
+            return None
+        position = self.layout.position(*self.region.centroid)
+        if self.chain is not None and self.joints is not None:
+            pose = self.chain.pose(self.joints)
+            position = pose[:3, :3] @ position + pose[:3, 3]
+        return position
+
+    def series(self) -> FeatureSeries:
+        """What was measured so far; later frames leave it as it is."""
+        rows = self._rows[: self._n].copy()
+        called, counted = self._measurer, rows["counted"]
+        more = counted[:, PLAIN:]
+        return FeatureSeries(
+            t=rows["t"],
+            peak=counted[:, 0],
+            area=counted[:, 1],
+            sums=counted[:, 2:PLAIN],
+            motion=rows["motion"],
+            counts_per_newton=self.layout.counts_per_newton,
+            ended=self.ended,
+            zones={zone: more[:, columns] for zone, columns in called.columns.items()},
+            regions=more[:, -1] if called.regions else None,
+            force_motion=rows["force_motion"] if called.force_motion else None,
+            turn=self.layout.cols if self.layout.wraps else None,
+        )
+
+
+def region_time(frame: Frame, region: Region | None) -> float:
+    """When the region was read: the mean over its taxels, as a frame is a rolling shutter.
+
+    Raises:
+        InputError: a taxel of the region has a time that is not finite.
+    """
+    if region is None or frame.times is None:
+        return frame.t
+    t = float(frame.times[region.mask].mean())
+    if not math.isfinite(t):
+        raise InputError("the time of a taxel in contact is not finite")
+    return t
