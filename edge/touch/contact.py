@@ -126,7 +126,7 @@ class Contact:
             # Two readings of one instant: the later one counts.
             age = self._age
             self._forget_last()
-        elif self._n == len(self._rows):
+        if self._n == len(self._rows):
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
