@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import errno
+import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 
 from edge import __version__
@@ -51,6 +53,24 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and run; an expected error becomes one sentence on stderr and exit status 2."""
     arguments = top.parse_args(argv)
+    with messages(top.prog):
+        return _run(top, arguments)
+
+
+@contextmanager
+def messages(prog: str) -> Iterator[None]:
+    """Within the block, log messages go to stderr, one line each."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter(f"{prog}: %(message)s"))
+    root = logging.getLogger()
+    root.addHandler(handler)
+    try:
+        yield
+    finally:
+        root.removeHandler(handler)
+
+
+def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
     try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()

@@ -6,8 +6,8 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from edge import npz
 from edge.errors import InputError
 from edge.files import write_whole
+from edge.touch.arm import joint_columns
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -33,7 +34,8 @@ class Recording:
         frames: (n, rows, cols) counts above baseline.
         joints: (n, dof) radians, or None.
         valid: (rows, cols) or (n, rows, cols), taxels that could be read, or None for all.
-        meta: `labels` {task: label}, `skin` (see `SkinLayout`), `source`, `trial`, and more.
+        meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of each
+            column of `joints`], `source`, `trial`, and more.
     """
 
     t: NDArray[np.float64]
@@ -52,6 +54,29 @@ class Recording:
         """The skin that the trial was recorded with."""
         skin = {"rows": self.frames.shape[1], "cols": self.frames.shape[2]}
         return SkinLayout.from_dict({**skin, **self.meta.get("skin", {})})
+
+    @property
+    def joint_names(self) -> tuple[str, ...] | None:
+        """The joint of each column of `joints`, or None where it is not known."""
+        names = self.meta.get("joint_names")
+        return None if names is None else tuple(names)
+
+    def for_joints(self, names: Sequence[str], where: str = "recording") -> Recording:
+        """The recording with the angles of these joints, in this order.
+
+        The recording itself where it does not name its joints.
+
+        Raises:
+            InputError: it has no angle of one of them; the sentence names `where`.
+        """
+        if self.joints is None or self.joint_names in (None, tuple(names)):
+            return self
+        try:
+            columns = joint_columns(self.joint_names or (), names)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        meta = {**self.meta, "joint_names": list(names)}
+        return replace(self, joints=self.joints[:, columns], meta=meta)
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames as the live skin would give them."""
@@ -111,6 +136,15 @@ def _check(path: str, recording: Recording) -> None:
         isinstance(k, str) and k and isinstance(v, str) and v for k, v in labels.items()
     ):
         fail("meta.labels must map task names to labels, both text")
+    names = meta.get("joint_names")
+    if names is not None:
+        if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
+            fail("meta.joint_names must be a list of names")
+        if len(set(names)) < len(names):
+            fail("meta.joint_names has the same name twice")
+        dof = 0 if joints is None else joints.shape[1]
+        if len(names) != dof:
+            fail(f"meta.joint_names has {len(names)} names for {dof} joint angles")
     skin = meta.get("skin", {})
     if not isinstance(skin, dict):
         fail("meta.skin must be an object")

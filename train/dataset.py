@@ -107,9 +107,11 @@ def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Ch
         chain = unnamed
     else:
         chain = Chain.cody()
-        if dof != chain.dof:
+        if dof != chain.dof or recording.joint_names not in (None, chain.names):
             raise InputError(f"{where}: has {dof} joint angles and names no arm; give --arm")
-    if dof != chain.dof:
+    if recording.joint_names is not None:
+        recording.for_joints(chain.names, where)
+    elif dof != chain.dof:
         raise InputError(f"{where}: has {dof} joint angles, its arm takes {chain.dof}")
     return chain
 
@@ -186,6 +188,10 @@ def load_trials(
         reference = replace(reference, onset_counts=onset)
     reference = replace(reference, dead=_dead(recordings))
     arms = [arm_of(r, str(p), arm) for r, p in zip(recordings, paths, strict=True)]
+    recordings = [
+        recording if of is None else recording.for_joints(of.names)
+        for recording, of in zip(recordings, arms, strict=True)
+    ]
     chain = arms[0] if moving and None not in arms else None
     if chain is not None:
         for other, path in zip(arms, paths, strict=True):

@@ -52,8 +52,9 @@ def add_joints(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--joints",
         metavar="stdin|udp:[HOST:]PORT",
-        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; a port without a '
-        "host is bound to the loopback interface",
+        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}, with "names": '
+        "[joints] if they are not in the arm's order; a port without a host is bound to the "
+        "loopback interface",
     )
     parser.add_argument(
         "--joints-oldest",

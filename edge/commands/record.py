@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -182,8 +183,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
     with (
         stop_on(signal.SIGINT) as stop,
-        open_skin(arguments) as opened,
-        open_joints(arguments, opened, dof) as joints,
+        open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
+        open_joints(arguments, opened, arm, dof) as joints,
     ):
         if arm is not None and arguments.joints is None:
             have = opened.playback.dof if opened.playback is not None else None
@@ -192,6 +193,9 @@ def run(arguments: argparse.Namespace) -> int:
                     f"{opened.source} gives {have or 'no'} joint angles, but the arm of "
                     f"{arguments.arm} has {dof}; name their source with --joints"
                 )
+        names = arm.names if arm is not None else None
+        if arguments.joints is None and opened.playback is not None:
+            names = opened.playback.joint_names
         skin = opened.skin
         tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead = round(arguments.lead / skin.period_s)
@@ -202,14 +206,14 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames = trials.push(frame)
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, complete=True)
+                _save(frames, arguments.out, labels, opened, arm, names, complete=True)
                 done += 1
                 if done == wanted:
                     break
         else:
             frames = trials.rest()
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, complete=False)
+                _save(frames, arguments.out, labels, opened, arm, names, complete=False)
                 done += 1
     if done == 0:
         print("edge-classify: there was no contact, so nothing was saved", file=sys.stderr)
@@ -223,6 +227,7 @@ def _save(
     labels: dict[str, str],
     opened: Opened,
     arm: Chain | None,
+    names: Sequence[str] | None,
     *,
     complete: bool,
 ) -> None:
@@ -238,6 +243,8 @@ def _save(
     }
     if arm is not None:
         meta["arm"] = arm.to_dict()
+    if names is not None and all(frame.joints is not None for frame in frames):
+        meta["joint_names"] = list(names)
     trial = recording(frames, meta)
     save(path, trial, overwrite=False)
     event = {

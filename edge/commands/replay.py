@@ -44,6 +44,8 @@ def decide(
     Raises:
         InputError: the recording does not suit the model; the sentence names `name`.
     """
+    if model.info.chain is not None:
+        recording = recording.for_joints(model.info.chain.names, name)
     joints = recording.joints
     require_joints(model, None if joints is None else joints.shape[1], name)
     try:

@@ -90,13 +90,12 @@ def run(arguments: argparse.Namespace) -> int:
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
         notifier = stack.enter_context(Notifier(now=time.monotonic))
         lines = stack.enter_context(Lines(udp=arguments.udp))
-        opened = stack.enter_context(open_skin(arguments, model=model))
+        opened = stack.enter_context(open_skin(arguments, model=model, arm=chain))
         on_skin = arguments.without_joints == "skin"
         if not on_skin:
             check_joints(model, arguments, opened)
         skin = opened.skin
-        dof = None if chain is None else chain.dof
-        joints = stack.enter_context(open_joints(arguments, opened, dof))
+        joints = stack.enter_context(open_joints(arguments, opened, chain))
         classifier = Classifier(
             model,
             skin.layout,

@@ -19,6 +19,7 @@ from edge.runtime.loop import JointSource
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
+from edge.touch.arm import Chain
 from edge.touch.layout import for_device
 
 
@@ -57,6 +58,7 @@ def open_skin(
     calibrated: bool = True,
     paced: bool = False,
     model: Model | None = None,
+    arm: Chain | None = None,
 ) -> Iterator[Opened]:
     """The skin that the options name, closed at the end of the block.
 
@@ -65,6 +67,7 @@ def open_skin(
         calibrated: refuse a real skin that has no calibration.
         paced: play a recording no faster than it was recorded, whatever the options say.
         model: a taxel above its threshold counts as touched, if that is lower than the skin's.
+        arm: whose joint angles a recording must give, in the order of its joints.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
@@ -73,6 +76,8 @@ def open_skin(
     with ExitStack() as stack:
         if arguments.fake is not None:
             recording = load(arguments.fake)
+            if arm is not None:
+                recording = recording.for_joints(arm.names, arguments.fake)
             if arguments.skin is None:
                 file = skin_file(recording.layout)
             else:
@@ -102,14 +107,18 @@ def open_skin(
 
 @contextmanager
 def open_joints(
-    arguments: argparse.Namespace, opened: Opened, dof: int | None
+    arguments: argparse.Namespace,
+    opened: Opened,
+    arm: Chain | None,
+    dof: int | None = None,
 ) -> Iterator[JointSource | None]:
     """The source of joint angles that the options name; a fake skin has its recording's.
 
     Args:
         arguments: with the options of `options.add_joints`.
         opened: the skin that is being read.
-        dof: how many angles a line must have, or None where none are wanted.
+        arm: whose joint angles are wanted, or None.
+        dof: how many angles a line must have where the arm is not known.
 
     Raises:
         InputError: the options contradict each other.
@@ -117,6 +126,7 @@ def open_joints(
     if arguments.joints is None:
         yield opened.playback if opened.playback is not None and opened.playback.dof else None
         return
+    dof = dof if arm is None else arm.dof
     if dof is None:
         raise InputError("--joints: the model measures motion without joint angles; leave it out")
     kind, _, address = arguments.joints.partition(":")
@@ -130,6 +140,7 @@ def open_joints(
     stream = joint_stream.Joints(
         source,
         dof=dof,
+        names=None if arm is None else arm.names,
         now=opened.skin.clock.now,
         oldest_s=arguments.joints_oldest,
         shared_clock=arguments.joints_shared_clock,

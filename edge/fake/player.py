@@ -46,6 +46,8 @@ class Playback:
         t = recording.t - recording.t[0]
         self._t, self._frames = t, recording.frames
         self._joints = recording.joints
+        self.joint_names = recording.joint_names
+        """The joint of each angle, where the recording names them."""
         steps = np.diff(t)
         last = float(np.median(steps)) if steps.size else 0.01
         self._length = float(t[-1]) + last

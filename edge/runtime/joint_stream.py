@@ -1,8 +1,10 @@
 """Joint angles from another program: JSON lines with their own time, by stdin or UDP.
 
-A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock, and one angle a
-joint in radians. The sender's clock need not be ours: the shortest delay seen lately tells the
-two apart, and a line that came later than that is as much older.
+A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock, and one angle per
+joint in radians. A line may name its joints, `"names": ["elbow", ...]`; its angles are then put in
+the arm's order, and those of other joints are ignored. The sender's clock need not be ours: the
+shortest delay seen lately gives the offset between the two, and a line that took longer than that
+is older by the difference.
 """
 
 from __future__ import annotations
@@ -13,12 +15,13 @@ import os
 import select
 import socket
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
+from edge.touch.arm import joint_columns
 
 OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
@@ -48,6 +51,7 @@ class Joints:
         source: Source,
         *,
         dof: int,
+        names: Sequence[str] | None = None,
         now: Callable[[], float],
         oldest_s: float = OLDEST_S,
         shared_clock: bool = False,
@@ -57,12 +61,15 @@ class Joints:
         Args:
             source: gives what has come; never waits.
             dof: angles a line must have.
+            names: of the joints, in the order of the angles that `at` returns; None where they
+                are not known, and a line's own names are ignored.
             now: the loop's clock.
             oldest_s: how old a pose may be.
             shared_clock: the sender's `t` is on the loop's clock already (both on one machine,
                 CLOCK_MONOTONIC).
         """
         self._source, self._dof, self._now = source, dof, now
+        self._names = None if names is None else tuple(names)
         self._oldest, self._shared = oldest_s, shared_clock
         self._rest = b""
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
@@ -138,8 +145,17 @@ class Joints:
             isinstance(x, bool) or not isinstance(x, int | float) for x in numbers
         ):
             return self._bad("a time or an angle is not a number")
+        names = pose.get("names")
+        if names is not None and self._names is not None:
+            if not isinstance(names, list) or len(names) != len(q):
+                return self._bad("a line's names are not one for each angle")
+            try:
+                columns = joint_columns([str(name) for name in names], self._names)
+            except InputError as error:
+                return self._bad(f"a line has {error}")
+            q = [q[column] for column in columns]
         if len(q) != self._dof:
-            return self._bad(f"a line has {len(q)} angles, the arm {self._dof}")
+            return self._bad(f"a line has {len(q)} angles, the arm has {self._dof}")
         try:
             finite = all(math.isfinite(x) for x in numbers)
         except OverflowError:

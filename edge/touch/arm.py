@@ -226,6 +226,25 @@ class Chain:
         return cls.from_dict({"base": base, "tip": tip, "joint": joints}, where=os.fspath(path))
 
 
+def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
+    """For each joint wanted, its index among those given.
+
+    >>> joint_columns(["wheel", "elbow", "shoulder"], ["shoulder", "elbow"])
+    [2, 1]
+
+    Raises:
+        InputError: a joint is missing; the sentence names it and those given.
+    """
+    index = {name: i for i, name in enumerate(given)}
+    missing = [name for name in wanted if name not in index]
+    if missing:
+        raise InputError(
+            f"no angle of the arm's joint{'s' if len(missing) > 1 else ''} "
+            f"{', '.join(missing)}; there are {', '.join(given) or 'none'}"
+        )
+    return [index[name] for name in wanted]
+
+
 def _check_joint(joint: Joint) -> None:
     if joint.kind not in (*MOVING, "fixed"):
         raise InputError(

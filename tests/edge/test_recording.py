@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,6 +34,36 @@ def test_what_is_saved_is_loaded(make_touch, tmp_path):
     assert back.labels == {"category": "rigid-fixed", "object": "hard 0"}
     assert [f.t for f in back] == recording.t.tolist()
     assert not list(back)[3].valid[4, 5]
+
+
+def named(make_touch, *names):
+    one = make_touch()
+    return replace(one, joints=one.joints[:, : len(names)], meta={"joint_names": list(names)})
+
+
+def test_named_joints_are_given_in_the_order_asked_for(make_touch):
+    recording = named(make_touch, "wheel", "elbow", "shoulder")
+    picked = recording.for_joints(["shoulder", "elbow"], "a.npz")
+    np.testing.assert_array_equal(picked.joints, recording.joints[:, [2, 1]])
+    assert picked.joint_names == ("shoulder", "elbow")
+    with pytest.raises(InputError, match=r"a.npz: no angle of the arm's joint wrist; there are w"):
+        recording.for_joints(["wrist", "elbow"], "a.npz")
+    unnamed = make_touch()
+    assert unnamed.for_joints(["a", "b"]) is unnamed
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["a"], "has 1 names for 5 joint angles"),
+        (["a", "b", "c", "d", "a"], "has the same name twice"),
+        ("abcde", "must be a list of names"),
+        ([1, 2, 3, 4, 5], "must be a list of names"),
+    ],
+)
+def test_joint_names_that_do_not_suit_are_refused(make_touch, tmp_path, names, said):
+    with pytest.raises(InputError, match=f"meta.joint_names {said}"):
+        save(tmp_path / "a.npz", replace(make_touch(), meta={"joint_names": names}))
 
 
 def test_the_same_recording_gives_the_same_bytes(make_touch, tmp_path):

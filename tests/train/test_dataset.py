@@ -133,3 +133,15 @@ def test_recordings_that_name_no_arm_take_the_one_given(make_touch, tmp_path):
     save(tmp_path / "one.npz", replace(trial, joints=trial.joints[:, :1]))
     data = load_trials([tmp_path], arm=swing)
     assert data.chain is swing
+
+
+def test_angles_are_measured_by_the_names_of_their_joints(recordings, make_touch, tmp_path):
+    """A recording whose columns are reversed, with a wheel between them, has the same features."""
+    arm, trial = Chain.cody(), make_touch()
+    save(tmp_path / "a" / "one.npz", trial)
+    names = list(arm.names)[::-1]
+    shuffled = np.insert(trial.joints[:, ::-1], 2, 7.0, axis=1)
+    meta = {**trial.meta, "joint_names": [*names[:2], "wheel", *names[2:]]}
+    save(tmp_path / "b" / "one.npz", replace(trial, joints=shuffled, meta=meta))
+    straight, reordered = load_trials([tmp_path / "a"]), load_trials([tmp_path / "b"], arm=arm)
+    np.testing.assert_array_equal(reordered.features(), straight.features())

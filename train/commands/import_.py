@@ -9,6 +9,8 @@ from typing import Any
 
 from tqdm import tqdm
 
+from edge.commands.options import add_arm, open_arm
+from edge.errors import InputError
 from edge.recording import save
 from train.importers import names
 
@@ -17,21 +19,26 @@ def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "import",
-        help="turn other labs' data into recordings",
-        description="Writes one recording a trial; an existing file of that name is replaced. "
+        help="turn another lab's data into recordings",
+        description="Writes one recording per trial; existing files of the same name are "
+        "replaced. "
         "To add a format, see train/importers/__init__.py.",
     )
     parser.add_argument("format", choices=names(), help="what kind of file it is")
     parser.add_argument("file", type=Path, help="the file")
     parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
+    add_arm(parser, "whose joint names say which angles of a log are kept, and in what order")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings."""
-    trials = import_module(f"train.importers.{arguments.format}").trials(arguments.file)
+    arm = open_arm(arguments)
+    trials = import_module(f"train.importers.{arguments.format}").trials(arguments.file, arm)
     n = 0
     for name, recording in tqdm(trials, desc="importing", unit=" trials"):
+        if arm is not None and recording.joints is None:
+            raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
         save(arguments.out / f"{name}.npz", recording)
         n += 1
     print(f"{n} recordings in {arguments.out}")

@@ -50,6 +50,8 @@ def draw(
             layout, threshold_counts=threshold, onset_counts=max(threshold, layout.onset)
         )
     chain = arm_of(recording, where)
+    if chain is not None:
+        recording = recording.for_joints(chain.names)
     if scene and chain is None:
         raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
     found = first_contact(recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S))
@@ -86,7 +88,7 @@ def draw(
     if scene and chain is not None:
         side = figure.add_subplot(grid[2, : FRAMES // 2])
         _side(side, recording, chain, layout, onset, series)
-        _path(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, layout, onset)
+        _path(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, chain, layout, onset)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
 
@@ -152,7 +154,7 @@ def _side(
     onset: float,
     series: FeatureSeries | None,
 ) -> None:
-    """The arm at the onset and at the window's end, in the torso's x-z plane."""
+    """The arm at onset and at the end of the window, in the x-z plane of its base."""
     joints = recording.joints
     assert joints is not None
     simulated = recording.meta.get("simulation")
@@ -176,8 +178,8 @@ def _side(
         axis.set_title(f"seen from the side: {what}\n{names}", fontsize=9)
     else:
         axis.set_title("seen from the side", fontsize=9)
-    axis.set_xlabel("x, metres forward of the torso")
-    axis.set_ylabel("z, metres up")
+    axis.set_xlabel(f"x in the frame of {chain.base}, metres")
+    axis.set_ylabel("z, metres")
     axis.set_aspect("equal", adjustable="datalim")
     axis.legend(fontsize=8)
 
@@ -223,7 +225,7 @@ def _contact(
     return pose[:3, :3] @ position + pose[:3, 3], pose[:3, :3] @ out
 
 
-def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:
+def _path(axis: Any, recording: Recording, chain: Chain, layout: SkinLayout, onset: float) -> None:
     """Push and joint angles over time."""
     t = recording.t - onset
     scale = layout.counts_per_newton or 1.0
@@ -235,7 +237,8 @@ def _path(axis: Any, recording: Recording, layout: SkinLayout, onset: float) -> 
     joints = recording.joints
     if joints is not None:
         other = axis.twinx()
+        names = recording.joint_names or chain.names
         for j in range(joints.shape[1]):
-            other.plot(t, np.degrees(joints[:, j] - joints[0, j]), lw=1, label=f"j{j}")
+            other.plot(t, np.degrees(joints[:, j] - joints[0, j]), lw=1, label=names[j])
         other.set_ylabel("joint angles from their start, degrees")
         other.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=5)

@@ -3,10 +3,11 @@
 A module `NAME.py` here is `python -m train import NAME FILE --out DIR`. It has a docstring, whose
 first line is the help, and
 
-    def trials(path: Path) -> Iterator[tuple[str, Recording]]
+    def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]
 
 which yields each trial's file name (without `.npz`) and recording, and raises
-`edge.errors.InputError` where the file is not what it expects.
+`edge.errors.InputError` if the file is not what it expects. `arm` is the one that the user names,
+for formats that carry joint angles.
 """
 
 from __future__ import annotations

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.recording import Recording
+from edge.touch.arm import Chain
 
 FASTEST_HZ = 1_000_000
 """Frames per second above which a rate must be a mistake."""
 
 
-def trials(path: Path) -> Iterator[tuple[str, Recording]]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
     """One recording a folder."""
     folders = sorted(p for p in path.glob("*") if p.is_dir()) if path.is_dir() else []
     if not folders:

@@ -11,17 +11,18 @@ from typing import Any
 
 from edge.errors import InputError
 from edge.recording import Recording
+from edge.touch.arm import Chain
 from train.importers.topics import FRAMES, JOINTS, Log
 
 
-def trials(path: Path) -> Iterator[tuple[str, Recording]]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
     """The file's one trial."""
     try:
         from mcap.exceptions import McapError
         from mcap.reader import make_reader
     except ImportError:
         raise InputError("MCAP files need mcap; install it with `pip install mcap`") from None
-    log = Log.of(path)
+    log = Log.of(path, arm)
     types = None
     try:
         with path.open("rb") as file:

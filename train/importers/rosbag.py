@@ -10,10 +10,11 @@ from pathlib import Path
 
 from edge.errors import InputError
 from edge.recording import Recording
+from edge.touch.arm import Chain
 from train.importers.topics import FRAMES, JOINTS, Log
 
 
-def trials(path: Path) -> Iterator[tuple[str, Recording]]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
     """The bag's one trial."""
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError
@@ -22,7 +23,7 @@ def trials(path: Path) -> Iterator[tuple[str, Recording]]:
         raise InputError("bags need rosbags; install it with `pip install rosbags`") from None
     if not path.exists():
         raise InputError(f"{path}: no such bag")
-    log = Log.of(path)
+    log = Log.of(path, arm)
     # A ROS 2 bag of before 2024 does not carry its types' definitions.
     types = get_typestore(Stores.ROS2_HUMBLE)
     try:

@@ -13,6 +13,7 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.recording import Recording, load_arrays
+from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.0034
@@ -22,7 +23,7 @@ ONSET_COUNTS = 60
 """A little above the threshold, so that a force that hovers there is one contact."""
 
 
-def trials(path: Path) -> Iterator[tuple[str, Recording]]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
     """One recording a grasp: the pads side by side, a column between them that is never valid.
 
     The scale to newtons is unknown, so force stays in counts.

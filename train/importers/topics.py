@@ -1,19 +1,26 @@
-"""Topics of frames and joint angles, as robots log them, to one recording.
+"""From the topics of frames and joint angles in a robot's log to one recording.
 
-Of frames: `sensor_msgs/Image` (`mono16`, `16UC1` or `mono8`), `std_msgs/UInt16MultiArray`
-(two dimensions in its layout, or the skin's rows and columns beside the file), or JSON
-`{"counts": [[...], ...]}`. Of joint angles: `sensor_msgs/JointState`, or JSON `{"q": [...]}`.
-Both may have a time of their own (`header.stamp`, `"t"`); else the log's is taken.
+Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`), `std_msgs/UInt16MultiArray`
+(with two dimensions in its layout, or the skin's rows and columns beside the file), or JSON
+`{"counts": [[...], ...]}`. Joint angles are `sensor_msgs/JointState`, or JSON `{"q": [...]}`,
+optionally with `"names": [...]`. Each message may carry its own time (`header.stamp`, `"t"`);
+otherwise the time at which it was logged is used.
 
-What a log does not say stands in a JSON file beside it, `NAME.json`, all keys optional:
-`labels` {task: label}, `skin` (see `edge.touch.layout.SkinLayout`), `arm`, and the topics to take
-where there are several, `frames_topic` and `joints_topic`.
+Angles are told apart by the names of their joints, whatever their order in a message, and several
+messages may share the joints between them. An arm's joints are selected by name, in the arm's
+order; other joints are left out, and a warning names them. Without an arm, all joints are kept.
+
+What a log does not say may stand in a JSON file beside it, `NAME.json`, with the optional keys
+`labels` {task: label}, `skin` (see `edge.touch.layout.SkinLayout`), `arm`, and, if there are
+several topics of a kind, the ones to use: `frames_topic` and `joints_topic`.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +30,9 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.recording import Recording
+from edge.touch.arm import Chain, joint_columns
+
+LOG = logging.getLogger(__name__)
 
 FRAMES = ("sensor_msgs/msg/Image", "std_msgs/msg/UInt16MultiArray")
 JOINTS = ("sensor_msgs/msg/JointState",)
@@ -35,30 +45,35 @@ class Log:
     Attributes:
         path: the log, for sentences.
         beside: what the JSON file beside it says.
+        arm: whose joint angles are wanted, or None for all.
     """
 
     path: Path
     beside: dict[str, Any]
+    arm: Chain | None = None
     _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(default_factory=dict)
-    _joints: dict[str, list[tuple[float, NDArray[np.float64]]]] = field(default_factory=dict)
+    _joints: dict[str, dict[str, list[tuple[float, float]]]] = field(default_factory=dict)
+    """By topic and joint: times and angles."""
 
     @classmethod
-    def of(cls, path: Path) -> Log:
-        """A log with what stands beside it.
+    def of(cls, path: Path, arm: Chain | None = None) -> Log:
+        """A log with what stands beside it; `arm` is used rather than the one beside it.
 
         Raises:
             InputError: the file beside it is not a JSON object.
         """
         beside = path.with_name(path.stem + ".json")
         if not beside.is_file():
-            return cls(path, {})
+            return cls(path, {}, arm)
         try:
             said = json.loads(beside.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"{beside}: cannot be read as JSON: {error}") from None
         if not isinstance(said, dict):
             raise InputError(f"{beside}: must be a JSON object with labels, skin, arm")
-        return cls(path, said)
+        if arm is None and "arm" in said:
+            arm = Chain.from_dict(said["arm"], where=f"{beside}: arm")
+        return cls(path, said, arm)
 
     def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
         """Take in a ROS message; kinds that are neither frames nor joint angles are left out."""
@@ -67,9 +82,7 @@ class Log:
         if t == 0.0:  # a driver that does not fill in its stamp
             t = logged_s
         if kind in JOINTS:
-            self._joints.setdefault(topic, []).append(
-                (t, np.asarray(message.position, dtype=np.float64))
-            )
+            self._pose(topic, t, list(message.name), np.asarray(message.position))
         elif kind == FRAMES[0]:
             self._frames.setdefault(topic, []).append((t, self._image(topic, message)))
         elif kind == FRAMES[1]:
@@ -82,7 +95,7 @@ class Log:
             t = float(message.get("t", logged_s))
             if "q" in message:
                 q = np.asarray(message["q"], dtype=np.float64)
-                self._joints.setdefault(topic, []).append((t, q))
+                self._pose(topic, t, list(map(str, message.get("names", ()))), q)
             elif "counts" in message:
                 counts = self._counts(topic, np.asarray(message["counts"]))
                 self._frames.setdefault(topic, []).append((t, counts))
@@ -90,6 +103,20 @@ class Log:
             raise
         except (AttributeError, TypeError, ValueError, RecursionError) as error:
             raise InputError(f"{self.path}: a message of {topic} cannot be used: {error}") from None
+
+    def _pose(self, topic: str, t: float, names: list[str], q: NDArray[np.float64]) -> None:
+        """Take in a message's angles; joints without names are called by their positions."""
+        if q.ndim != 1 or (names and len(names) != len(q)):
+            raise InputError(
+                f"{self.path}: a message of {topic} has {len(names)} names for {q.size} angles"
+            )
+        if len(set(names)) < len(names):
+            raise InputError(f"{self.path}: a message of {topic} names a joint twice")
+        if not np.isfinite(q).all():
+            raise InputError(f"{self.path}: an angle of {topic} is not finite")
+        joints = self._joints.setdefault(topic, {})
+        for name, angle in zip(names or map(str, range(len(q))), q.tolist(), strict=True):
+            joints.setdefault(name, []).append((t, angle))
 
     def _image(self, topic: str, message: Any) -> NDArray[np.uint16]:
         kinds = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
@@ -150,10 +177,14 @@ class Log:
         if len(shapes) > 1:
             raise InputError(f"{self.path}: frames of {name} have the shapes {sorted(shapes)}")
         t = np.array([at for at, _ in frames])
-        joints = self._angles(t)
         meta: dict[str, Any] = {
-            key: self.beside[key] for key in ("labels", "skin", "arm") if key in self.beside
+            key: self.beside[key] for key in ("labels", "skin") if key in self.beside
         }
+        joints, names = self._angles(t)
+        if names is not None:
+            meta["joint_names"] = list(names)
+        if self.arm is not None:
+            meta["arm"] = self.arm.to_dict()
         rows, cols = shapes.pop()
         meta["skin"] = {"rows": rows, "cols": cols, **meta.get("skin", {})}
         meta["source"] = f"{self.path.name} {name}"
@@ -164,18 +195,35 @@ class Log:
             meta=meta,
         )
 
-    def _angles(self, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        name, angles = self._only("joints", self._joints)
-        if not angles:
-            return None
-        angles = sorted(angles, key=lambda entry: entry[0])
-        if len({q.shape for _, q in angles}) > 1 or angles[0][1].ndim != 1:
-            raise InputError(f"{self.path}: messages of {name} differ in the number of joints")
-        at = np.array([time for time, _ in angles])
-        q = np.stack([pose for _, pose in angles])
-        return np.stack([np.interp(t, at, column) for column in q.T], axis=1)
+    def _angles(
+        self, t: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64] | None, tuple[str, ...] | None]:
+        """Angles (n, dof) at the frames' times, and the joints' names where the log has them."""
+        topic, series = self._only("joints", self._joints)
+        if not series:
+            return None, None
+        found = tuple(series)
+        named = found != tuple(map(str, range(len(found))))
+        wanted = found
+        if self.arm is not None and named:
+            wanted = self.arm.names
+            try:
+                joint_columns(found, wanted)
+            except InputError as error:
+                raise InputError(f"{self.path}: {topic} has {error}") from None
+            others = [name for name in found if name not in wanted]
+            if others:
+                LOG.warning("%s: %s: not of the arm: %s", self.path, topic, ", ".join(others))
+        elif self.arm is not None and len(found) != self.arm.dof:
+            raise InputError(
+                f"{self.path}: {topic} has {len(found)} angles without names, but the arm has "
+                f"{self.arm.dof} joints"
+            )
+        return np.stack([_at(t, series[name]) for name in wanted], axis=1), (
+            wanted if named else None
+        )
 
-    def _only(self, what: str, topics: dict[str, list[Any]]) -> tuple[str, list[Any]]:
+    def _only(self, what: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
         wanted = self.beside.get(f"{what}_topic")
         if wanted is not None:
             if wanted not in topics:
@@ -188,4 +236,12 @@ class Log:
                 f"{self.path}: {what} are on {', '.join(sorted(topics))}; name one as "
                 f'"{what}_topic" in {self.path.stem}.json beside it'
             )
-        return next(iter(topics.items()), ("", []))
+        return next(iter(topics.items()), ("", ()))
+
+
+def _at(t: NDArray[np.float64], series: list[tuple[float, float]]) -> NDArray[np.float64]:
+    """A joint's angle at times `t`, linear between messages; held before the first and after the
+    last. An angle that wraps at +-pi between two messages went the shorter way."""
+    at, angle = np.array(sorted(series)).T
+    angles: NDArray[np.float64] = np.interp(t, at, np.unwrap(angle))
+    return angles

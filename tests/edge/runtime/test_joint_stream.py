@@ -22,8 +22,8 @@ class Wire:
         data, self.data = self.data, b""
         return data
 
-    def send(self, t, q):
-        self.data += json.dumps({"t": t, "q": q}).encode() + b"\n"
+    def send(self, t, q, **more):
+        self.data += json.dumps({"t": t, "q": q, **more}).encode() + b"\n"
 
     def at(self, t=None):
         q = self.joints.at(self.now if t is None else t)
@@ -130,7 +130,7 @@ def test_the_clocks_may_drift_apart(wire):
         (b'{"t": "1", "q": [1, 2]}', "not a number"),
         (b'{"t": 1.0, "q": [1, true]}', "not a number"),
         (b'{"t": 1.0, "q": [1, null]}', "not a number"),
-        (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm 2"),
+        (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm has 2"),
         (b'{"t": 1.0, "q": [1, NaN]}', "not finite"),
         (b'{"t": Infinity, "q": [1, 2]}', "not finite"),
         (b'{"t": 1e400, "q": [1, 2]}', "not finite"),
@@ -195,3 +195,30 @@ def test_udp_is_bound_to_loopback_unless_told_otherwise():
 def test_an_address_that_cannot_be_bound_is_one_sentence(address):
     with pytest.raises(InputError, match=f"joints udp:{address}: "):
         from_udp(address)
+
+
+@pytest.fixture
+def named():
+    return Wire(names=("shoulder", "elbow"))
+
+
+def test_named_angles_are_put_in_the_arms_order(named):
+    named.send(5.0, [0.3, 9.0, 0.1], names=["elbow", "wheel", "shoulder"])
+    assert named.at() == [0.1, 0.3]
+    named.send(5.01, [0.2, 0.4])
+    named.now = 0.01
+    assert named.at() == [0.2, 0.4]
+
+
+@pytest.mark.parametrize(
+    ("q", "names", "problem"),
+    [
+        ([0.1, 0.2], ["elbow", "wrist"], "a line has no angle of the arm's joint shoulder"),
+        ([0.1, 0.2], ["elbow"], "a line's names are not one for each angle"),
+        ([0.1, 0.2], "elbow", "a line's names are not one for each angle"),
+    ],
+)
+def test_names_that_do_not_suit_are_refused(named, q, names, problem):
+    named.send(5.0, q, names=names)
+    assert named.at() is None
+    assert named.joints.problem.startswith(problem)

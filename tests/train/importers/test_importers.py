@@ -35,7 +35,7 @@ def test_every_grasp_is_one_recording_with_its_own_frames_and_times(archive):
 
 def test_the_command_writes_a_folder(archive, tmp_path, monkeypatch, capsys):
     few = list(sdh2.trials(archive))[:3]
-    monkeypatch.setattr(sdh2, "trials", lambda path: iter(few))
+    monkeypatch.setattr(sdh2, "trials", lambda path, arm: iter(few))
     assert main(["import", "sdh2", str(archive), "--out", str(tmp_path / "out")]) == 0
     written = sorted((tmp_path / "out").iterdir())
     assert [p.name for p in written] == [f"000{i}_aerosol_can.npz" for i in range(3)]

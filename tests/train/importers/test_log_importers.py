@@ -19,6 +19,7 @@ T = 100.0 + np.arange(N) / 100
 JOINT_T = 99.99 + np.arange(8) / 50
 JOINTS = RNG.uniform(-1, 1, (8, DOF))
 BESIDE = {"labels": {"object": "cup"}, "skin": {"threshold_counts": 50, "wraps": True}}
+NAMES = tuple(f"j{i}" for i in range(DOF))
 STORES = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
 
 
@@ -55,16 +56,17 @@ def array(types, frame, *, dims=True):
     return types.types["std_msgs/msg/UInt16MultiArray"](layout=layout, data=frame.reshape(-1))
 
 
-def joint_state(types, t, q):
+def joint_state(types, t, q, names=NAMES):
     none = np.zeros(0)
-    names = [f"j{i}" for i in range(DOF)]
+    q = np.asarray(q, dtype=np.float64)
+    names = list(names)
     return types.types["sensor_msgs/msg/JointState"](
         header=header(types, t), name=names, position=q, velocity=none, effort=none
     )
 
 
-def write_bag(path, version, frames, *, joints=True, topics=("/skin",)):
-    """A bag whose messages are logged 7 ms after their stamps."""
+def write_bag(path, version, frames, *, joints=True, topics=("/skin",), states=None):
+    """A bag whose messages are logged 7 ms after their stamps; `states` are (t, names, q)."""
     types = STORES[version]
     serialize = types.serialize_ros1 if version == 1 else types.serialize_cdr
     with Bag1(path) if version == 1 else Bag2(path, version=9) as bag:
@@ -76,14 +78,17 @@ def write_bag(path, version, frames, *, joints=True, topics=("/skin",)):
         if joints:
             kind = "sensor_msgs/msg/JointState"
             connection = bag.add_connection("/joint_states", kind, typestore=types)
-            for t, q in zip(JOINT_T, JOINTS, strict=True):
-                message = serialize(joint_state(types, t, q), kind)
+            for t, names, q in states or [
+                (t, NAMES, q) for t, q in zip(JOINT_T, JOINTS, strict=True)
+            ]:
+                message = serialize(joint_state(types, t, q, names), kind)
                 bag.write(connection, nanoseconds(t + 0.007), message)
     return path
 
 
-def imported(tmp_path, kind, path):
-    assert main(["import", kind, str(path), "--out", str(tmp_path / "out")]) == 0
+def imported(tmp_path, kind, path, *options):
+    out = ["--out", str(tmp_path / "out")]
+    assert main(["import", kind, str(path), *out, *map(str, options)]) == 0
     (file,) = (tmp_path / "out").glob("*.npz")
     return load(file)
 
@@ -110,6 +115,87 @@ def test_a_bag_of_images_with_joint_states(tmp_path, version, big):
     check(recording)
     assert recording.labels == {"object": "cup"}
     assert (recording.layout.threshold_counts, recording.layout.wraps) == (50, True)
+
+
+ARM = "".join(f'[[joint]]\nname = "{name}"\naxis = [0, 0, 1]\n' for name in NAMES)
+
+
+@pytest.fixture
+def arm(tmp_path):
+    (tmp_path / "arm.toml").write_text(ARM)
+    return "--arm", tmp_path / "arm.toml"
+
+
+def bag_of(tmp_path, states):
+    messages = [image(STORES[2], t, f) for t, f in zip(T, FRAMES, strict=True)]
+    return write_bag(tmp_path / "grasp", 2, messages, states=states)
+
+
+def every(names, columns, t=JOINT_T):
+    """A joint state at each time, of these columns under these names."""
+    return [(at, names, q[columns]) for at, q in zip(t, JOINTS, strict=True)]
+
+
+def test_angles_are_told_apart_by_the_names_of_their_joints(tmp_path, arm):
+    """The same bag with its names and angles reversed gives the same recording."""
+    backwards = list(range(DOF))[::-1]
+    path = bag_of(tmp_path, every(NAMES[::-1], backwards))
+    recording = imported(tmp_path, "rosbag", path, *arm)
+    check(recording)
+    assert recording.joint_names == NAMES
+    assert [j["name"] for j in recording.meta["arm"]["joint"]] == list(NAMES)
+
+
+def test_joints_that_are_not_of_the_arm_are_left_out_and_named(tmp_path, arm, capsys):
+    names = ("wheel_left", *NAMES, "finger")
+    path = bag_of(tmp_path, every(names, [0, *range(DOF), 1]))
+    recording = imported(tmp_path, "rosbag", path, *arm)
+    check(recording)
+    assert "/joint_states: not of the arm: wheel_left, finger\n" in capsys.readouterr().err
+
+
+def test_two_publishers_may_share_the_joints_of_an_arm(tmp_path, arm):
+    one, two = every(NAMES[:2], [0, 1]), every(NAMES[2:], [2, 3, 4])
+    path = bag_of(tmp_path, [state for pair in zip(one, two, strict=True) for state in pair])
+    check(imported(tmp_path, "rosbag", path, *arm))
+
+
+def test_without_an_arm_every_joint_is_kept_by_name(tmp_path):
+    recording = imported(tmp_path, "rosbag", bag_of(tmp_path, None))
+    assert recording.joint_names == NAMES
+
+
+def test_an_angle_that_wraps_between_two_messages_goes_the_shorter_way(tmp_path):
+    angles = np.where(np.arange(len(JOINT_T)) % 2, 3.1, -3.1)
+    path = bag_of(tmp_path, [(t, ["a"], [q]) for t, q in zip(JOINT_T, angles, strict=True)])
+    joints = imported(tmp_path, "rosbag", path).joints
+    assert np.all(np.cos(joints) < np.cos(3.09))
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("a", *NAMES[1:]), "has no angle of the arm's joint j0; there are a, j1, j2, j3, j4"),
+        ((), None),
+        (("j0", *NAMES[:-1]), "names a joint twice"),
+        (NAMES[:3], "has 3 names for 5 angles"),
+    ],
+)
+def test_joints_that_do_not_suit_the_arm(tmp_path, arm, capsys, names, said):
+    path = bag_of(tmp_path, every(names, list(range(DOF))))
+    status = main(["import", "rosbag", str(path), "--out", str(tmp_path / "out"), *map(str, arm)])
+    if said is None:  # angles without names are taken in the arm's order
+        assert status == 0
+    else:
+        assert status == 2
+        assert said in capsys.readouterr().err
+
+
+def test_an_arm_for_data_without_joint_angles_is_refused(tmp_path, arm, capsys):
+    folder = write_csv(tmp_path / "csv")
+    out = ["--out", str(tmp_path / "out")]
+    assert main(["import", "csv_frames", str(folder), *out, *map(str, arm)]) == 2
+    assert "holds no joint angles; leave --arm out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("dims", [True, False])
