@@ -18,7 +18,6 @@ from train.importers.topics import FRAMES, JOINTS, Log
 def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
     """The file's one trial."""
     try:
-        from mcap.exceptions import McapError
         from mcap.reader import make_reader
     except ImportError:
         raise InputError("MCAP files need mcap; install it with `pip install mcap`") from None
@@ -26,7 +25,7 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
     types = None
     try:
         with path.open("rb") as file:
-            for schema, channel, message in make_reader(file).iter_messages():
+            for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
                 logged_s = message.log_time * 1e-9
                 kind = "" if schema is None else schema.name
                 if channel.message_encoding == "json":
@@ -38,8 +37,11 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
                     )
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except McapError as error:
-        raise InputError(f"{path}: not a whole MCAP file ({error}); copy it again") from None
+    except InputError:
+        raise
+    except Exception as error:  # of the file's parts and of its compression: a dozen kinds
+        reason = str(error)[:200] or type(error).__name__
+        raise InputError(f"{path}: not a whole MCAP file ({reason}); copy it again") from None
     yield path.stem, log.recording()
 
 

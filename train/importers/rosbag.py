@@ -17,7 +17,7 @@ from train.importers.topics import FRAMES, JOINTS, Log
 def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
     """The bag's one trial."""
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError("bags need rosbags; install it with `pip install rosbags`") from None
@@ -33,6 +33,9 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
             for connection, logged_ns, raw in reader.messages(wanted) if wanted else ():
                 message = reader.deserialize(raw, connection.msgtype)
                 log.ros(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
-    except AnyReaderError as error:
-        raise InputError(f"{path}: not a bag that can be read: {error}") from None
+    except InputError:
+        raise
+    except Exception as error:  # of the bag's parts, of its compression and of SQLite
+        reason = str(error)[:200] or type(error).__name__
+        raise InputError(f"{path}: not a bag that can be read: {reason}") from None
     yield path.stem, log.recording()
