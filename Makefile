@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants bench faults soak clean
+  board-test hard-cases hard-cases-versions mutants fuzz bench faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types and tests"
@@ -26,6 +26,7 @@ help:
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
 	@echo "make mutants  removes each guard in turn and checks that a test fails"
+	@echo "make fuzz     reads 5,000 hostile files of each kind: every one must end in an answer or a sentence"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
 $(READY): pyproject.toml constraints.txt
@@ -175,6 +176,9 @@ hard-cases-versions: $(READY) $(OTHER)/.ready
 
 mutants: $(READY)
 	$(BIN)/python -m tests.mutation.guards
+
+fuzz: $(READY)
+	$(BIN)/python -m tests.fuzz --out $(OUT)/fuzz $(FUZZ)
 
 clean:
 	rm -rf build dist

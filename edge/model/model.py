@@ -350,7 +350,7 @@ class Model:
         Raises:
             InputError: the vector has another length, or a value that is not finite (or is so
                 large that no distance to the training rows is); the model has no such decision
-                point.
+                point, or its file is damaged.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != self._shape:
@@ -359,13 +359,18 @@ class Model:
         self._decision_point[0] = (
             NO_DECISION_POINT if decision_point is None else self._place(decision_point)
         )
-        self._session.run_with_iobinding(self._binding)
+        try:
+            self._session.run_with_iobinding(self._binding)
+        except Exception as error:  # an index past its tensor, a shape that came out otherwise
+            raise self._broken(str(error)) from None
         decisions: dict[str, Decision] = {}
         for name, labels, label, scores, distances, neighbours, pvalues in self._answers:
             index = int(label[0])
             if index < 0:
                 raise self._refusal(x)
             shares = scores.tolist()
+            if index >= len(labels) or not 0.0 <= shares[index] <= 1.0:
+                raise self._broken(f"{name} is answered by label {index} of {len(labels)}")
             decisions[name] = Decision(
                 labels[index],
                 shares[index],
@@ -376,6 +381,11 @@ class Model:
                 None if decision_point is None or pvalues is None else pvalues.copy(),
             )
         return decisions
+
+    def _broken(self, reason: str) -> InputError:
+        """The file loads, and yet it is no model: nothing that was exported answers so."""
+        reason = " ".join(reason.split())[:200]
+        return InputError(f"{self.path}: cannot be run ({reason}); copy or export it again")
 
     def _refusal(self, x: NDArray[np.float64]) -> InputError:
         """Why the graph answered -1: it does so for every vector it cannot measure."""

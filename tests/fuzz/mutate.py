@@ -86,7 +86,7 @@ def of_text(data: bytes, draw: Random) -> bytes:
 def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
     """Another type, shape or value; JSON text within is mutated as text."""
     if array.dtype.kind == "U" and array.size == 1 and draw.random() < 0.8:
-        text = of_text(str(array.reshape(())[()]).encode(), draw).decode("utf-8", "surrogatepass")
+        text = of_text(str(array.reshape(())[()]).encode(), draw).decode("utf-8", "surrogateescape")
         return np.array(text)
     match draw.randrange(8):
         case 0:
@@ -102,7 +102,7 @@ def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
         case 3:
             return array[None]
         case 4:
-            return np.swapaxes(array, 0, -1) if array.ndim > 1 else array[::-1]
+            return np.swapaxes(array, 0, -1) if array.ndim else array.reshape(1, 1)
         case 5:
             return array[..., :0] if array.ndim else np.zeros(0)
         case 6:

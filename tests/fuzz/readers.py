@@ -164,8 +164,11 @@ def golden_files() -> list[bytes]:
 def skins() -> list[bytes]:
     """The shipped skins, one calibrated."""
     files = [path.read_bytes() for path in sorted((ROOT / "edge" / "skins").glob("*.toml"))]
-    rows = ", ".join("[" + ", ".join(["20000"] * 24) + "]" for _ in range(16))
-    return [*files, files[0] + f"\n[calibration]\nbaseline = [{rows}]\n".encode()]
+    rows, noise = (", ".join([f"[{', '.join([x] * 24)}]"] * 16) for x in ("20000", "1.5"))
+    return [
+        *files,
+        files[0] + f"\n[calibration]\nbaseline = [{rows}]\nnoise = [{noise}]\n".encode(),
+    ]
 
 
 def arms() -> list[bytes]:
