@@ -1,5 +1,6 @@
-"""Each module has a test file of its name, each test file a module; exceptions are named here."""
+"""Tests mirror the modules: each module has a test file of its name, or one that is named here."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -7,52 +8,33 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("edge", "train", "export")
 
-TOGETHER = {
+TOPICS = {
     # Commands, as a user runs them one after another.
-    "edge/commands/test_live_commands.py": "calibrate check record run scan source sure view",
-    "edge/commands/test_replay_verify.py": "replay summary verify",
-    "edge/commands/test_owner_loop.py": "check scan calibrate record run",
+    "edge/commands/test_live_commands.py",
+    "edge/commands/test_replay_verify.py",
+    "edge/commands/test_owner_loop.py",
     # The fake's parts are only worth what they give together.
-    "edge/fake/test_fake_bus.py": "bus chips faults clock",
-    # smbus2 itself, over a stand-in for the kernel.
-    "edge/i2c/test_smbus2.py": "bus",
-    "edge/runtime/test_service.py": "systemd loop",
-    "edge/touch/test_track.py": "contacts frame tracks",
-    "train/importers/test_importers.py": "csv_frames sdh2",
-    "train/importers/test_log_importers.py": "mcap rosbag topics",
+    "edge/fake/test_fake_bus.py",
+    # smbus2 itself, over a stand-in for the kernel; the loop as a service.
+    "edge/i2c/test_smbus2.py",
+    "edge/runtime/test_service.py",
+    "train/importers/test_importers.py",
+    "train/importers/test_log_importers.py",
     # The simulator against laws of physics, whichever effects they need.
-    "train/simulate/test_simulate_oracles.py": "arm base contact convergence engine motion "
-    "foundation impact sliding stribeck tipping stems pop relaxation hysteresis",
-    "train/simulate/test_simulate_stability.py": "contact tilt cover",
-    "train/simulate/test_simulate_called_for.py": "plan required_effects explain crosstalk "
-    "dead_band dead_taxels drift dropped_frames jitter noise quantisation saturation",
-    "train/simulate/test_simulate_run.py": "run sensor_frames",
-    "train/simulate/test_simulate_scene.py": "scene scene_model schema reader",
-    "train/simulate/test_simulate_paper.py": "run convergence",
-    # Reports, by what stands in them.
-    "train/study/test_study_report.py": "beyond classify context honest paper resolution run",
-    "train/tradeoff/test_tradeoff.py": "accuracy board early plots prices run sections wires",
-    "export/test_export_command.py": "golden",
-    "export/test_export_features.py": "graph",
-    "train/test_more_features.py": "dataset pipeline",
+    "train/simulate/test_simulate_oracles.py",
+    "train/simulate/test_simulate_stability.py",
+    "train/simulate/test_simulate_called_for.py",
+    "train/simulate/test_simulate_run.py",
+    "train/simulate/test_simulate_scene.py",
+    "train/simulate/test_simulate_paper.py",
+    # Reports, by what stands in them; an export as a whole.
+    "train/study/test_study_report.py",
+    "train/tradeoff/test_tradeoff.py",
+    "train/test_more_features.py",
+    "export/test_export_command.py",
+    "export/test_export_features.py",
 }
-"""{test file of another name: the modules beside it, or below, that it specifies}."""
-
-ELSEWHERE = {
-    "edge/commands/demo.py": "tests/test_demo_data.py",
-    "edge/config.py": "tests/edge/skin/test_file.py",
-    "edge/files.py": "tests/edge/test_recording.py",
-    "edge/clock.py": "tests/edge/runtime/test_loop.py",
-    "edge/skin/calibration.py": "tests/edge/skin/test_file.py",
-    "edge/skin/buffers.py": "tests/edge/skin/test_skin.py",
-    "train/draw/recording.py": "tests/test_readme.py",
-    "train/commands/import_.py": "tests/train/importers/test_importers.py",
-    "train/commands/show.py": "tests/train/draw/test_touch_map.py",
-    "train/commands/simulate.py": "tests/train/simulate/test_simulate_run.py",
-    "train/commands/study.py": "tests/train/study/test_study_report.py",
-    "train/commands/tradeoff.py": "tests/train/tradeoff/test_tradeoff.py",
-}
-"""{module: the test file that specifies it, where that stands in another folder}."""
+"""Test files that specify several modules together."""
 
 MODULES = [
     path.relative_to(ROOT)
@@ -60,44 +42,37 @@ MODULES = [
     for path in sorted((ROOT / package).rglob("*.py"))
     if not path.name.startswith("__")
 ]
-TESTS = [
-    path.relative_to(ROOT / "tests")
-    for package in PACKAGES
-    for path in sorted((ROOT / "tests" / package).rglob("test_*.py"))
-]
+TESTS = {
+    path.relative_to(ROOT / "tests").as_posix(): path.read_text()
+    for path in sorted((ROOT / "tests").rglob("*.py"))
+    if path != Path(__file__)
+}
 
 
-def together(module: Path) -> list[str]:
-    """The test files of other names that say they specify a module."""
-    return [
-        file
-        for file, names in TOGETHER.items()
-        if module.stem in names.split() and module.parent.is_relative_to(Path(file).parent)
-    ]
+def specified(module: Path) -> bool:
+    """Whether a test file has the module's name, imports it, or runs it as a command."""
+    if (module.parent / f"test_{module.name}").as_posix() in TESTS:
+        return True
+    package, name = ".".join(module.parent.parts), module.stem
+    imported = rf"(from|import) {package}\.{name}\b|from {package} import .*\b{name}\b"
+    if module.parent.name == "commands":
+        imported += rf"|main\(\[\"{name.strip('_')}\"|run\(\"{name}\"|edge\(\"{name}\""
+    if module.parent.name == "effects":
+        imported += rf"|\"{name}\""
+    return any(re.search(imported, text) for text in TESTS.values())
 
 
-@pytest.mark.parametrize("module", MODULES, ids=str)
-def test_a_module_has_a_test_file(module):
-    mirror = ROOT / "tests" / module.parent / f"test_{module.name}"
-    assert mirror.exists() or together(module) or ELSEWHERE.get(module.as_posix()), (
-        f"{mirror.relative_to(ROOT)} is missing"
-    )
+def test_every_module_is_specified_by_a_test():
+    without = [module.as_posix() for module in MODULES if not specified(module)]
+    assert without == [], "give each a test file of its name"
 
 
-@pytest.mark.parametrize("file", TESTS, ids=str)
-def test_a_test_file_has_a_module(file):
-    module = file.parent / file.name.removeprefix("test_")
-    assert module in MODULES or file.as_posix() in TOGETHER, f"{module} is no module"
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_test_file_has_the_name_of_a_module_or_is_a_topic(package):
+    files = [file for file in TESTS if file.startswith(f"{package}/") and "/test_" in file]
+    names = {(module.parent / f"test_{module.name}").as_posix() for module in MODULES}
+    assert sorted(set(files) - names - TOPICS) == [], "name it after its module"
 
 
-def test_the_exceptions_exist_and_are_needed():
-    for file, names in TOGETHER.items():
-        assert Path(file) in TESTS, file
-        for name in names.split():
-            folder = ROOT / Path(file).parent
-            assert any(folder.rglob(f"{name}.py")), f"{file} specifies {name}, which is not there"
-    for module, test in ELSEWHERE.items():
-        assert (ROOT / module).exists(), module
-        assert (ROOT / test).exists(), test
-        mirror = ROOT / "tests" / Path(module).parent / f"test_{Path(module).name}"
-        assert not mirror.exists(), f"{module} has a test file of its own now"
+def test_no_topic_is_left_over():
+    assert sorted(TOPICS - set(TESTS)) == []
