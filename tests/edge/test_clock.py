@@ -1,0 +1,29 @@
+"""The clock of the board never goes back, and a moment that has passed is not waited for."""
+
+import time
+
+from edge.clock import SystemClock
+
+
+def test_it_never_goes_back():
+    clock = SystemClock()
+    readings = [clock.now() for _ in range(1000)]
+    assert readings == sorted(readings)
+
+
+def test_it_returns_no_sooner_than_it_was_asked_to():
+    clock = SystemClock()
+    wanted = clock.now() + 0.002
+    clock.sleep_until(wanted)
+    assert clock.now() >= wanted
+
+
+def test_a_moment_that_has_passed_is_not_waited_for(monkeypatch):
+    clock = SystemClock()
+
+    def never(seconds):
+        raise AssertionError(f"slept {seconds} s")
+
+    monkeypatch.setattr(time, "sleep", never)
+    clock.sleep_until(clock.now() - 1.0)
+    clock.sleep_until(clock.now())
