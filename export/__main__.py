@@ -25,7 +25,8 @@ from train import operating_points
 from train.conformal import FEWEST, FOLDS, SequentialClassifier
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
-from train.pipeline import CLOSE_EIGENVALUES, SCALINGS, ContactClassifier, check_columns
+from train.pipeline import ContactClassifier
+from train.projection import CLOSE_EIGENVALUES, SCALINGS, check_columns
 
 FRONTS = Path("build/tradeoff/front.json")
 DECISION_POINTS = "0.2:1.2:0.2"
@@ -295,11 +296,11 @@ def report(dataset: DataSet, classifier: ContactClassifier, chosen: dict[str, Ch
                 f"warning: {task}: the trials span {classifier.components_[task]} components, "
                 f"{dropped} fewer than asked for"
             )
-        projection = classifier.projections_[found.choice.scaling]
-        if projection.gap < CLOSE_EIGENVALUES:
+        projection = classifier.projections_[found.choice.space(task)]
+        if projection.gap_ < CLOSE_EIGENVALUES:
             lines.append(
                 f"warning: {task}: two components explain the same variance to within "
-                f"{projection.gap:.1e}; which of them is kept is arbitrary"
+                f"{projection.gap_:.1e}; which of them is kept is arbitrary"
             )
     return "\n".join(lines)
 

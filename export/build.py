@@ -55,6 +55,12 @@ class Builder:
         assert all((a == b).all() for a, b in zip(small, values, strict=True))
         return self.node("Cast", [self.by_decision_point(small, np.float32)], to=TensorProto.DOUBLE)
 
+    def taken(self, x: str, columns: NDArray[np.int64], width: int) -> str:
+        """Name of some columns of x (n, width); of x itself where they are all."""
+        if len(columns) == width:
+            return x
+        return self.node("Gather", [x, self.constant(columns, np.int64)], axis=1)
+
     def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
         """Add an operator of one output and return its name."""
         return self.nodes(operator, inputs, [output], **attributes)[0]
@@ -94,23 +100,23 @@ class Builder:
 
 
 class Affine(Protocol):
-    """What `project` reads of a `train.pipeline.Projection`, or of several stacked."""
+    """What `project` reads of a `train.projection.Projection`, or of several stacked."""
 
-    mean: NDArray[np.float64]
-    gain: NDArray[np.float64]
-    high: Any
-    low: Any
-    weights: NDArray[np.float64]
+    mean_: NDArray[np.float64]
+    gain_: NDArray[np.float64]
+    high_: Any
+    low_: Any
+    weights_: NDArray[np.float64]
 
 
 def project(build: Builder, x: str, decision_points: Sequence[Affine]) -> str:
-    """Features (n, p) to coordinates (n, c); see `train.pipeline.Projection`."""
-    d = build.node("Sub", [x, build.by_decision_point([p.mean for p in decision_points])])
-    if not all((p.gain == 1.0).all() for p in decision_points):
-        d = build.node("Mul", [d, build.by_decision_point([p.gain for p in decision_points])])
+    """Features (n, p) to coordinates (n, c); see `train.projection.Projection`."""
+    d = build.node("Sub", [x, build.by_decision_point([p.mean_ for p in decision_points])])
+    if not all((p.gain_ == 1.0).all() for p in decision_points):
+        d = build.node("Mul", [d, build.by_decision_point([p.gain_ for p in decision_points])])
     grids = [
-        build.by_decision_point([p.high for p in decision_points]),
-        build.by_decision_point([p.low for p in decision_points]),
+        build.by_decision_point([p.high_ for p in decision_points]),
+        build.by_decision_point([p.low_ for p in decision_points]),
     ]
     halves = []
     for step in grids:
@@ -118,7 +124,7 @@ def project(build: Builder, x: str, decision_points: Sequence[Affine]) -> str:
         halves.append(half)
         if step == grids[0]:
             d = build.node("Sub", [d, half])
-    weights = widened([p.weights for p in decision_points])
+    weights = widened([p.weights_ for p in decision_points])
     # Components are multiples of 2^-WEIGHT_BITS, which float32 holds.
     weighing = (
         build.by_decision_point(weights)

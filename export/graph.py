@@ -23,7 +23,7 @@ from edge.model.onnx_file import check
 from export.build import OPSET, Builder, project, widened
 from export.pvalues import pvalues
 from train.conformal import SequentialClassifier
-from train.pipeline import ContactClassifier
+from train.pipeline import ContactClassifier, Space
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
@@ -190,34 +190,38 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         task: max(decision_point.components_[task] for decision_point in decision_points)
         for task in model.choices
     }
-    groups: dict[tuple[str, int], str] = {}
+    groups: dict[tuple[Space, int], str] = {}
     for task, choice in model.choices.items():
-        key = (choice.scaling, kept[task])
+        key = (choice.space(task), kept[task])
         if key not in groups or choice.k > model.choices[groups[key]].k:
             groups[key] = task
     points = {
-        s: project(build, x, [m.projections_[s] for m in decision_points])
-        for s in last.projections_
+        space: project(
+            build,
+            build.taken(x, last.columns_[space], last.n_features_in_),
+            [m.projections_[space] for m in decision_points],
+        )
+        for space in last.projections_
     }
     tasks = {task: names[f"{task}_label"].removesuffix("_label") for task in model.choices}
-    near: dict[tuple[str, int], list[str]] = {}
-    gaps: dict[str, str] = {}
-    for (scaling, components), most in groups.items():
-        rows = widened([m.rows_[scaling] for m in decision_points])
+    near: dict[tuple[Space, int], list[str]] = {}
+    gaps: dict[Space, str] = {}
+    for (space, components), most in groups.items():
+        rows = widened([m.rows_[space] for m in decision_points])
         have, k = rows[0].shape[1], model.choices[most].k
         # The rows of the task that asks for most neighbours are its output as they are.
         outputs = ("", f"{tasks[most]}_neighbours")
         # A shortlist of most rows saves nothing.
         if len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0]):
-            z = _first(build, points[scaling], have, components)
+            z = _first(build, points[space], have, components)
             found = _shortlisted(build, z, [r[:, :components] for r in rows], k, outputs)
         else:
-            if scaling not in gaps:
-                gaps[scaling] = _gaps(build, points[scaling], rows)
-            found = _nearest(build, _first(build, gaps[scaling], have, components), k, outputs)
-        near[scaling, components] = found
+            if space not in gaps:
+                gaps[space] = _gaps(build, points[space], rows)
+            found = _nearest(build, _first(build, gaps[space], have, components), k, outputs)
+        near[space, components] = found
     for task, choice in model.choices.items():
-        key = (choice.scaling, kept[task])
+        key = (choice.space(task), kept[task])
         have = model.choices[groups[key]].k
         squares, rows_of = near[key]
         if groups[key] != task:

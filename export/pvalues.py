@@ -12,28 +12,29 @@ from onnx import TensorProto
 
 from export.build import Builder, project, widened
 from train.conformal import ConformalCalibration, Ranking, SequentialClassifier
-from train.pipeline import Projection
+from train.pipeline import Space
+from train.projection import Projection
 
 
 @dataclass
 class Folds:
     """The projections of all folds at one decision point, stacked for `export.build.project`."""
 
-    mean: NDArray[np.float64]
-    gain: NDArray[np.float64]
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    mean_: NDArray[np.float64]
+    gain_: NDArray[np.float64]
+    high_: NDArray[np.float64]
+    low_: NDArray[np.float64]
+    weights_: NDArray[np.float64]
 
     @classmethod
     def of(cls, folds: list[Projection]) -> Folds:
         """Arrays that broadcast against features (n, 1, 1, p) to coordinates (n, folds, 1, c)."""
         return cls(
-            mean=np.stack([p.mean for p in folds])[:, None],
-            gain=np.stack([p.gain for p in folds])[:, None],
-            high=np.array([p.high for p in folds])[:, None, None],
-            low=np.array([p.low for p in folds])[:, None, None],
-            weights=np.stack(widened([p.weights for p in folds])),
+            mean_=np.stack([p.mean_ for p in folds])[:, None],
+            gain_=np.stack([p.gain_ for p in folds])[:, None],
+            high_=np.array([p.high_ for p in folds])[:, None, None],
+            low_=np.array([p.low_ for p in folds])[:, None, None],
+            weights_=np.stack(widened([p.weights_ for p in folds])),
         )
 
 
@@ -76,23 +77,21 @@ def _unasked(build: Builder, model: SequentialClassifier, names: dict[str, str])
 
 
 def _asked(build: Builder, x: str, model: SequentialClassifier) -> list[str]:
-    wide = build.node("Unsqueeze", [x, build.ints(1, 2)])
-    gaps: dict[str, tuple[str, int]] = {}
-    squares: dict[tuple[str, int], str] = {}
+    gaps: dict[Space, tuple[str, int]] = {}
+    squares: dict[tuple[Space, int], str] = {}
     scores: list[str] = []
     for task, choice in model.choices.items():
         calibration = model.calibrations_[task]
-        if choice.scaling not in gaps:
-            gaps[choice.scaling] = _gaps(build, wide, model, choice.scaling)
-        apart, have = gaps[choice.scaling]
+        space = choice.space(task)
+        if space not in gaps:
+            gaps[space] = _gaps(build, x, model, space)
+        apart, have = gaps[space]
         c = calibration.rows.shape[-1]
-        if (choice.scaling, c) not in squares:
+        if (space, c) not in squares:
             if c < have:
                 apart = build.node("Slice", [apart, *(build.ints(i) for i in (0, c, 2))])
-            squares[choice.scaling, c] = build.node(
-                "ReduceSumSquare", [apart, build.ints(2)], keepdims=0
-            )
-        scores += _scores(build, squares[choice.scaling, c], calibration)
+            squares[space, c] = build.node("ReduceSumSquare", [apart, build.ints(2)], keepdims=0)
+        scores += _scores(build, squares[space, c], calibration)
     calibrations = [model.calibrations_[task] for task in model.choices]
     every = _pvalues(build, build.node("Concat", scores, axis=2), calibrations)
     ends = np.cumsum([calibration.classes + 1 for calibration in calibrations]).tolist()
@@ -102,20 +101,22 @@ def _asked(build: Builder, x: str, model: SequentialClassifier) -> list[str]:
     ]
 
 
-def _gaps(build: Builder, wide: str, model: SequentialClassifier, scaling: str) -> tuple[str, int]:
+def _gaps(build: Builder, x: str, model: SequentialClassifier, space: Space) -> tuple[str, int]:
     """Differences (n, folds, c, rows) from the rows of the task with most components; that c."""
-    tasks = [task for task, choice in model.choices.items() if choice.scaling == scaling]
+    tasks = [task for task, choice in model.choices.items() if choice.space(task) == space]
     widest = max((model.calibrations_[task] for task in tasks), key=lambda one: one.rows.shape[-1])
     c = widest.rows.shape[-1]
+    taken = build.taken(x, widest.columns, model.n_features_in_)
+    wide = build.node("Unsqueeze", [taken, build.ints(1, 2)])
     z = project(build, wide, [Folds.of(folds) for folds in widest.projections])
-    have = max(p.weights.shape[-1] for folds in widest.projections for p in folds)
+    have = max(p.weights_.shape[-1] for folds in widest.projections for p in folds)
     if c < have:
         z = build.node("Slice", [z, *(build.ints(i) for i in (0, c, 3))])
     # (n, folds, c, 1), against rows (folds, c, rows): sums then run along memory.
     z = build.node("Unsqueeze", [build.node("Squeeze", [z, build.ints(2)]), build.ints(3)])
-    rows = build.by_decision_point_small(
-        [decision_point.transpose(0, 2, 1) for decision_point in widest.rows]
-    )
+    columns = [decision_point.transpose(0, 2, 1) for decision_point in widest.rows]
+    small = widest.rows.dtype == np.float32
+    rows = build.by_decision_point_small(columns) if small else build.by_decision_point(columns)
     return build.node("Sub", [rows, z]), c
 
 

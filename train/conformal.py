@@ -38,12 +38,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator
 from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.pipeline import Choice, ContactClassifier, Projection
+from train.pipeline import Choice, ContactClassifier, projections
+from train.projection import Projection
 
 FOLDS = 5
 RANKS = 64
@@ -51,8 +51,10 @@ RANKS = 64
 SLACK = 1e-9
 """Stored ranks and scores are this much larger, in parts: a new trial that repeats a calibration
 trial then compares alike on every machine, and p-values err upwards."""
-FAR = 1e30
-"""Coordinate of rows that fill up a fold."""
+FAR = {np.float32: 1e30, np.float64: 1e150}
+"""Coordinate of rows that fill up a fold, by the type that the rows are stored in."""
+FLOAT32_FIT = (1e-20, 1e20)
+"""Largest coordinates between which float32 holds the rows as exactly as ever."""
 FEWEST = 4
 """Trials a fold needs at least."""
 
@@ -119,9 +121,10 @@ class ConformalCalibration:
     fold.
 
     Attributes:
+        columns: those of the feature vectors that the task takes.
         projections: [decision point][fold], fitted on the other folds.
         rows: (L, K, R, c) projected trials of the other folds, rounded to float32 (a board's
-            memory is small), `FAR` beyond their number.
+            memory is small) where that holds them, `FAR` beyond their number.
         labels: (K, R) their classes, -1 beyond their number.
         rankings: [decision point][fold] of the ratio, and of the distance to the nearest.
         maxima: (2, K, M) largest rank over the decision points of each of the fold's own trials,
@@ -130,8 +133,9 @@ class ConformalCalibration:
         classes: number of labels.
     """
 
+    columns: NDArray[np.int64]
     projections: list[list[Projection]]
-    rows: NDArray[np.float32]
+    rows: NDArray[np.float32] | NDArray[np.float64]
     labels: NDArray[np.int64]
     rankings: list[list[tuple[Ranking, Ranking]]]
     maxima: NDArray[np.float64]
@@ -143,7 +147,8 @@ class ConformalCalibration:
         out = np.empty((len(X), len(self.sizes), self.classes + 1))
         for k, size in enumerate(self.sizes):
             c = self.rows.shape[-1]
-            points = _padded(self.projections[decision_point][k](X), c)
+            points = self.projections[decision_point][k].transform(X[:, self.columns])
+            points = _padded(points, c)
             squares = squares_between(points, self.rows[decision_point, k].astype(np.float64))
             nearest = nearest_by_label(squares, self.labels[k], self.classes)
             ratio, far = self.rankings[decision_point][k]
@@ -172,8 +177,8 @@ def calibrate(
     labels: NDArray[np.int64],
     classes: int,
     choice: Choice,
-    features: Sequence[str],
     fold_of: NDArray[np.int64],
+    columns: NDArray[np.int64],
     projections: list[list[Projection]],
 ) -> ConformalCalibration:
     """Calibrate one task.
@@ -182,17 +187,23 @@ def calibrate(
         X: (L, n, p) feature vectors at each decision point.
         labels: (n,) class indices.
         classes: number of labels.
-        choice: scaling and components.
-        features: names of the feature types.
+        choice: how many components.
         fold_of: (n,) from `deal`.
+        columns: those of X that the task takes.
         projections: [decision point][fold] fitted on the other folds with at least that many
             components.
     """
     decision_points, n = X.shape[:2]
     folds = int(fold_of.max()) + 1
     sizes = np.bincount(fold_of, minlength=folds)
-    c = min(choice.components, max(p.weights.shape[1] for row in projections for p in row))
-    rows = np.full((decision_points, folds, n - int(sizes.min()), c), FAR, dtype=np.float32)
+    c = min(choice.components, max(p.weights_.shape[1] for row in projections for p in row))
+    projected = [
+        [_padded(projection.transform(x[:, columns]), c) for projection in row]
+        for x, row in zip(X, projections, strict=True)
+    ]
+    largest = max(float(np.abs(points).max(initial=0.0)) for row in projected for points in row)
+    kind = np.float32 if FLOAT32_FIT[0] <= largest <= FLOAT32_FIT[1] else np.float64
+    rows = np.full((decision_points, folds, n - int(sizes.min()), c), FAR[kind], dtype=kind)
     row_labels = np.full(rows.shape[1:3], -1, dtype=np.int64)
     maxima = np.full((2, folds, int(sizes.max())), -1.0)
     rankings: list[list[tuple[Ranking, Ranking]]] = [[] for _ in range(decision_points)]
@@ -202,7 +213,7 @@ def calibrate(
         row_labels[k, :count] = labels[others]
         best = np.full((2, size), -np.inf)
         for decision_point in range(decision_points):
-            points = _padded(projections[decision_point][k](X[decision_point]), c)
+            points = projected[decision_point][k]
             rows[decision_point, k, :count] = points[others]
             known = rows[decision_point, k, :count].astype(np.float64)
             among = squares_between(known, known)
@@ -215,10 +226,12 @@ def calibrate(
             best[0] = np.maximum(best[0], ratio(ratios(new)[np.arange(size), labels[own]]))
             best[1] = np.maximum(best[1], far(new.min(axis=1)))
         maxima[:, k, :size] = best * (1.0 + SLACK)
-    return ConformalCalibration(projections, rows, row_labels, rankings, maxima, sizes, classes)
+    return ConformalCalibration(
+        columns, projections, rows, row_labels, rankings, maxima, sizes, classes
+    )
 
 
-class SequentialClassifier(BaseEstimator):
+class SequentialClassifier:
     """All tasks of a model at several windows, with calibrated p-values.
 
     Args:
@@ -244,7 +257,7 @@ class SequentialClassifier(BaseEstimator):
     ) -> None:
         self.choices = choices
         self.decision_points_s = decision_points_s
-        self.features = features
+        self.features = tuple(features)
         self.folds = folds
         self.seed = seed
 
@@ -269,26 +282,25 @@ class SequentialClassifier(BaseEstimator):
     def _fit(
         self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
     ) -> SequentialClassifier:
-        decision_points, n = X.shape[:2]
+        n = X.shape[1]
         self.decision_points_ = [
             ContactClassifier(self.choices, self.features).fit(x, y) for x in X
         ]
         self.n_features_in_ = X.shape[2]
         last = self.decision_points_[-1]
         fold_of = deal(n, self.folds, self.seed)
-        most: dict[str, int] = {}
-        for choice in self.choices.values():
-            most[choice.scaling] = max(most.get(choice.scaling, 0), choice.components)
-        fitted = {
-            scaling: [
-                [
-                    Projection(X[decision_point][fold_of != k], scaling, c, self.features)
-                    for k in range(self.folds)
-                ]
-                for decision_point in range(decision_points)
+        by_fold = [
+            [
+                projections(
+                    self.choices,
+                    self.features,
+                    x[fold_of != k],
+                    {task: labels[fold_of != k] for task, labels in y.items()},
+                )
+                for k in range(self.folds)
             ]
-            for scaling, c in most.items()
-        }
+            for x in X
+        ]
         self.sizes_ = tuple(int(size) for size in np.bincount(fold_of))
         self.calibrations_ = {
             task: calibrate(
@@ -296,9 +308,9 @@ class SequentialClassifier(BaseEstimator):
                 last.labels_[task],
                 len(last.classes_[task]),
                 choice,
-                self.features,
                 fold_of,
-                fitted[choice.scaling],
+                last.columns_[choice.space(task)],
+                [[fitted[choice.space(task)] for fitted in row] for row in by_fold],
             )
             for task, choice in self.choices.items()
         }

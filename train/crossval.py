@@ -19,7 +19,8 @@ from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.pipeline import SCALINGS, Choice, leading_axes, scale_of
+from train.pipeline import Choice
+from train.projection import SCALINGS, Spectrum, gains_of
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -46,7 +47,7 @@ def split_neighbours(
         X: (n, features * samples).
         train: (m,) rows of X, rising; scaling and components are fitted on them alone.
         test: (t,) rows of X.
-        scaling: one of `train.pipeline.SCALINGS`.
+        scaling: one of `train.projection.SCALINGS`.
         max_components: components tried, from 1.
         max_k: neighbours wanted, at most m.
         features: names of the feature types, in the order of X.
@@ -57,11 +58,8 @@ def split_neighbours(
         rows. Beyond the numerical rank a further component adds nothing, so its row repeats.
     """
     known = X[train]
-    _, gain = scale_of(known, scaling, features)
-    columns = np.repeat(gain, X.shape[1] // len(features))
-    mean = known.mean(axis=0)
-    scaled = (X - mean) * columns
-    axes = leading_axes(scaled[train], max_components)
+    scaled = (X - known.mean(axis=0)) * gains_of(known, scaling, features)
+    axes = Spectrum(scaled[train]).leading(max_components)
     z = (scaled @ axes.T)[first_equal(X) if first is None else first]
     places, queries = z[train], z[test]
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
@@ -208,7 +206,7 @@ def leave_one_out(
         y: (n,) labels.
         max_components: principal components tried, from 1.
         max_k: neighbours tried, from 1; at most n - 1.
-        scaling: one of `train.pipeline.SCALINGS`, fitted inside each fold.
+        scaling: one of `train.projection.SCALINGS`, fitted inside each fold.
         features: names of the feature types, in the order of X.
         jobs: processes.
     """

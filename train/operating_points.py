@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from edge.errors import InputError
-from train.pipeline import SCALINGS
+from train.projection import SCALINGS
 
 SHIPPED = Path(__file__).with_name("tradeoff") / "front.json"
 """The front of the simulated `cody18`."""

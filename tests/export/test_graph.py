@@ -12,7 +12,8 @@ from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 from export import graph
-from train.pipeline import SCALINGS, Choice, ContactClassifier, vote
+from train.pipeline import Choice, ContactClassifier, vote
+from train.projection import SCALINGS
 
 
 def features(n, seed=0):
@@ -121,9 +122,9 @@ def test_one_at_a_time_or_all_at_once_gives_the_same_bits(export, n):
 
 def exact_order(fitted, queries, k):
     """Neighbours by exact squared distances of the projected coordinates, ties to lower rows."""
-    rows = [[Fraction(v) for v in r] for r in fitted.rows_["none"].tolist()]
+    rows = [[Fraction(v) for v in r] for r in next(iter(fitted.rows_.values())).tolist()]
     found = []
-    for q in fitted.projections_["none"](queries).tolist():
+    for q in fitted.project(next(iter(fitted.rows_)), queries).tolist():
         point = [Fraction(v) for v in q]
         squares = [sum((a - b) ** 2 for a, b in zip(r, point, strict=True)) for r in rows]
         found.append(sorted(range(len(rows)), key=lambda i: (squares[i], i))[:k])

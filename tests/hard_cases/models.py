@@ -90,9 +90,10 @@ class Ours:
             self.data = to_onnx(self.fitted, describe(self.fitted))
             path.write_bytes(self.data)
             self.model = Model(path)
-        self.projection = self.fitted.projections_[scaling]
+        self.projection = next(iter(self.fitted.projections_.values()))
+        self.projected_rows = next(iter(self.fitted.rows_.values()))
         p, c = self.projection, self.fitted.components_["t"]
-        self._parameters = (p.mean, p.gain, p.weights[:, :c])
+        self._parameters = (p.mean_, p.gain_, p.weights_[:, :c])
         self.rows, self.exponent = exact.coordinates(X, *self._parameters)
         self.X, self.y = X, self.fitted.labels_["t"].tolist()
 
@@ -157,11 +158,11 @@ def plain_graph(ours: Ours, number: Any = np.float32) -> bytes:
     """Projection and direct distances alone, every number of one type: no grid, no shortlist,
     no vote, no guard."""
     p, c = ours.projection, ours.fitted.components_["t"]
-    rows = ours.fitted.rows_[next(iter(ours.fitted.rows_))][:, :c]
+    rows = ours.projected_rows[:, :c]
     constants = {
-        "mean": p.mean,
-        "gain": p.gain,
-        "weights": p.weights[:, :c],
+        "mean": p.mean_,
+        "gain": p.gain_,
+        "weights": p.weights_[:, :c],
         "columns": rows.T,
     }
     with np.errstate(over="ignore", under="ignore"):
@@ -183,7 +184,7 @@ def plain_graph(ours: Ours, number: Any = np.float32) -> bytes:
     graph = helper.make_graph(
         nodes,
         "plain",
-        [helper.make_tensor_value_info("x", of, [None, p.mean.size])],
+        [helper.make_tensor_value_info("x", of, [None, p.mean_.size])],
         [
             helper.make_tensor_value_info("rows", TensorProto.INT64, [None, ours.k]),
             helper.make_tensor_value_info("near", of, [None, ours.k]),

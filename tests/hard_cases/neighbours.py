@@ -22,7 +22,7 @@ from tests.hard_cases.models import (
     usual_neighbours,
     usual_pipeline,
 )
-from train.pipeline import Projection
+from train.projection import Projection
 
 SHORT = 1400
 """Rows enough for the graph's shortlist."""
@@ -64,7 +64,7 @@ def scale_error(n: int, scale: float, seed: int) -> float:
 def refused_error(scale: float) -> float:
     """1 where a scale that cannot be held is not refused at export with the mend."""
     try:
-        Projection(features(20) * scale, "none", 3)
+        Projection("none", 3).fit(features(20) * scale)
     except InputError as error:
         return float("other units" not in str(error))
     return 1.0
@@ -105,7 +105,7 @@ def ties_usual() -> str:
     """The last of 12 overlapping classes is hardly ever said where the lowest number wins."""
     X, queries = features(160), features(400, 1)
     ours = Ours(X, k=2, y=labels_for(X, 12))
-    z, points = ours.fitted.rows_["none"], ours.projection(queries)
+    z, points = ours.projected_rows, ours.projection.transform(queries)
     labels = np.array(ours.y)
     theirs = KNeighborsClassifier(2, algorithm="brute").fit(z, labels)
     seen = ours.alone(queries)
@@ -169,10 +169,12 @@ def all_rows_usual() -> str:
     wrong = 0
     for n in range(2, 62):
         ours = Ours(features(n), k=n, y=labels_for(features(n), 7))
-        z = ours.fitted.rows_["none"]
+        z = ours.projected_rows
         query = features(1, 1)
         theirs = KNeighborsClassifier(n, algorithm="brute").fit(z, np.array(ours.y))
-        wrong += int(theirs.predict(ours.projection(query))[0] != ours.alone(query)["label"][0])
+        wrong += int(
+            theirs.predict(ours.projection.transform(query))[0] != ours.alone(query)["label"][0]
+        )
     return f"scikit-learn: another label in {wrong} of 60 sets of 2 to 61 rows, the lowest number's"
 
 
@@ -207,7 +209,7 @@ def distance_usual() -> str:
     for scale in (1.0, 1e-24, 1e20):
         X, queries = features(160) * scale, features(12, 1) * scale
         ours = Ours(X, components=20)
-        z, points = ours.fitted.rows_["none"], ours.projection(queries)
+        z, points = ours.projected_rows, ours.projection.transform(queries)
         truth = np.sqrt(((points[:, None] - z) ** 2).sum(axis=2))
         brute = KNeighborsClassifier(5, algorithm="brute").fit(z, np.arange(160))
         far, rows = brute.kneighbors(points)

@@ -14,13 +14,7 @@ from sklearn.preprocessing import MaxAbsScaler, StandardScaler
 from tests.hard_cases import exact
 from tests.hard_cases.cases import Case
 from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
-from train.pipeline import (
-    CLOSE_EIGENVALUES,
-    SCALINGS,
-    PrincipalComponents,
-    Projection,
-    principal_axes,
-)
+from train.projection import CLOSE_EIGENVALUES, SCALINGS, Projection, principal_axes
 
 SEEDS = st.integers(0, 10**6)
 METHODS = st.sampled_from(SCALINGS)
@@ -32,8 +26,9 @@ def constant_error(scaling: str, value: float, seed: int) -> float:
     X[:, [7, 95]] = value
     moved = X.copy()
     moved[:, [7, 95]] += 1e3
-    p = Projection(X, scaling, 20)
-    return max(float(np.abs(p.weights[[7, 95]]).max()), float(np.abs(p(moved) - p(X)).max()))
+    p = Projection(scaling, 20).fit(X)
+    shift = np.abs(p.transform(moved) - p.transform(X)).max()
+    return max(float(np.abs(p.weights_[[7, 95]]).max()), float(shift))
 
 
 def constant_usual() -> str:
@@ -53,7 +48,7 @@ def nearly_constant_error(scaling: str, seed: int) -> float:
     X[:, 80:] = np.nextafter(
         0.1, np.where(np.random.default_rng(seed).random((40, 40)) < 0.5, 0.0, 1.0)
     )
-    return abs(float(Projection(X, scaling, 20).gain[80:].max())) if scaling == "IV" else 0.0
+    return abs(float(Projection(scaling, 20).fit(X).gain_[80:].max())) if scaling == "IV" else 0.0
 
 
 def nearly_constant_usual() -> str:
@@ -107,10 +102,8 @@ def rank_error(rows: int, rank: int, seed: int) -> float:
     right = rng.integers(-9, 10, (rank, 120))
     X = (left @ right).astype(np.float64)
     wide = (rows * X - X.sum(axis=0)).astype(np.int64)  # rows times the centred rows
-    kept = PrincipalComponents(200).fit(X)
-    truth = exact.rank(wide)
-    reported = kept.dropped_ == 200 - len(kept.components_)
-    return abs(len(kept.components_) - truth) + float(not reported)
+    kept = Projection(components=200).fit(X)
+    return float(abs(kept.weights_.shape[1] - exact.rank(wide)) + (kept.rank_ != exact.rank(wide)))
 
 
 def rank_usual() -> str:
@@ -131,10 +124,10 @@ def cut_error(gap: float, seed: int) -> float:
     values = np.array([4.0, 2.0, 2.0 * np.sqrt(1.0 - gap), 1.0])
     X = np.zeros((32, 120))
     X[:, :32] = h[:, columns] * values @ h[:4]
-    p = Projection(X, "none", 2)
+    p = Projection("none", 2).fit(X)
     true = 1.0 - (values[2] / values[1]) ** 2
-    warned = (p.gap < CLOSE_EIGENVALUES) == (true < CLOSE_EIGENVALUES)
-    return abs(p.gap - true) if warned else 1.0
+    warned = (p.gap_ < CLOSE_EIGENVALUES) == (true < CLOSE_EIGENVALUES)
+    return abs(p.gap_ - true) if warned else 1.0
 
 
 def cut_usual() -> str:
@@ -157,8 +150,8 @@ def sign_error(seed: int) -> float:
     """Components that differ when the same trials come in another order."""
     X = flat(seed)
     order = np.random.default_rng(seed).permutation(len(X))
-    weights = Projection(X, "none", 2).weights
-    return float((Projection(X[order], "none", 2).weights != weights).any(axis=0).sum())
+    weights = Projection("none", 2).fit(X).weights_
+    return float((Projection("none", 2).fit(X[order]).weights_ != weights).any(axis=0).sum())
 
 
 def sign_usual() -> str:
@@ -214,11 +207,11 @@ def decades_usual() -> str:
 def grid_error(seed: int) -> float:
     """A distance on the components' grid against the same with components as fitted."""
     X, queries = features(60, seed), features(20, seed + 1)
-    p = Projection(X, "none", 20)
-    _, axes, _ = principal_axes((X - p.mean) * p.gain)
+    p = Projection("none", 20).fit(X)
+    _, axes, _ = principal_axes((X - p.mean_) * p.gain_)
     fine = axes[:20].T
     gaps = queries[:, None] - X
-    ours = np.sqrt(((gaps @ p.weights) ** 2).sum(axis=2))
+    ours = np.sqrt(((gaps @ p.weights_) ** 2).sum(axis=2))
     free = np.sqrt(((gaps @ fine) ** 2).sum(axis=2))
     return float((np.abs(ours - free) / np.sqrt((gaps**2).sum(axis=2))).max())
 

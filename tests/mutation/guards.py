@@ -46,73 +46,74 @@ class Guard:
 
 
 CONTACT, GRID = "edge/touch/contact.py", "edge/touch/grid.py"
-PIPELINE, GRAPH, TRACK = "train/pipeline.py", "export/graph.py", "edge/touch/track.py"
+PIPELINE, PROJECTION = "train/pipeline.py", "train/projection.py"
+GRAPH, TRACK = "export/graph.py", "edge/touch/track.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
 TILT = "train/simulate/effects/tilt.py"
 
 GUARDS = (
     Guard(
         "a type that told nothing gets no gain",
-        f"{PIPELINE}:scale_of",
+        f"{PROJECTION}:scale_of",
         "np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)",
         "np.divide(1.0, scale, out=np.ones(types), where=scale > 0.0)",
     ),
     Guard(
         "a spread that is rounding is no spread",
-        f"{PIPELINE}:scale_of",
+        f"{PROJECTION}:scale_of",
         "deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0",
         "pass",
         "spread and rounding",
     ),
     Guard(
         "a column that is constant but for rounding weighs nothing",
-        f"{PIPELINE}:_centred",
+        f"{PROJECTION}:_centred",
         "still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)",
         "still = np.zeros(X.shape[1], dtype=bool)",
     ),
     Guard(
         "components end at the rank",
-        f"{PIPELINE}:principal_axes",
+        f"{PROJECTION}:principal_axes",
         "limit = values[:1].max(initial=0.0) * max(X.shape) * np.finfo(float).eps",
         "limit = 0.0",
         "rank",
     ),
     Guard(
         "the sign is fixed",
-        f"{PIPELINE}:principal_axes",
-        "axes *= np.sign(axes[np.arange(rank), top])[:, None]",
+        f"{PROJECTION}:principal_axes",
+        "axes *= _signs(axes)[:, None]",
         "pass",
     ),
     Guard(
         "entries equal but for rounding are equal",
-        f"{PIPELINE}:principal_axes",
+        f"{PROJECTION}:_signs",
         "sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True)",
         "sizes >= sizes.max(axis=1, keepdims=True)",
     ),
     Guard(
         "a projection is exact: high half",
-        f"{PIPELINE}:__call__",
-        "high = (d + self.high) - self.high",
+        f"{PROJECTION}:transform",
+        "high = (d + self.high_) - self.high_",
         "high = 0.5 * d",
     ),
     Guard(
         "a projection is exact: low half",
-        f"{PIPELINE}:__call__",
-        "low = ((d - high) + self.low) - self.low",
+        f"{PROJECTION}:transform",
+        "low = ((d - high) + self.low_) - self.low_",
         "low = d - high",
         beside=GRAPH,
     ),
     Guard(
         "the mean is subtracted first",
-        f"{PIPELINE}:__call__",
-        "d = (X - self.mean) * self.gain",
-        "d = X * self.gain - self.mean * self.gain",
+        f"{PROJECTION}:transform",
+        "d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_",
+        "d = X * self.gain_ - self.mean_ * self.gain_",
         "offset or exact",
     ),
     Guard(
         "scales that cannot be held are refused",
-        f"{PIPELINE}:__init__",
-        "if largest > LARGEST_SCALE or 0.0 < largest < SMALLEST_SCALE: ...",
+        f"{PROJECTION}:fit",
+        "if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE): ...",
         "if False: ...",
     ),
     Guard(

@@ -9,27 +9,19 @@ from edge.errors import InputError
 from train import crossval
 from train.crossval import choose, leave_one_out, neighbours, split_neighbours, votes_right
 from train.dataset import load_trials
-from train.pipeline import (
-    SCALINGS,
-    FeatureScaler,
-    NearestNeighbours,
-    PrincipalComponents,
-    leading_axes,
-    principal_axes,
-    vote,
-)
+from train.pipeline import NearestNeighbours, vote
+from train.projection import SCALINGS, Projection, Spectrum, principal_axes
 
 
 def sklearn_table(X, y, scaling, components, ks):
     search = GridSearchCV(
         Pipeline(
             [
-                ("scale", FeatureScaler(scaling)),
-                ("pca", PrincipalComponents()),
+                ("project", Projection(scaling)),
                 ("knn", NearestNeighbours()),
             ]
         ),
-        {"pca__components": components, "knn__k": ks},
+        {"project__components": components, "knn__k": ks},
         cv=LeaveOneOut(),
         scoring="accuracy",
     ).fit(X, y)
@@ -37,7 +29,7 @@ def sklearn_table(X, y, scaling, components, ks):
     for cell, score in zip(
         search.cv_results_["params"], search.cv_results_["mean_test_score"], strict=True
     ):
-        at = components.index(cell["pca__components"]), ks.index(cell["knn__k"])
+        at = components.index(cell["project__components"]), ks.index(cell["knn__k"])
         table[at] = score
     return table
 
@@ -184,7 +176,7 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     left = np.linalg.qr(left - left.mean(axis=0))[0]
     right = np.linalg.qr(rng.normal(size=(shape[1], side)))[0]
     X = left * 10.0 ** -np.linspace(0, decades, side) @ right.T
-    ours = leading_axes(X, side - 2)
+    ours = Spectrum(X).leading(side - 2)
     _, exact, _ = principal_axes(X)
     assert len(ours) == min(side - 2, len(exact))
     assert subspace_gap(ours, exact[: len(ours)]) < 1e-7
@@ -193,8 +185,8 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
 
 def test_leading_axes_of_fewer_dimensions_than_asked_for():
     X = np.outer(np.arange(9.0), np.ones(12))
-    assert len(leading_axes(X, 5)) == 1
-    assert leading_axes(np.ones((9, 12)), 5).shape == (0, 12)
+    assert len(Spectrum(X).leading(5)) == 1
+    assert Spectrum(np.ones((9, 12))).leading(5).shape == (0, 12)
 
 
 def test_a_group_left_out_is_fitted_without_any_of_its_trials():
@@ -203,8 +195,6 @@ def test_a_group_left_out_is_fitted_without_any_of_its_trials():
     rows = split_neighbours(X, train, test, "IV", 6, 15)
     assert rows.shape == (2, 6, 15)
     assert (np.sort(rows, axis=2) == train).all()
-    scaled = FeatureScaler("IV").fit(X[train])
-    fitted = PrincipalComponents(6).fit(scaled.transform(X[train]))
-    places = fitted.transform(scaled.transform(X))
+    places = Projection("IV", 6).fit(X[train]).transform(X)
     known = NearestNeighbours(15).fit(places[train], np.array(["x"] * 15))
     assert (train[known.kneighbors(places[test])[1]] == rows[:, 5]).all()

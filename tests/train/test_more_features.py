@@ -6,7 +6,8 @@ import pytest
 from edge.errors import InputError
 from train.crossval import choose, leave_one_out
 from train.dataset import load_trials
-from train.pipeline import Choice, ContactClassifier, FeatureScaler, Projection, scale_of
+from train.pipeline import Choice, ContactClassifier
+from train.projection import Projection, scale_of
 
 SIX = ("skin_force", "contact_motion", "left_length", "max_force", "regions", "contact_area")
 
@@ -33,7 +34,8 @@ def test_method_v_without_the_papers_features_is_no_scaling(names):
 
 
 def test_method_iv_standardises_each_of_many_types():
-    X = FeatureScaler("IV", SIX).fit(vectors(6, 8)).transform(vectors(6, 8)).reshape(30, 6, 8)
+    offset, gain = scale_of(vectors(6, 8), "IV", SIX)
+    X = (vectors(6, 8).reshape(30, 6, 8) - offset[:, None]) * gain[:, None]
     assert X.mean(axis=(0, 2)) == pytest.approx(np.zeros(6), abs=1e-14)
     assert X.std(axis=(0, 2)) == pytest.approx(np.ones(6))
 
@@ -47,20 +49,20 @@ def test_columns_that_are_no_whole_number_of_samples_are_refused():
 def test_a_projection_of_many_columns_adds_up_exactly(samples):
     """Any order of the columns gives the same bits, and a training row lies at distance 0."""
     X = vectors(6, samples)
-    projection = Projection(X, "IV", 8, SIX)
-    rows = projection(X)
-    assert (projection(X[3:4]) == rows[3]).all()
+    projection = Projection("IV", 8, SIX).fit(X)
+    rows = projection.transform(X)
+    assert (projection.transform(X[3:4]) == rows[3]).all()
     rng = np.random.default_rng(1)
-    shuffled = Projection(X, "IV", 8, SIX)
+    shuffled = Projection("IV", 8, SIX).fit(X)
     order = rng.permutation(X.shape[1])
-    shuffled.mean, shuffled.gain = projection.mean[order], projection.gain[order]
-    shuffled.weights = projection.weights[order]
-    assert (shuffled(X[:, order]) == rows).all()
+    shuffled.mean_, shuffled.gain_ = projection.mean_[order], projection.gain_[order]
+    shuffled.weights_ = projection.weights_[order]
+    assert (shuffled.transform(X[:, order]) == rows).all()
 
 
 def test_more_columns_than_add_up_exactly_are_refused():
     with pytest.raises(InputError, match="4098 values a trial are more than the 4096"):
-        Projection(vectors(6, 683, n=4), "none", 2, SIX)
+        Projection("none", 2, SIX).fit(vectors(6, 683, n=4))
 
 
 def test_a_classifier_of_six_features_and_few_samples(recordings):

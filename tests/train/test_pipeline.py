@@ -9,18 +9,8 @@ from hypothesis import strategies as st
 from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
-from train.pipeline import (
-    SCALINGS,
-    WEIGHT_BITS,
-    Choice,
-    ContactClassifier,
-    FeatureScaler,
-    NearestNeighbours,
-    PrincipalComponents,
-    Projection,
-    principal_axes,
-    vote,
-)
+from train.pipeline import Choice, ContactClassifier, NearestNeighbours, vote
+from train.projection import SCALINGS, Projection, principal_axes, scale_of
 
 
 def data(n=30, seed=0):
@@ -44,7 +34,8 @@ def test_scalings_are_the_papers_equations_per_feature_type():
     }
     assert set(expected) == set(SCALINGS)
     for method, blocks in expected.items():
-        scaled = FeatureScaler(method).fit(X).transform(X)
+        offset, gain = (np.repeat(part, 40) for part in scale_of(X, method))
+        scaled = (X - offset) * gain
         assert scaled == pytest.approx(np.hstack(blocks), rel=1e-14, abs=1e-13)
 
 
@@ -52,16 +43,16 @@ def test_scalings_are_the_papers_equations_per_feature_type():
 def test_a_feature_type_that_told_nothing_in_training_is_dropped(method):
     X = data()
     X[:, 80:] = 0.0
-    scaler = FeatureScaler(method).fit(X)
+    fitted = Projection(method).fit(X)
     moved = X.copy()
     moved[:, 80:] = 1e6
-    assert (scaler.transform(moved) == scaler.transform(X)).all()
+    assert (fitted.transform(moved) == fitted.transform(X)).all()
 
 
 def test_a_spread_that_is_only_rounding_is_no_spread():
     X = data()
     X[:, 80:] = 0.1  # its mean is not exactly 0.1
-    assert FeatureScaler("IV").fit(X).gain_[2] == 0.0
+    assert scale_of(X, "IV")[1][2] == 0.0
 
 
 def test_components_match_long_double_and_have_a_fixed_sign():
@@ -86,17 +77,17 @@ def test_the_sign_does_not_hang_on_rounding():
         rng = np.random.default_rng(seed)
         a, b = rng.normal(size=(2, 30))
         X = 5.0 + np.repeat(np.column_stack([a, -a, 0.01 * b]), 40, axis=1)
-        weights = Projection(X, "none", 2).weights
+        weights = Projection("none", 2).fit(X).weights_
         assert (weights[:40, 0] > 0.7 / 40**0.5).all()
-        assert (Projection(X[rng.permutation(30)], "none", 2).weights == weights).all()
+        assert (Projection("none", 2).fit(X[rng.permutation(30)]).weights_ == weights).all()
 
 
 def test_components_stop_at_the_rank():
     X = data(n=12)
-    pca = PrincipalComponents(20).fit(X)
-    assert (len(pca.components_), pca.dropped_) == (11, 9)
+    fitted = Projection(components=20).fit(X)
+    assert (fitted.weights_.shape[1], fitted.rank_) == (11, 11)
     rank_two = np.outer(np.arange(30.0), X[0]) + np.outer(np.arange(30.0) ** 2, X[1])
-    assert len(PrincipalComponents(20).fit(rank_two).components_) == 2
+    assert Projection().fit(rank_two).rank_ == 2
 
 
 def test_a_column_without_variance_gets_no_weight():
@@ -125,7 +116,7 @@ def test_equal_distances_go_to_the_earlier_row():
 
 def test_the_estimators_work_in_a_scikit_learn_pipeline():
     X, y = data(), np.repeat(["a", "b"], 15)
-    pipe = make_pipeline(FeatureScaler("IV"), PrincipalComponents(3), NearestNeighbours(1))
+    pipe = make_pipeline(Projection("IV", 3), NearestNeighbours(1))
     assert (pipe.fit(X, y).predict(X) == y).all()
 
 
@@ -139,16 +130,14 @@ def test_the_estimators_work_in_a_scikit_learn_pipeline():
 def test_a_projection_is_exact_in_any_order(seed, scaling, offset, spread):
     """Its two sums are those of exact fractions, so the order of summation cannot matter."""
     X = data(seed=seed) * spread + offset
-    projection = Projection(X, scaling, 4)
-    z = projection(X)
-    d = (X - projection.mean) * projection.gain
-    high = (d + projection.high) - projection.high
-    low = ((d - high) + projection.low) - projection.low
-    scale = 2**WEIGHT_BITS
-    weights = (projection.weights * scale).astype(int)
+    projection = Projection(scaling, 4).fit(X)
+    z = projection.transform(X)
+    d = (X - projection.mean_) * projection.gain_
+    high = (d + projection.high_) - projection.high_
+    low = ((d - high) + projection.low_) - projection.low_
     for i in range(0, len(X), 7):
-        for j in range(weights.shape[1]):
-            w = [Fraction(int(v), scale) for v in weights[:, j]]
+        for j in range(4):
+            w = [Fraction(v) for v in projection.weights_[:, j].tolist()]
             parts = [
                 sum((Fraction(v) * u for v, u in zip(half[i].tolist(), w, strict=True)), Fraction())
                 for half in (high, low)
@@ -158,23 +147,23 @@ def test_a_projection_is_exact_in_any_order(seed, scaling, offset, spread):
             assert z[i, j] == float(parts[0]) + float(parts[1])
     order = np.random.default_rng(seed).permutation(120)
     shuffled = (
-        high[:, order] @ projection.weights[order] + low[:, order] @ projection.weights[order]
+        high[:, order] @ projection.weights_[order] + low[:, order] @ projection.weights_[order]
     )
     assert (shuffled == z).all()
 
 
 def test_what_a_projection_cuts_off_is_below_float64_of_its_range():
     X = data()
-    projection = Projection(X, "none", 20)
-    exact = (X - projection.mean).astype(np.longdouble) @ projection.weights.astype(np.longdouble)
-    reach = np.abs(X - projection.mean).max()
-    assert float(np.abs(projection(X) - exact).max()) < 120 * 2.0**-51 * reach
+    projection = Projection("none", 20).fit(X)
+    exact = (X - projection.mean_).astype(np.longdouble) @ projection.weights_.astype(np.longdouble)
+    reach = np.abs(X - projection.mean_).max()
+    assert float(np.abs(projection.transform(X) - exact).max()) < 120 * 2.0**-51 * reach
 
 
 def test_features_whose_squares_vanish_or_overflow_are_refused():
     for scale in (1e-110, 1e-33, 1e110):
         with pytest.raises(InputError, match="other units"):
-            Projection(data() * scale, "none", 2)
+            Projection("none", 2).fit(data() * scale)
 
 
 def test_a_classifier_answers_every_task_by_the_rules():

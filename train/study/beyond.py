@@ -15,7 +15,7 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from edge.touch.layout import for_device
 from edge.touch.measures import feature, names
 from edge.touch.track import ContactTracker, first_contact
-from train.pipeline import scale_of
+from train.projection import scale_of
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.context import Context

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from edge.touch.features import FEATURES
-from train.pipeline import SCALINGS
+from train.projection import SCALINGS
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.context import Context

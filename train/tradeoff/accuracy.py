@@ -12,7 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from edge.touch.contact import FeatureSeries
 from train.crossval import votes_right
-from train.pipeline import Choice, principal_axes, scale_of
+from train.pipeline import Choice
+from train.projection import principal_axes, scale_of
 from train.study.score import Labels, Result, best_cell
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)

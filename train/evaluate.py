@@ -1,0 +1,331 @@
+"""The accuracy of a choice, by trials that took no part in it.
+
+The trials are parted into folds. For each two folds every candidate is fitted on all others and
+tested on both, and for each fold on all others and tested on it. Seen from fold i, the tests on
+the other folds by fits without fold i are a whole cross-validation among those others: what it
+chooses was chosen without fold i, and the fit without fold i alone then tells fold i. Scaling,
+projection and neighbours are fitted on a fit's own trials each time, so a trial that is told took
+no part in them, nor in the choice of the features, the projection, the shrinkage, the components
+and k: that is the nested accuracy. A fit without folds i and j serves both i and j, so ten folds
+take 55 fits, not 110.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from edge.commands.summary import wilson
+from edge.errors import InputError
+from edge.touch.features import FEATURES
+from train.crossval import first_equal, votes_right
+from train.pipeline import Choice, columns_of
+from train.projection import Spectrum, gains_of, on_grid
+
+FOLDS = 10
+COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
+SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003)
+NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
+
+Labels = Mapping[str, NDArray[np.str_]]
+"""{task: (n,) labels}."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A task's accuracy.
+
+    Attributes:
+        right: trials answered right.
+        total: trials.
+        components: of the best cell of the grid, or of the cell most often chosen; 0 where no
+            grid was searched.
+        k: likewise.
+        said: (n,) what was said of each trial, or None.
+    """
+
+    right: int
+    total: int
+    components: int = 0
+    k: int = 0
+    said: NDArray[np.str_] | None = None
+
+    @property
+    def accuracy(self) -> float:
+        """0 to 1."""
+        return self.right / self.total
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % binomial interval (Wilson)."""
+        return wilson(self.right, self.total)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Candidates that share a decomposition of the features.
+
+    Attributes:
+        scaling: one of `train.projection.SCALINGS`.
+        projection: one of `train.projection.KINDS`.
+        features: names of those taken; all where empty.
+        components: numbers of components, rising; `lda` takes all directions there are.
+        shrinkages: of `lda`, the largest first.
+        neighbours: values of k, rising.
+        targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
+        name: what a table calls the features.
+    """
+
+    scaling: str = "none"
+    projection: str = "pca"
+    features: tuple[str, ...] = ()
+    components: tuple[int, ...] = COMPONENTS
+    shrinkages: tuple[float, ...] = SHRINKAGES
+    neighbours: tuple[int, ...] = NEIGHBOURS
+    targets: tuple[str, ...] = ()
+    name: str = ""
+
+    def choices(self, classes: int) -> list[Choice]:
+        """Every candidate, in the order of `_answers`."""
+        if self.projection == "pca":
+            cells = [(c, 0.01) for c in self.components]
+        else:
+            cells = [(max(classes - 1, 1), shrinkage) for shrinkage in self.shrinkages]
+        return [
+            Choice(self.scaling, c, k, self.projection, s, self.features, self.targets)
+            for c, s in cells
+            for k in self.neighbours
+        ]
+
+
+def stratified_folds(
+    y: NDArray[np.str_], count: int = FOLDS, seed: int = 2012
+) -> NDArray[np.int64]:
+    """(n,) folds in which each class is spread evenly; the same for the same labels."""
+    order = np.random.default_rng(seed).permutation(len(y))
+    order = order[np.argsort(y[order], kind="stable")]
+    folds = np.empty(len(y), dtype=np.int64)
+    folds[order] = np.arange(len(y)) % min(count, len(y))
+    return folds
+
+
+def group_folds(groups: NDArray[np.str_], count: int = 20, seed: int = 2012) -> NDArray[np.int64]:
+    """(n,) folds that keep groups whole: a group each, or several where there are over `count`."""
+    names, members = np.unique(groups, return_inverse=True)
+    order = np.random.default_rng(seed).permutation(len(names))
+    return np.asarray((order % count)[members], dtype=np.int64)
+
+
+def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
+    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order.
+
+    Which of several equal ones is the last of the k is left open.
+    """
+    among = np.sort(np.argpartition(squares, k - 1, axis=1)[:, :k], axis=1)
+    order = np.argsort(np.take_along_axis(squares, among, axis=1), axis=1, kind="stable")
+    return np.take_along_axis(among, order, axis=1)
+
+
+def _squares(
+    z: NDArray[np.float64], train: NDArray[np.int64], test: NDArray[np.int64], columns: range
+) -> NDArray[np.float64]:
+    """(test, train) squared distances along some columns, taken directly."""
+    out = np.zeros((len(test), len(train)))
+    gap = np.empty_like(out)
+    for column in columns:
+        np.subtract(z[test, column, None], z[train, column], out=gap)
+        gap *= gap
+        out += gap
+    return out
+
+
+def _neighbours(
+    spectrum: Spectrum,
+    d: NDArray[np.float64],
+    first: NDArray[np.int64],
+    labels: NDArray[np.int64] | None,
+    train: NDArray[np.int64],
+    test: NDArray[np.int64],
+    grid: Grid,
+) -> Iterator[NDArray[np.int64]]:
+    """(test, k) places among `train` of each projection of the grid."""
+    k = min(grid.neighbours[-1], len(train))
+    if grid.projection == "pca":
+        axes = spectrum.leading(grid.components[-1])
+        z = (d @ on_grid(axes.T))[first]
+        squares, done = np.zeros((len(test), len(train))), 0
+        for count in grid.components:
+            squares += _squares(z, train, test, range(done, min(count, len(axes))))
+            done = max(done, min(count, len(axes)))
+            yield _nearest(squares, k)
+        return
+    assert labels is not None
+    for shrinkage in grid.shrinkages:
+        weights = np.hstack([spectrum.discriminants(one, shrinkage) for one in labels])
+        z = (d @ on_grid(weights))[first]
+        yield _nearest(_squares(z, train, test, range(z.shape[1])), k)
+
+
+def _answers(
+    X: NDArray[np.float64],
+    classes: Mapping[str, NDArray[np.int64]],
+    train: NDArray[np.int64],
+    test: NDArray[np.int64],
+    grids: Sequence[Grid],
+    features: Sequence[str],
+) -> dict[str, NDArray[np.bool_]]:
+    """{task: (candidates, test)} whether each candidate, fitted on `train`, tells the tests."""
+    found: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
+    spectra: dict[tuple[str, tuple[str, ...]], tuple[Spectrum, NDArray[np.float64]]] = {}
+    first = first_equal(X)
+    with threadpool_limits(1):
+        for grid in grids:
+            key = grid.scaling, grid.features
+            if key not in spectra:
+                names = [name for name in features if name in grid.features] or features
+                part = X[:, columns_of(grid.features, features, X.shape[1])]
+                gains = gains_of(part[train], grid.scaling, names)
+                d = (part - part[train].mean(axis=0)) * gains
+                spectra = {key: (Spectrum(d[train]), d)}
+            spectrum, d = spectra[key]
+            pick = [k - 1 for k in grid.neighbours]
+            shared = (
+                list(_neighbours(spectrum, d, first, None, train, test, grid))
+                if grid.projection == "pca"
+                else None
+            )
+            for task, labels in classes.items():
+                near = shared
+                if near is None:
+                    targets = np.stack([classes[t][train] for t in grid.targets or (task,)])
+                    near = list(_neighbours(spectrum, d, first, targets, train, test, grid))
+                for places in near:
+                    right = votes_right(places, labels[train], labels[test])
+                    most = right.shape[1] - 1
+                    found[task] += [right[:, min(j, most)] for j in pick]
+    return {task: np.array(right) for task, right in found.items()}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Every candidate's answers to every trial, by fits that had not seen it.
+
+    Attributes:
+        folds: (n,) the fold of each trial.
+        choices: {task: the candidates}.
+        right: {task: (folds, candidates, n)} whether the fit without a fold, and without the
+            trial's own, tells the trial.
+    """
+
+    folds: NDArray[np.int64]
+    choices: dict[str, list[Choice]]
+    right: dict[str, NDArray[np.bool_]] = field(repr=False)
+
+    def held_out(self, task: str) -> NDArray[np.bool_]:
+        """(candidates, n) answers to each trial by the fit without its fold."""
+        right = self.right[task]
+        return np.asarray(right[self.folds, :, np.arange(len(self.folds))].T)
+
+    def chosen(self, task: str, order: NDArray[np.int64] | None = None) -> int:
+        """The candidate chosen by all trials; see `choose`."""
+        return choose(self.held_out(task), order)
+
+    def nested(self, task: str, order: NDArray[np.int64] | None = None, missed: int = 0) -> Result:
+        """The accuracy of the choice itself.
+
+        Args:
+            task: its name.
+            order: see `choose`.
+            missed: trials without a contact, which count as wrong.
+        """
+        right, picked = 0, []
+        for fold in range(int(self.folds.max()) + 1):
+            own = self.folds == fold
+            seen = self.right[task][fold]
+            cell = choose(seen[:, ~own], order)
+            right += int(seen[cell, own].sum())
+            picked.append(cell)
+        cell = int(np.bincount(picked).argmax())
+        choice = self.choices[task][cell]
+        return Result(right, len(self.folds) + missed, choice.components, choice.k)
+
+
+def choose(right: NDArray[np.bool_], order: NDArray[np.int64] | None = None) -> int:
+    """The best candidate; or the cheapest that is not worse by more than a standard error.
+
+    The error is that of the difference to the best one on the same trials: two candidates that
+    err on the same trials are told apart more finely than by their accuracies' own errors.
+
+    Args:
+        right: (candidates, n) answers of each.
+        order: (candidates,) rising with cost; without it the best is taken, of equal ones the
+            first.
+    """
+    best = int(right.mean(axis=1).argmax())
+    if order is None:
+        return best
+    worse = right[best].astype(np.int64) - right
+    within = worse.mean(axis=1) <= worse.std(axis=1) / np.sqrt(right.shape[1])
+    return int(np.flatnonzero(within)[order[within].argmin()])
+
+
+def evaluate(
+    X: NDArray[np.float64],
+    y: Labels,
+    folds: NDArray[np.int64],
+    grids: Sequence[Grid],
+    *,
+    features: Sequence[str] = FEATURES,
+    jobs: int = 1,
+    progress: str | None = None,
+) -> Table:
+    """Fit every candidate without each fold, and without each two folds.
+
+    Args:
+        X: (n, p).
+        y: {task: (n,) labels}.
+        folds: (n,) from 0.
+        grids: the candidates.
+        features: names of the types, in the order of X.
+        jobs: processes.
+        progress: what a bar on stderr is called; none without it.
+
+    Raises:
+        InputError: there are fewer than three folds, or X is not finite.
+    """
+    X = np.ascontiguousarray(X, dtype=np.float64)
+    count = int(folds.max()) + 1
+    if count < 3:
+        raise InputError(f"nested accuracy needs at least 3 folds, not {count}; record more")
+    if not np.isfinite(X).all():
+        raise InputError(
+            f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
+        )
+    classes = {task: np.unique(labels, return_inverse=True)[1] for task, labels in y.items()}
+    pairs = [(i, j) for i in range(count) for j in range(i, count)]
+    tests = [np.flatnonzero((folds == i) | (folds == j)) for i, j in pairs]
+    everything = np.arange(len(X))
+    work = (
+        delayed(_answers)(X, classes, np.delete(everything, test), test, grids, tuple(features))
+        for test in tests
+    )
+    parts = Parallel(n_jobs=jobs, return_as="generator")(work)
+    bar = tqdm(parts, total=len(pairs), desc=progress, unit=" fits", disable=progress is None)
+    choices = {
+        task: [c for grid in grids for c in grid.choices(len(set(labels.tolist())))]
+        for task, labels in classes.items()
+    }
+    right = {task: np.zeros((count, len(choices[task]), len(X)), dtype=bool) for task in classes}
+    for (i, j), test, part in zip(pairs, tests, bar, strict=True):
+        for task, answers in part.items():
+            # Seen from fold i these are answers to fold j, and the other way round.
+            for one, other in {(i, j), (j, i)}:
+                own = folds[test] == other
+                right[task][one][:, test[own]] = answers[:, own]
+    return Table(folds, choices, right)

@@ -1,0 +1,374 @@
+"""Scaling and projection of feature vectors, as a scikit-learn transformer.
+
+The arithmetic of a fitted `Projection` is what the ONNX graph does, operation by operation;
+`export/build.py` writes it down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.utils.validation import check_is_fitted
+
+from edge.errors import InputError
+from edge.touch.features import FEATURES
+
+SCALINGS = ("none", "I", "II", "III", "IV", "V")
+"""No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
+
+WEIGHT_BITS = 20
+"""Components of up to 128 columns are multiples of 2 ** -WEIGHT_BITS; see `Projection`."""
+HALF_BITS = 26
+MOST_COLUMNS = 1 << 12
+"""Beyond them too few bits are left for the components."""
+RANGE = 4.0
+"""How far beyond the training set's range a query may lie and still be projected exactly."""
+SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
+"""Above, squares overflow in a distance. Below, nothing has been asked of the graph: the hard
+cases go down to it."""
+CLOSE_EIGENVALUES = 1e-6
+WELL_CONDITIONED = 1e-8
+"""Variance, as a part of the largest, down to which eigenvectors of a covariance are trusted."""
+SAME_SIZE = 1e-6
+KINDS = ("pca", "lda")
+"""Principal components, and discriminants."""
+NO_DISTANCE = 1e-6
+"""How far classes lie apart in a direction, as a part of all spread, below which it is rounding."""
+
+
+def _exponents(X: NDArray[np.float64], axes: tuple[int, ...]) -> NDArray[np.int32]:
+    """The powers of two that bring the largest entries along some axes near 1.
+
+    Multiplied by them, nothing is rounded, and neither sums nor squares leave float64.
+    """
+    return np.asarray(np.frexp(np.abs(X).max(axis=axes, initial=0.0))[1])
+
+
+def _mean(X: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(p,) mean of each column, also where its sum would overflow."""
+    powers = _exponents(X, (0,))
+    return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
+
+
+def scale_of(
+    X: NDArray[np.float64], method: str, features: Sequence[str] = FEATURES
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Offset and gain of each feature type: scaled = (x - offset) * gain.
+
+    The statistics are over all samples of a feature type in all trials (paper, section IV-D),
+    not over columns. Where a maximum or a standard deviation is 0 the type is dropped (gain 0):
+    it told nothing in training and must not dominate when it moves.
+
+    Args:
+        X: (n, features * samples).
+        method: one of `SCALINGS`. Method V brings contact_motion to the range of max_force and
+            contact_area and leaves all else alone; without them it is no scaling.
+        features: names of the types, in the order of X.
+
+    Returns:
+        (features,) and (features,).
+
+    Raises:
+        InputError: the method is unknown, or X has no whole number of samples a feature.
+    """
+    types = len(features)
+    if X.shape[1] % types:
+        raise InputError(f"{X.shape[1]} columns are no whole number of samples of {types} features")
+    if method == "none":
+        return np.zeros(types), np.ones(types)
+    blocks = X.reshape(X.shape[0], types, -1)
+    powers = _exponents(blocks, (0, 2))
+    small = np.ldexp(blocks, -powers[:, None])
+    mean = small.mean(axis=(0, 2))
+    largest = np.abs(small).max(axis=(0, 2))
+    ones, zeros = np.ones(types), np.zeros(types)
+
+    def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
+        gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
+        with np.errstate(over="ignore"):  # what is then infinite, `Projection` refuses
+            return np.asarray(np.ldexp(gain, -powers))
+
+    if method == "I":
+        return np.ldexp(mean, powers), inverse(largest)
+    if method == "II":
+        return zeros, inverse(largest)
+    if method == "III":
+        return np.ldexp(mean, powers), ones
+    if method == "IV":
+        deviation = np.sqrt(((small - mean[:, None]) ** 2).mean(axis=(0, 2)))
+        # A spread below the rounding of its own mean is no spread.
+        deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
+        return np.ldexp(mean, powers), inverse(deviation)
+    if method == "V":
+        gain = ones.copy()
+        whole = np.ldexp(largest, powers)
+        ranges = [whole[i] for i, name in enumerate(features) if name in FEATURES[:2]]
+        if ranges and FEATURES[2] in features:
+            motion = list(features).index(FEATURES[2])
+            gain[motion] = max(ranges) * inverse(largest)[motion]
+        return zeros, gain
+    raise InputError(f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}")
+
+
+def gains_of(
+    X: NDArray[np.float64], method: str, features: Sequence[str] = FEATURES
+) -> NDArray[np.float64]:
+    """(p,) the gain of each column of X (n, p); see `scale_of`."""
+    _, gain = scale_of(X, method, features)
+    return np.repeat(gain, X.shape[1] // len(features))
+
+
+def _centred(
+    X: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Mean (p,), X without it, and which columns have no variance (p,)."""
+    mean = _mean(X)
+    centred = X - mean
+    # What is left of a constant column is the rounding of its mean.
+    still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)
+    # The mean of a large offset is rounded; what that leaves in every row is one more direction.
+    centred -= centred.mean(axis=0)
+    centred[:, still] = 0.0
+    return mean, centred, still
+
+
+def _signs(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(c,) the sign of the largest entry of each of (c, p), of nearly equal ones the first."""
+    sizes = np.abs(axes)
+    top = np.argmax(sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True), axis=1)
+    return np.asarray(np.sign(axes[np.arange(len(axes)), top]))
+
+
+def principal_axes(
+    X: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean, components and singular values of X (n, p), as many as its numerical rank.
+
+    By a full singular value decomposition in float64, which keeps small singular values that the
+    covariance loses. Each component's largest entry is positive, so that files are the same; of
+    entries that are equal but for rounding (two features against each other) the first counts.
+
+    Returns:
+        (p,), (rank, p) and (rank,), the largest singular value first.
+    """
+    mean, centred, still = _centred(X)
+    _, values, axes = np.linalg.svd(centred, full_matrices=False)
+    limit = values[:1].max(initial=0.0) * max(X.shape) * np.finfo(float).eps
+    rank = min(int(np.count_nonzero(values > limit)), max(len(X) - 1, 0))
+    axes = axes[:rank]
+    axes[:, still] = 0.0
+    axes *= _signs(axes)[:, None]
+    return mean, axes, values[:rank]
+
+
+class Spectrum:
+    """The eigenvectors of centred rows' scatter: axes for any count, shrinkage and labels.
+
+    They come from the scatter (p, p) or from its dual (n, n), whichever is smaller, and are
+    right to 1e-16 of its largest eigenvalue.
+
+    Args:
+        X: (n, p) rows.
+
+    Attributes:
+        values: (r,) eigenvalues above their own rounding, the largest first.
+        scores: (n, r) coordinates of the rows along the eigenvectors.
+    """
+
+    def __init__(self, X: NDArray[np.float64]) -> None:
+        self._given = X
+        _, self._rows, _ = _centred(X)
+        n, p = self._rows.shape
+        self._dual = n < p
+        scatter = self._rows @ self._rows.T if self._dual else self._rows.T @ self._rows
+        values, vectors = np.linalg.eigh(scatter)
+        keep = values > max(n, p) * np.finfo(float).eps * values[-1]
+        self.values = np.ascontiguousarray(values[keep][::-1])
+        self._vectors = np.ascontiguousarray(vectors[:, keep][:, ::-1])
+        roots = np.sqrt(self.values)
+        self.scores = self._vectors * roots if self._dual else self._rows @ self._vectors
+
+    def _lift(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Directions (r, c) among the eigenvectors as weights of the columns (p, c)."""
+        if not self._dual:
+            return self._vectors @ directions
+        over = directions / np.sqrt(self.values)[:, None]
+        return np.asarray(self._rows.T @ (self._vectors @ over))
+
+    def leading(self, count: int) -> NDArray[np.float64]:
+        """(c, p) the first principal axes up to sign, quicker than `principal_axes`.
+
+        As long as the last of them has more than `WELL_CONDITIONED` of the first one's variance:
+        an axis is then right to 1e-16 / `WELL_CONDITIONED` over the relative gap of its
+        eigenvalue. Where it has not, where small singular values would drown, by
+        `principal_axes`.
+        """
+        if (
+            count < min(self._rows.shape)
+            and count <= len(self.values)
+            and self.values[count - 1] > WELL_CONDITIONED * self.values[0]
+        ):
+            return np.ascontiguousarray(self._lift(np.eye(len(self.values), count)).T)
+        return principal_axes(self._given)[1][:count]
+
+    def discriminants(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
+        """(p, c) the directions in which classes lie apart, at most classes - 1.
+
+        The eigenvectors of (W + s I)^-1 B for the within-class and between-class scatter W, B,
+        with s = `shrinkage` times the mean squared length of the centred rows; each is scaled to
+        the variance 1 within the classes, shrunk alike (Fisher's discriminant with a ridge;
+        Friedman, Regularized discriminant analysis, 1989). They are those of (W + B + s I)^-1 B
+        too, whose inverse is a division along the scatter's own eigenvectors: no inverse of W is
+        taken, so one trial a class, more columns than trials and equal trials do no harm.
+
+        Args:
+            labels: (n,) class indices.
+            shrinkage: above 0.
+        """
+        n = len(labels)
+        ridge = shrinkage * float(self.values.sum()) / n
+        root = 1.0 / np.sqrt(self.values + ridge)
+        sizes = np.bincount(labels)
+        sizes, labels = sizes[sizes > 0], np.unique(labels, return_inverse=True)[1]
+        members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
+        # The rows are centred, so the members' indicators need not be.
+        means = root[:, None] * (self.scores.T @ (members / np.sqrt(sizes)))
+        left, apart, _ = np.linalg.svd(means, full_matrices=False)
+        keep = apart[: len(sizes) - 1] > NO_DISTANCE
+        directions = root[:, None] * left[:, : len(keep)][:, keep]
+        z = self.scores @ directions
+        within = z - (members.T @ z / sizes[:, None])[labels]
+        variance = ((within**2).sum(axis=0) + ridge * (directions**2).sum(axis=0)) / n
+        weights = self._lift(directions / np.sqrt(variance))
+        return np.asarray(weights * _signs(weights.T))
+
+
+def check_columns(columns: int) -> None:
+    """Raise InputError where feature vectors are too long for a `Projection`."""
+    if columns > MOST_COLUMNS:
+        raise InputError(
+            f"{columns} values a trial are more than the {MOST_COLUMNS} that a projection "
+            "adds up exactly; take fewer features or samples"
+        )
+
+
+def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (p, c) rounded so that `Projection` adds up their products exactly.
+
+    Each column is a multiple of its own power of two, 2^-`WEIGHT_BITS` of its largest entry with
+    up to 128 rows; each doubling of the rows costs one bit.
+    """
+    lost = max(0, (len(weights) - 1).bit_length() - 7)
+    largest = np.abs(weights).max(axis=0, initial=0.0)
+    above = np.ceil(np.log2(largest, out=np.zeros_like(largest), where=largest > 0.0))
+    powers = WEIGHT_BITS - lost - above.astype(np.int32)
+    return np.ascontiguousarray(np.ldexp(np.rint(np.ldexp(weights, powers)), -powers))
+
+
+class Projection(TransformerMixin, BaseEstimator):
+    """Features to a few coordinates, the same bits on every machine.
+
+    Each column's mean is subtracted and its feature type's gain multiplied. The directions are
+    principal components, or the discriminants of the labels (`Spectrum.discriminants`).
+
+    A feature's difference d from its training mean, scaled, is split into a high and a low half
+    of `HALF_BITS` bits each on a fixed grid, and weights are on a grid too (`on_grid`). Each
+    product then has at most 53 - 7 bits and sums of up to 128 of them are exact, in any order,
+    with or without fused multiply-add: a query that equals a training row lies at distance
+    exactly 0, in any batch, on any processor. Each doubling of the columns beyond 128 costs the
+    weights one bit. What is cut off lies 2^-52 below the range of the training set. Queries more
+    than `RANGE` times outside it are projected with ordinary rounding.
+
+    Args:
+        scaling: one of `SCALINGS`.
+        components: most coordinates wanted; at most the numerical rank, and one less than the
+            classes, are kept.
+        features: names of the feature types, in the order of X.
+        kind: one of `KINDS`.
+        shrinkage: of the within-class scatter; `lda` alone uses it.
+
+    Attributes:
+        mean_: (p,) subtracted first.
+        gain_: (p,) multiplied next.
+        high_, low_: adding and subtracting it rounds to the grid of that half.
+        weights_: (p, c).
+        rank_: how many coordinates there could be.
+        gap_: smallest relative gap of squared singular values at any cut up to c; 1 of `lda`.
+    """
+
+    def __init__(
+        self,
+        scaling: str = "none",
+        components: int = 20,
+        features: Sequence[str] = FEATURES,
+        kind: str = "pca",
+        shrinkage: float = 0.01,
+    ) -> None:
+        self.scaling = scaling
+        self.components = components
+        self.features = features
+        self.kind = kind
+        self.shrinkage = shrinkage
+
+    def fit(self, X: NDArray[np.float64], y: NDArray[Any] | None = None) -> Projection:
+        """Fit to X (n, p), and to the labels y (n,) or (n, tasks) where `kind` is `lda`.
+
+        The discriminants of several tasks stand side by side.
+
+        Raises:
+            InputError: the columns are too many, or their scale is beyond what distances hold;
+                the kind is unknown, or needs labels.
+        """
+        X = np.asarray(X, dtype=np.float64)
+        check_columns(X.shape[1])
+        self.n_features_in_ = X.shape[1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            # Scaling shifts each type by a constant, which centring takes away again: the mean is
+            # subtracted from the features themselves, where it loses nothing.
+            self.mean_ = _mean(X)
+            self.gain_ = gains_of(X, self.scaling, self.features)
+            d = (X - self.mean_) * self.gain_
+        largest = float(np.abs(d).max(initial=0.0))
+        if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
+            raise InputError(
+                f"the features spread over {largest:g} once scaled; distances need "
+                f"{SMALLEST_SCALE:g} to {LARGEST_SCALE:g}: store them in other units"
+            )
+        axes, self.gap_ = self._axes(d, y)
+        self.rank_ = axes.shape[1]
+        self.weights_ = on_grid(axes[:, : self.components])
+        exponent = int(np.ceil(np.log2(RANGE * largest))) if largest > 0.0 else 0
+        self.high_ = 1.5 * 2.0 ** (52 + exponent - HALF_BITS)
+        self.low_ = 1.5 * 2.0 ** (52 + exponent - 2 * HALF_BITS)
+        return self
+
+    def _axes(
+        self, d: NDArray[np.float64], y: NDArray[Any] | None
+    ) -> tuple[NDArray[np.float64], float]:
+        """Weights (p, rank) before rounding, and the gap."""
+        if self.kind == "pca":
+            _, axes, values = principal_axes(d)
+            squares = values**2
+            gaps = 1.0 - squares[1:] / squares[:-1] if len(values) > 1 else np.ones(1)
+            return axes.T, float(gaps[: self.components].min(initial=1.0))
+        if self.kind != "lda":
+            raise InputError(f"the projection must be one of {', '.join(KINDS)}, not {self.kind!r}")
+        if y is None:
+            raise InputError("the projection lda needs labels; use pca without them")
+        spectrum = Spectrum(d)
+        targets = np.asarray(y).reshape(len(d), -1).T
+        labels = [np.unique(target, return_inverse=True)[1] for target in targets]
+        parts = [spectrum.discriminants(one, self.shrinkage) for one in labels]
+        return np.hstack(parts), 1.0
+
+    def transform(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates (n, c) of vectors (n, p)."""
+        check_is_fitted(self)
+        d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
+        high = (d + self.high_) - self.high_
+        low = ((d - high) + self.low_) - self.low_
+        return np.asarray(high @ self.weights_ + low @ self.weights_)
