@@ -7,7 +7,7 @@ import pytest
 from onnx import TensorProto, helper
 
 from export.build import OPSET, Builder, project, widened
-from train.pipeline import Projection
+from train.projection import Projection
 
 
 class Names:
@@ -62,8 +62,10 @@ def test_equal_constants_are_stored_once(graph):
 def test_the_graph_projects_to_the_bits_of_the_estimator(graph, scaling):
     build, _, run = graph
     X = np.random.default_rng(0).gamma(2.0, size=(30, 120)) * 10.0 ** np.arange(-3, 3).repeat(20)
-    projection = Projection(X, scaling, 7)
-    np.testing.assert_array_equal(run(project(build, "x", [projection]), X), projection(X))
+    projection = Projection(scaling, 7).fit(X)
+    np.testing.assert_array_equal(
+        run(project(build, "x", [projection]), X), projection.transform(X)
+    )
 
 
 def test_widened_columns_are_zero():

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from train.study.score import Result
+from train.evaluate import Result
 
 COLOURS = ("#1f5fa8", "#c8553d", "#3a7d44", "#7a5195", "#8a6d1d")
 STYLE: dict[Any, Any] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from train.study.score import Result
+from train.evaluate import Result
 
 
 @dataclass

@@ -15,12 +15,13 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from edge.touch.layout import for_device
 from edge.touch.measures import feature, names
 from edge.touch.track import ContactTracker, first_contact
+from train.evaluate import FOLDS, Labels, Result
 from train.projection import scale_of
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.context import Context
-from train.study.honest import FOLDS, nested
-from train.study.score import Labels, Result, collect, evaluate, nested_fold, shuffled_folds
+from train.study.honest import nested
+from train.study.score import collect, grid_search, nested_fold, shuffled_folds
 from train.study.skins import View, vectors
 
 CHOSEN = (
@@ -207,8 +208,8 @@ def _singles(
     sets = [FEATURES, *((*FEATURES, name) for name in types if name not in FEATURES)]
     cases = [(columns(every, types, wanted), y, SCALING, wanted) for wanted in sets]
     alone = [(columns(every, types, [name]), y, SCALING, [name]) for name in types]
-    results = context.map("one more feature", evaluate, cases)
-    own = context.map("one feature alone", evaluate, alone)
+    results = context.map("one more feature", grid_search, cases)
+    own = context.map("one feature alone", grid_search, alone)
     base = results[0][task].accuracy
     more = dict(zip([s[-1] for s in sets[1:]], results[1:], strict=True))
     rows: list[tuple[Any, ...]] = []
@@ -259,7 +260,7 @@ def _sets(
             found,
         )
     work = [(X, y, s, wanted) for (_, s), (X, wanted) in cases.items()]
-    plain = context.map("sets of features", evaluate, work)
+    plain = context.map("sets of features", grid_search, work)
     rows: list[tuple[Any, ...]] = []
     for ((name, scaling), (X, wanted)), loo in zip(cases.items(), plain, strict=True):
         us = round(cost(wanted), 1)
@@ -267,7 +268,7 @@ def _sets(
             (name, scaling, X.shape[1], "leave-one-out, best cell", *score(loo[task]), us, "")
         )
         if X.shape[1] <= 4 * X3.shape[1]:
-            inside = nested(context, X, scaling, wanted, "nested", exact_up_to=0)
+            inside = nested(context, X, scaling, wanted, "nested")
             rows.append(
                 (name, scaling, X.shape[1], f"nested, {FOLDS} folds", *score(inside[task]), us, "")
             )

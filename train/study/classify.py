@@ -5,12 +5,13 @@ from __future__ import annotations
 from itertools import combinations
 
 from edge.touch.features import FEATURES
+from train.evaluate import Result
 from train.projection import SCALINGS
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.context import Context
 from train.study.paper import entries
-from train.study.score import Result, evaluate
+from train.study.score import grid_search
 
 WINDOWS_S = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.6, 1.8, 2.0)
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))
@@ -23,7 +24,7 @@ def papers(table: str, task: str) -> dict[str, float]:
 
 def confusion(context: Context) -> Section:
     """Figs. 6 to 8."""
-    found = evaluate(context.vectors(), context.labels)
+    found = grid_search(context.vectors(), context.labels)
     table = Table(
         "classification",
         "Best cell of the grid, a task a row",
@@ -60,7 +61,7 @@ def window(context: Context) -> Section:
     """Fig. 10."""
     windows = list(WINDOWS_S)
     found = context.map(
-        "time window", evaluate, [(context.vectors(w), context.labels) for w in windows]
+        "time window", grid_search, [(context.vectors(w), context.labels) for w in windows]
     )
     table = Table("window", "Accuracy of each window", ("window s", "task", *SCORE))
     for seconds, results in zip(windows, found, strict=True):
@@ -95,7 +96,7 @@ def window(context: Context) -> Section:
 def scaling(context: Context) -> Section:
     """Table II."""
     cases = [(context.vectors(), context.labels, method) for method in SCALINGS]
-    found = context.map("feature scaling", evaluate, cases)
+    found = context.map("feature scaling", grid_search, cases)
     table = Table("scaling", "Accuracy of each scaling", ("scaling", "task", *SCORE, "paper %"))
     for method, results in zip(SCALINGS, found, strict=True):
         for task, r in results.items():
@@ -128,7 +129,7 @@ def scaling(context: Context) -> Section:
 def features(context: Context) -> Section:
     """Table III."""
     cases = [(context.vectors(names=names), context.labels, "none", names) for names in SUBSETS]
-    found = context.map("features", evaluate, cases)
+    found = context.map("features", grid_search, cases)
     table = Table(
         "features", "Accuracy of each combination", ("features", "task", *SCORE, "paper %")
     )

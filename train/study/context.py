@@ -16,9 +16,9 @@ from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.dataset import DataSet
+from train.evaluate import Labels
 from train.simulate.scene_model import Scene
 from train.study import skins
-from train.study.score import Labels
 
 
 @dataclass

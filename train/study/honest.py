@@ -12,25 +12,14 @@ from numpy.typing import NDArray
 from edge.recording import Recording
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
+from train.crossval import MAX_COMPONENTS, MAX_K
+from train.evaluate import FOLDS, Grid, Labels, Result, evaluate, group_folds, stratified_folds
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
 from train.study.context import Context
-from train.study.score import (
-    Labels,
-    Result,
-    collect,
-    evaluate,
-    majority,
-    nested_fold,
-    nested_from_pairs,
-    pairs_right,
-    shuffled_folds,
-)
+from train.study.score import grid_search, majority
 from train.study.skins import View, vectors
 
-EXACT_UP_TO = 200
-"""Trials up to which every trial is an outer fold; beyond, ten folds."""
-FOLDS = 10
 GROUP_TASK = "object"
 FACTORS = (0.5, 2.0, 4.0, 8.0)
 PARTS = (0.05, 0.1, 0.2)
@@ -38,43 +27,45 @@ PARTS = (0.05, 0.1, 0.2)
 
 
 def nested(
-    context: Context,
-    X: NDArray[np.float64],
-    scaling: str,
-    features: Sequence[str],
-    what: str,
-    exact_up_to: int = EXACT_UP_TO,
+    context: Context, X: NDArray[np.float64], scaling: str, features: Sequence[str], what: str
 ) -> dict[str, Result]:
-    """Nested cross-validation: leave-one-out inside, leave-one-out or ten folds outside."""
+    """Nested accuracy in ten folds, of up to 20 components and neighbours."""
     y = context.labels
-    n = len(X)
-    if n <= exact_up_to:
-        first, second = np.triu_indices(n, 1)
-        pairs = list(zip(first.tolist(), second.tolist(), strict=True))
-        size = max(1, len(pairs) // (8 * context.jobs))
-        cases = [(X, y, pairs[i : i + size], scaling, features) for i in range(0, len(pairs), size)]
-        parts = context.map(what, pairs_right, cases)
-        right = {task: np.concatenate([part[task] for part in parts]) for task in y}
-        return nested_from_pairs(X, y, right, scaling, features)
     finest = max(y, key=lambda task: len(set(y[task])))
-    folds = shuffled_folds(y[finest], FOLDS)
-    answers = context.map(what, nested_fold, [(X, y, f, scaling, features) for f in folds])
-    return collect(y, folds, answers)
+    return _evaluated(context, X, y, stratified_folds(y[finest]), scaling, features, what)
 
 
 def unseen_objects(context: Context, X: NDArray[np.float64], scaling: str) -> dict[str, Result]:
-    """Leave-one-object-out for every other task, the cell chosen likewise on the others."""
-    groups = context.labels[GROUP_TASK]
+    """The same with whole objects left out, for every other task."""
+    folds = group_folds(context.labels[GROUP_TASK])
     y: Labels = {task: labels for task, labels in context.labels.items() if task != GROUP_TASK}
-    folds = [np.flatnonzero(groups == group) for group in np.unique(groups)]
-    cases = [(X, y, fold, scaling, FEATURES, groups) for fold in folds]
-    return collect(y, folds, context.map("objects not met", nested_fold, cases))
+    return _evaluated(context, X, y, folds, scaling, FEATURES, "objects not met")
+
+
+def _evaluated(
+    context: Context,
+    X: NDArray[np.float64],
+    y: Labels,
+    folds: NDArray[np.int64],
+    scaling: str,
+    features: Sequence[str],
+    what: str,
+) -> dict[str, Result]:
+    grid = Grid(
+        scaling,
+        components=tuple(range(1, MAX_COMPONENTS + 1)),
+        neighbours=tuple(range(1, MAX_K + 1)),
+    )
+    table = evaluate(
+        X, y, folds, [grid], features=features, jobs=context.jobs, progress=f"{what:<22}"
+    )
+    return {task: table.nested(task) for task in y}
 
 
 def section(context: Context) -> Section:
     """Nested, leave-one-object-out, baselines, thresholds and wrap-around."""
     X, y = context.vectors(), context.labels
-    plain = evaluate(X, y)
+    plain = grid_search(X, y)
     inside = nested(context, X, "none", FEATURES, "nested")
     table = Table("honest", "How the score is taken", ("task", "how", *SCORE))
     bars: dict[str, dict[str, Result]] = {"leave-one-out, best cell": plain, "nested": inside}
@@ -84,13 +75,8 @@ def section(context: Context) -> Section:
     for how, results in bars.items():
         table.rows += [(task, how, *score(r)) for task, r in results.items()]
     text = [
-        "Nested: the cell is chosen on the other trials alone"
-        + (
-            ", each trial left out in turn."
-            if len(X) <= EXACT_UP_TO
-            else f", in {FOLDS} folds outside and leave-one-out inside."
-        )
-        + " What the plain search flatters: "
+        f"Nested: in {FOLDS} folds, the cell is chosen by the other nine, each told by fits without "
+        "it and without the fold that is scored. What the plain search flatters: "
         + ", ".join(
             f"{task} {100 * (plain[task].accuracy - inside[task].accuracy):+.1f} points"
             for task in y
@@ -180,7 +166,7 @@ def _thresholds(context: Context, plain: dict[str, Result]) -> list[Table]:
         followed.append(X)
         lost.append(none)
         names.append(f"tuned per object, {part:.0%} of its peak")
-    results = context.map("their accuracy", evaluate, [(X, y) for X in followed])
+    results = context.map("their accuracy", grid_search, [(X, y) for X in followed])
     table = Table(
         "thresholds", "Threshold and seam", ("setting", "task", *SCORE, "without contact")
     )

@@ -11,7 +11,7 @@ from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.classify import papers
 from train.study.context import Context
-from train.study.score import evaluate
+from train.study.score import grid_search
 from train.study.skins import View, masked, pooled_down, pooled_layout, thinned, vectors
 
 HOW = {"sum": np.add, "maximum": np.maximum}
@@ -51,7 +51,7 @@ def section(context: Context) -> Section:
     ]
     series = context.follow_again("taxel resolution", views)
     X = [context.vectors(), *(vectors(found) for found in series)]
-    results = context.map("its accuracy", evaluate, [(x, context.labels) for x in X])
+    results = context.map("its accuracy", grid_search, [(x, context.labels) for x in X])
     levels = len(skins) - 1
     table = Table(
         "resolution",

@@ -20,7 +20,7 @@ from train.simulate.run import parts, recordings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
 from train.study.context import Context
-from train.study.score import evaluate, transfer
+from train.study.score import grid_search, transfer
 from train.study.skins import Remembering, follow, vectors
 
 FACTORS = (0.5, 2.0)
@@ -155,8 +155,8 @@ def section(context: Context) -> Section | None:
             "or study them without a scene"
         )
     changed = {name: vectors(contacts) for name, contacts in series.items()}
-    own = context.map("their accuracy", evaluate, [(x, y) for x in changed.values()])
-    plain = evaluate(X, y)
+    own = context.map("their accuracy", grid_search, [(x, y) for x in changed.values()])
+    plain = grid_search(X, y)
     to = context.map("trained here", transfer, [(X, y, plain, x) for x in changed.values()])
     work = [(x, y, best, X) for x, best in zip(changed.values(), own, strict=True)]
     back = context.map("trained there", transfer, work)

@@ -1,15 +1,13 @@
-"""Accuracies of the study: leave-one-out, nested, by groups, and from one set to another."""
+"""Accuracies of the study: leave-one-out, and from one set to another."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from edge.commands.summary import wilson
 from edge.touch.features import FEATURES
 from train.crossval import (
     MAX_COMPONENTS,
@@ -19,41 +17,8 @@ from train.crossval import (
     neighbours,
     split_neighbours,
 )
-from train.crossval import votes_right as right_votes
+from train.evaluate import Labels, Result
 from train.pipeline import vote
-
-Labels = Mapping[str, NDArray[np.str_]]
-"""{task: (n,) labels}."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """A task's accuracy.
-
-    Attributes:
-        right: trials answered right.
-        total: trials.
-        components: of the best cell of the grid, or of the cell most often chosen; 0 where no
-            grid was searched.
-        k: likewise.
-        said: (n,) what was said of each trial, or None.
-    """
-
-    right: int
-    total: int
-    components: int = 0
-    k: int = 0
-    said: NDArray[np.str_] | None = None
-
-    @property
-    def accuracy(self) -> float:
-        """0 to 1."""
-        return self.right / self.total
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % binomial interval (Wilson)."""
-        return wilson(self.right, self.total)
 
 
 def best_cell(grid: NDArray[np.float64]) -> tuple[int, int]:
@@ -71,7 +36,7 @@ def said_by(
     return np.asarray(classes[winners])
 
 
-def evaluate(
+def grid_search(
     X: NDArray[np.float64],
     y: Labels,
     scaling: str = "none",
@@ -105,7 +70,7 @@ def transfer(
     Args:
         X: (n, p) training trials.
         y: labels of both.
-        chosen: components and k of each task, as `evaluate` chose them on X.
+        chosen: components and k of each task, as `grid_search` chose them on X.
         changed: (n, p) the same trials, changed.
         scaling: fitted on the training trials.
         features: of X.
@@ -138,85 +103,12 @@ def transfer(
     return found
 
 
-def pairs_right(
-    X: NDArray[np.float64],
-    y: Labels,
-    pairs: Sequence[tuple[int, int]],
-    scaling: str,
-    features: Sequence[str],
-) -> dict[str, NDArray[np.bool_]]:
-    """{task: (pairs, 2, components, k)} whether each of two left-out trials is told right."""
-    n = len(X)
-    k = min(MAX_K, n - 2)
-    everything = np.arange(n)
-    both = np.array(pairs)
-    first = first_equal(X)
-    with threadpool_limits(1):
-        rows = np.stack(
-            [
-                split_neighbours(
-                    X,
-                    np.delete(everything, pair),
-                    pair,
-                    scaling,
-                    MAX_COMPONENTS,
-                    k,
-                    features,
-                    first,
-                )
-                for pair in both
-            ]
-        )
-    found: dict[str, NDArray[np.bool_]] = {}
-    for task, labels in y.items():
-        _, classes = np.unique(labels, return_inverse=True)
-        right = [
-            right_votes(r, classes, classes[p][:, None]) for r, p in zip(rows, both, strict=True)
-        ]
-        found[task] = np.stack(right)
-    return found
-
-
-def nested_from_pairs(
-    X: NDArray[np.float64],
-    y: Labels,
-    right: Mapping[str, NDArray[np.bool_]],
-    scaling: str,
-    features: Sequence[str],
-) -> dict[str, Result]:
-    """Nested leave-one-out: each trial is told with the cell that is best among the others.
-
-    Args:
-        X: (n, p).
-        y: labels.
-        right: `pairs_right` of all pairs i < j in the order of `numpy.triu_indices`.
-        scaling: as for the pairs.
-        features: as for the pairs.
-    """
-    n = len(X)
-    first, second = np.triu_indices(n, 1)
-    outer = neighbours(X, scaling=scaling, features=features, max_k=min(MAX_K, n - 2))
-    found: dict[str, Result] = {}
-    for task, labels in y.items():
-        sums = np.zeros((n, *right[task].shape[2:]))
-        # Where `first` is the outer trial, `second` is the inner one, and the other way round.
-        np.add.at(sums, first, right[task][:, 1])
-        np.add.at(sums, second, right[task][:, 0])
-        cells = [best_cell(grid) for grid in sums]
-        said = np.array(
-            [said_by(outer[i : i + 1], labels, c + 1, j + 1)[0] for i, (c, j) in enumerate(cells)]
-        )
-        found[task] = _most_often(said, labels, cells)
-    return found
-
-
 def nested_fold(
     X: NDArray[np.float64],
     y: Labels,
     test: NDArray[np.int64],
     scaling: str,
     features: Sequence[str],
-    groups: NDArray[np.str_] | None = None,
 ) -> dict[str, tuple[NDArray[np.str_], tuple[int, int]]]:
     """What is said of the trials `test` with the cell that is best among the others.
 
@@ -226,7 +118,6 @@ def nested_fold(
         test: rows left out.
         scaling: fitted inside.
         features: of X.
-        groups: (n,) where given, the inner search too leaves out a group at a time.
 
     Returns:
         {task: ((t,) labels, (components - 1, k - 1))}.
@@ -234,30 +125,13 @@ def nested_fold(
     train = np.setdiff1d(np.arange(len(X)), test)
     inner_X = X[train]
     with threadpool_limits(1):
-        if groups is None:
-            inner = neighbours(inner_X, scaling=scaling, features=features)
-        else:
-            inner = group_neighbours(inner_X, groups[train], scaling, features)
+        inner = neighbours(inner_X, scaling=scaling, features=features)
         outer = split_neighbours(X, train, test, scaling, MAX_COMPONENTS, inner.shape[2], features)
     found: dict[str, tuple[NDArray[np.str_], tuple[int, int]]] = {}
     for task, labels in y.items():
         c, j = best_cell(accuracies(inner, labels[train]))
         found[task] = said_by(outer, labels, c + 1, j + 1), (c, j)
     return found
-
-
-def group_neighbours(
-    X: NDArray[np.float64], groups: NDArray[np.str_], scaling: str, features: Sequence[str]
-) -> NDArray[np.int64]:
-    """(n, components, k) neighbours of each trial among those of other groups."""
-    everything = np.arange(len(X))
-    members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
-    k = min(MAX_K, len(X) - max(map(len, members)))
-    rows = np.empty((len(X), MAX_COMPONENTS, k), dtype=np.int64)
-    for test in members:
-        train = np.setdiff1d(everything, test)
-        rows[test] = split_neighbours(X, train, test, scaling, MAX_COMPONENTS, k, features)
-    return rows
 
 
 def collect(

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from edge.touch.contact import FeatureSeries
 from train.crossval import votes_right
+from train.evaluate import Grid, Labels, Result, evaluate, stratified_folds
 from train.pipeline import Choice
 from train.projection import principal_axes, scale_of
-from train.study.score import Labels, Result, best_cell
+from train.study.score import best_cell
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 """Numbers of components to choose from."""
 NEIGHBOURS = 6
 """Most neighbours to choose from."""
-LEAVE_ONE_OUT_UP_TO = 200
-FOLDS = 10
 
 
 def nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
@@ -37,39 +34,18 @@ def nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
 def nested(
     X: NDArray[np.float64], y: Labels, scaling: str, features: Sequence[str]
 ) -> dict[str, Result]:
-    """Accuracy of trials that took no part: not in the scaling, the components, the neighbours
-    or the choice of the number of either.
-
-    The cell is chosen anew for each trial left out (for each of ten folds of more than
-    `LEAVE_ONE_OUT_UP_TO` trials), by leave-one-out among the others, in their components. That
-    inner choice sees each inner trial in the components too; the outer trial it never sees.
+    """Each task's nested accuracy, in ten folds; see `train.evaluate`.
 
     Args:
         X: (n, p).
         y: {task: (n,) labels}.
-        scaling: one of `train.pipeline.SCALINGS`.
+        scaling: one of `train.projection.SCALINGS`.
         features: names of the types in X.
     """
-    n = len(X)
-    everything = np.arange(n)
-    if n <= LEAVE_ONE_OUT_UP_TO:
-        folds = everything
-    else:
-        folds = np.random.default_rng(0).permutation(n) % FOLDS
-    classes = {task: np.unique(labels, return_inverse=True)[1] for task, labels in y.items()}
-    right: Counter[str] = Counter()
-    cells: dict[str, Counter[tuple[int, int]]] = {task: Counter() for task in y}
-    with threadpool_limits(1):
-        for fold in range(int(folds.max()) + 1):
-            train, test = everything[folds != fold], everything[folds == fold]
-            for task, one in evaluate_split(X, classes, train, test, scaling, features).items():
-                cells[task][one.choice.components, one.choice.k] += len(test)
-                right[task] += int(one.right.sum())
-    found = {}
-    for task in y:
-        (components, k), _ = min(cells[task].items(), key=lambda item: (-item[1], item[0]))
-        found[task] = Result(right[task], n, components, k)
-    return found
+    finest = max(y, key=lambda task: len(set(y[task])))
+    grid = Grid(scaling, components=COMPONENTS, neighbours=tuple(range(1, NEIGHBOURS + 1)))
+    table = evaluate(X, y, stratified_folds(y[finest]), [grid], features=features)
+    return {task: table.nested(task) for task in y}
 
 
 @dataclass(frozen=True)

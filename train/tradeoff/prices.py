@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from train.crossval import MAX_K, accuracies, neighbours
 from train.dataset import DataSet
+from train.evaluate import Result
 from train.report.tables import Section, Table
-from train.study.score import Result, best_cell, shuffled_folds
+from train.study.score import best_cell, shuffled_folds
 
 SCALING = "IV"
 PARTS = 5

@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 
-from train.crossval import accuracies, leave_one_out, neighbours
+from train.crossval import leave_one_out
 from train.study.score import (
     Result,
-    best_cell,
     collect,
-    evaluate,
-    group_neighbours,
+    grid_search,
     majority,
     nested_fold,
-    nested_from_pairs,
-    pairs_right,
     shuffled_folds,
     transfer,
 )
@@ -32,31 +28,12 @@ def overlapping(n=26, seed=0, spread=1.0):
 
 def test_the_best_cell_is_reported_with_what_it_said():
     X, y = overlapping()
-    found = evaluate(X, {"t": y}, "none", ONE)["t"]
+    found = grid_search(X, {"t": y}, "none", ONE)["t"]
     table = leave_one_out(X, y, features=ONE)
     assert found.accuracy == table.max() == table[found.components - 1, found.k - 1]
     assert found.right == int((found.said == y).sum())
     low, high = found.interval
     assert low < found.accuracy < high
-
-
-@pytest.mark.parametrize("scaling", ["none", "IV"])
-def test_nested_by_pairs_is_nested_the_long_way(scaling):
-    X, y = overlapping(14)
-    first, second = np.triu_indices(14, 1)
-    pairs = list(zip(first.tolist(), second.tolist(), strict=True))
-    right = pairs_right(X, {"t": y}, pairs, scaling, ONE)
-    quick = nested_from_pairs(X, {"t": y}, right, scaling, ONE)["t"]
-    said = []
-    for i in range(14):
-        others = np.delete(np.arange(14), i)
-        inner = neighbours(X[others], scaling=scaling, features=ONE)
-        c, j = best_cell(accuracies(inner, y[others]))
-        outer = neighbours(X, scaling=scaling, features=ONE)[i, c, : j + 1]
-        votes = [str(label) for label in y[outer]]
-        most = max(votes.count(label) for label in votes)
-        said.append(next(label for label in votes if votes.count(label) == most))
-    assert quick.said.tolist() == said
 
 
 def test_a_nested_search_does_not_see_the_trial_it_tells():
@@ -67,32 +44,11 @@ def test_a_nested_search_does_not_see_the_trial_it_tells():
         X = np.random.default_rng(seed).normal(size=(24, 8))
         y = rng.permutation(np.repeat(["a", "b"], 12))
         folds = shuffled_folds(y, 10)
-        flattered.append(evaluate(X, {"t": y}, "none", ONE)["t"].accuracy)
+        flattered.append(grid_search(X, {"t": y}, "none", ONE)["t"].accuracy)
         answers = [nested_fold(X, {"t": y}, fold, "none", ONE) for fold in folds]
         honest.append(collect({"t": y}, folds, answers)["t"].accuracy)
     assert np.mean(flattered) > 0.6
     assert np.mean(honest) < 0.55
-
-
-def test_groups_are_left_out_whole():
-    X, _ = overlapping(24)
-    groups = np.repeat(["p", "q", "r", "s"], 6)
-    rows = group_neighbours(X, groups, "none", ONE)
-    assert rows.shape == (24, 20, 18)
-    assert all((groups[rows[i]] != groups[i]).all() for i in range(24))
-
-
-def test_an_object_is_told_by_others_alone():
-    """Trials of one object are copies: they may only be told right by other objects."""
-    rng = np.random.default_rng(0)
-    objects = rng.normal(size=(6, 8))
-    X = np.repeat(objects, 4, axis=0)
-    groups = np.repeat(list("uvwxyz"), 4)
-    y = rng.permutation(np.repeat(["a", "b"], 3)).repeat(4)
-    assert evaluate(X, {"t": y}, "none", ONE)["t"].accuracy == 1.0
-    folds = [np.flatnonzero(groups == g) for g in np.unique(groups)]
-    answers = [nested_fold(X, {"t": y}, fold, "none", ONE, groups) for fold in folds]
-    assert collect({"t": y}, folds, answers)["t"].accuracy < 1.0
 
 
 def test_folds_cover_every_trial_once_and_spread_the_classes():
@@ -116,7 +72,7 @@ def test_a_changed_trial_is_never_told_by_its_own_twin():
 
 def test_a_change_that_moves_trials_among_others_costs():
     X, y = overlapping(30, spread=0.2)
-    best = evaluate(X, {"t": y}, "none", ONE)
+    best = grid_search(X, {"t": y}, "none", ONE)
     assert transfer(X, {"t": y}, best, X + 0.01, "none", ONE)["t"].accuracy > 0.8
     others = X[np.roll(np.arange(30), 1)]
     assert transfer(X, {"t": y}, best, others, "none", ONE)["t"].accuracy < 0.3

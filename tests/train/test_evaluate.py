@@ -1,0 +1,148 @@
+"""Nested accuracy against doing it the long way with the exported estimators."""
+
+import numpy as np
+import pytest
+from sklearn.pipeline import make_pipeline
+
+from edge.errors import InputError
+from train.evaluate import Grid, choose, evaluate, group_folds, stratified_folds
+from train.pipeline import NearestNeighbours
+from train.projection import Projection
+
+TWO = ("max_force", "contact_area")
+GRIDS = (
+    Grid("IV", "lda", shrinkages=(1.0, 0.01), neighbours=(1, 3)),
+    Grid("none", "pca", components=(1, 4, 30), neighbours=(1, 3)),
+    Grid("IV", "pca", ("contact_area",), components=(2,), neighbours=(5,)),
+)
+
+
+def trials(n=36, seed=0):
+    """Two feature types of which both tell a little."""
+    rng = np.random.default_rng(seed)
+    y = np.array(["a", "b", "c"])[np.arange(n) % 3]
+    X = rng.normal(size=(n, 12))
+    X[:, :6] += np.where(y == "a", 1.0, 0.0)[:, None]
+    X[:, 6:] = X[:, 6:] * 50 + np.where(y == "b", 60.0, 0.0)[:, None]
+    return X, y
+
+
+def told(choice, X, y, train, test):
+    """Whether the estimators that are exported tell the tests."""
+    part = X[:, 6:] if choice.features else X
+    names = choice.features or TWO
+    pipe = make_pipeline(
+        Projection(choice.scaling, choice.components, names, choice.projection, choice.shrinkage),
+        NearestNeighbours(choice.k),
+    ).fit(part[train], y[train])
+    return pipe.predict(part[test]) == y[test]
+
+
+def test_every_answer_is_that_of_the_exported_estimators():
+    X, y = trials()
+    folds = stratified_folds(y, 4)
+    table = evaluate(X, {"t": y}, folds, GRIDS, features=TWO)
+    assert len(table.choices["t"]) == 4 + 6 + 1
+    for i in range(4):
+        for j in range(4):
+            train = np.flatnonzero((folds != i) & (folds != j))
+            test = np.flatnonzero(folds == j)
+            for choice, right in zip(table.choices["t"], table.right["t"][i], strict=True):
+                assert (right[test] == told(choice, X, y, train, test)).all()
+
+
+def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
+    X, y = trials()
+    folds = stratified_folds(y, 4)
+    table = evaluate(X, {"t": y}, folds, GRIDS, features=TWO)
+    right = 0
+    for i in range(4):
+        inner = [
+            np.concatenate(
+                [
+                    told(c, X, y, np.flatnonzero((folds != i) & (folds != j)), folds == j)
+                    for j in range(4)
+                    if j != i
+                ]
+            ).mean()
+            for c in table.choices["t"]
+        ]
+        best = table.choices["t"][int(np.argmax(inner))]
+        right += told(best, X, y, np.flatnonzero(folds != i), np.flatnonzero(folds == i)).sum()
+    assert table.nested("t").right == right
+    assert table.nested("t", missed=4).accuracy == right / 40
+
+
+def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_scores():
+    rng = np.random.default_rng(2)
+    best, honest = [], []
+    for _ in range(6):
+        X, y = rng.normal(size=(40, 12)), rng.choice(["a", "b"], 40)
+        table = evaluate(X, {"t": y}, stratified_folds(y), GRIDS, features=TWO)
+        best.append(table.held_out("t").mean(axis=1).max())
+        honest.append(table.nested("t").accuracy)
+    assert np.mean(best) > 0.55
+    assert abs(np.mean(honest) - 0.5) < 0.1
+
+
+def test_twins_of_a_group_do_not_tell_each_other():
+    """Trials of one object are copies: only other objects may tell them."""
+    rng = np.random.default_rng(3)
+    objects = np.repeat([f"{i}" for i in range(12)], 4)
+    X = np.repeat(rng.normal(size=(12, 12)), 4, axis=0)
+    y = np.repeat(np.tile(["a", "b"], 6), 4)
+    grids = [Grid("none", "pca", components=(6,), neighbours=(1,))]
+    apart = evaluate(X, {"t": y}, group_folds(objects), grids, features=TWO)
+    mixed = evaluate(X, {"t": y}, stratified_folds(y), grids, features=TWO)
+    assert mixed.nested("t").accuracy == 1.0
+    assert apart.nested("t").accuracy < 0.8
+    few = group_folds(objects, count=5)
+    assert all(len(set(few[objects == name])) == 1 for name in objects)
+
+
+def test_the_discriminants_of_two_tasks_may_be_set_side_by_side():
+    X, y = trials()
+    two = np.where(y == "a", "yes", "no")
+    labels = {"t": y, "u": two}
+    grid = Grid("IV", "lda", shrinkages=(0.1,), neighbours=(1,), targets=("t", "u"))
+    table = evaluate(X, labels, stratified_folds(y, 4), [grid], features=TWO)
+    train, test = np.flatnonzero(table.folds), np.flatnonzero(table.folds == 0)
+    projection = Projection("IV", 5, TWO, "lda", 0.1)
+    z = projection.fit(X[train], np.column_stack([y, two])[train]).transform(X)
+    said = NearestNeighbours(1).fit(z[train], y[train]).predict(z[test])
+    assert (table.right["t"][0][0, test] == (said == y[test])).all()
+
+
+def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
+    right = np.ones((3, 100), dtype=bool)
+    right[0, :20] = False  # 20 worse than the best, with an error of 4
+    right[1, 20:23] = right[2, 98:] = False  # 1 worse, with an error of 2.2
+    assert choose(right) == 2
+    assert choose(right, np.array([0, 1, 2])) == 1
+    assert choose(right, np.array([0, 2, 1])) == 2
+
+
+def test_processes_do_not_change_the_table():
+    X, y = trials()
+    one, two = (
+        evaluate(X, {"t": y}, stratified_folds(y, 4), GRIDS, features=TWO, jobs=jobs).right["t"]
+        for jobs in (1, 2)
+    )
+    assert (one == two).all()
+
+
+def test_folds_spread_each_class_evenly():
+    y = np.repeat(["a", "b"], [30, 14])
+    folds = stratified_folds(y, 10)
+    assert sorted(np.bincount(folds[y == "a"])) == [3] * 10
+    assert np.bincount(folds).max() - np.bincount(folds).min() <= 1
+    assert (folds == stratified_folds(y, 10)).all()
+
+
+def test_what_cannot_be_parted_or_measured_is_one_sentence():
+    X, y = trials()
+    with pytest.raises(InputError, match="at least 3 folds, not 2"):
+        evaluate(X, {"t": y}, stratified_folds(y, 2), GRIDS, features=TWO)
+    X[5, 3] = np.nan
+    with pytest.raises(InputError, match="trial 5 are not finite"):
+        evaluate(X, {"t": y}, stratified_folds(y, 3), GRIDS, features=TWO)
