@@ -75,8 +75,8 @@ def section(context: Context) -> Section:
     for how, results in bars.items():
         table.rows += [(task, how, *score(r)) for task, r in results.items()]
     text = [
-        f"Nested: in {FOLDS} folds, the cell is chosen by the other nine, each told by fits without "
-        "it and without the fold that is scored. What the plain search flatters: "
+        f"Nested: for each of {FOLDS} folds the cell is chosen on the others, by fits that see "
+        "neither the fold nor the trials that they are tested on. What the plain search flatters: "
         + ", ".join(
             f"{task} {100 * (plain[task].accuracy - inside[task].accuracy):+.1f} points"
             for task in y

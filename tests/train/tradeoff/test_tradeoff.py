@@ -16,7 +16,7 @@ from export.__main__ import main as export
 from train.__main__ import main as train
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.study.score import Result
-from train.tradeoff import accuracy, board, early
+from train.tradeoff import board, early
 from train.tradeoff.accuracy import MeasuredPoint, nearest, nested, pareto_front, thinned
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
@@ -312,7 +312,6 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
     for kind in ("hard", "soft"):
         for seed in range(20):
             save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
-    monkeypatch.setattr(accuracy, "LEAVE_ONE_OUT_UP_TO", 0)
     monkeypatch.setattr(whole, "WINDOWS", (1.2,))
     monkeypatch.setattr(whole, "DECISION_POINTS_S", (0.4, 1.2))
     digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
