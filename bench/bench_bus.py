@@ -104,7 +104,7 @@ def measure() -> dict:
 
 def keep_period(seconds: float) -> dict:
     """Milliseconds of the loop's period at 100 Hz, by percentile."""
-    from edge.runtime.loop import Loop
+    from edge.skin.loop import Loop
 
     with _skin() as skin:
         loop = Loop(skin, lasts_s=seconds)

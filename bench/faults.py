@@ -17,9 +17,9 @@ import numpy as np
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
-from edge.runtime.loop import Schedule
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
+from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
 
 PERIOD_S = 0.01

@@ -16,8 +16,8 @@ import numpy as np
 
 from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
-from edge.runtime.loop import Loop
 from edge.skin import file as skinfile
+from edge.skin.loop import Loop
 
 PAGE_KB = 4
 

@@ -10,6 +10,7 @@ import os
 import sys
 
 from edge.classifier import Classifier
+from edge.events import Decided
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load
@@ -44,10 +45,9 @@ def main() -> None:
             mark()
             events = classifier.push(frame)
             mark()
-            kinds = {event["event"] for event in events}
-            if "decision" in kinds:
+            if any(isinstance(event, Decided) for event in events):
                 names.append("frame that decides")
-            elif kinds:
+            elif events:
                 names.append("frame with another event")
             elif classifier.tracker.region is not None:
                 names.append("frame in contact")

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from edge.errors import InputError
-from edge.model.model import Decision, Model
+from edge.events import Decided, Event, Onset, Release
+from edge.model.model import Decision, Model, require_joints
 from edge.model.prediction_set import NOVELTY_RATE, UNKNOWN, PredictionSet, check_rate
+from edge.recording import Recording
 from edge.touch.contact import Contact
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
 
+if TYPE_CHECKING:
+    from edge.skin.loop import JointSource
+    from edge.skin.skin import Skin
+
 AS_TRAINED = "as_trained"
 """Flag of a decision whose features are those of a training trial to the last bit: nearly always
 it is that trial, replayed. Only a model that sees whole numbers alone meets such twins anew."""
-
-Event = dict[str, Any]
-"""One JSON object; `event` says which."""
 
 
 @dataclass
@@ -36,35 +41,44 @@ class _Waiting:
     """By task, where an error rate was asked for."""
 
 
+class _Answer(NamedTuple):
+    """What is said of one task."""
+
+    label: str | None
+    confidence: float
+    flags: tuple[str, ...]
+    remaining: tuple[str, ...] | None = None
+    decision: Decision | None = None
+
+
 class Classifier:
-    """Watches a stream of frames and decides what each contact touches.
+    """Follows the contacts in a stream of frames and decides what each one touches.
 
-    `push` and `finish` return events in the order in which they came about:
+    >>> import edge
+    >>> from edge import demo
+    >>> classifier = edge.Classifier(edge.Model(demo.MODEL))
+    >>> for event in classifier.classify(edge.load(demo.FOLDER / "pillow-movable.npz")):
+    ...     if isinstance(event, edge.Decided):
+    ...         print(event.task, event.label)
+    category soft-movable
+    mobility movable
+    object pillow
 
-    - `onset`: `onset_s`;
-    - `decision`, one a task: `task`, `label`, `confidence`, `window_s`, `onset_s`,
-      `latency_ms` (from the frame that completed the window to the decision) and `flags`;
-    - `release`: `onset_s`, `release_s`.
+    `push` and `finish` return events in the order in which they came about: an `Onset` when a
+    contact begins, a `Decided` for each task once its window is over, and a `Release` when the
+    contact ends.
 
-    With an error rate, a task is decided at the first of the model's decision points that leaves
-    one
-    label, else at the full window. `window_s` is then that decision point's, `confidence` is one
-    less the
-    smallest error at which another label would be left, and a decision also has `error` (asked
-    for) and `left` (labels that were not struck out). The further flags are `unknown` (`label`
-    is "unknown": no label is left, or the contact lies too far from all that was trained) and
-    `unsure` (several are left, and the best of them was taken).
+    With an error rate, a task is decided at the first of the model's decision points at which one
+    label remains, or else at the full window. Further flags are then `unknown` (the label is
+    "unknown": none remains, or the contact lies too far from everything in training) and `unsure`
+    (several remain, and the best of them was taken).
 
     Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended
-    inside the window; its last values held), `missing_taxels` (taxels could not be read),
+    inside the window; the last values were held), `missing_taxels` (taxels could not be read),
     `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
-    measured on the skin, though the model's is in the world: see `run --without-joints`),
-    `out_of_range` (`label` is
-    None: the features are too large to be measured against the training rows).
-
-    With `max_contacts` above 1, every region is followed on its own, and each event says of which
-    `contact` it is (counted from 1 in the order of their events); a decision then has its `place`
-    too ([x, y, z], see `Contact.position`), None where it is not known.
+    measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
+    `out_of_range` (there is no label, as the features are too large to be measured against the
+    training rows).
     """
 
     def __init__(
@@ -77,15 +91,17 @@ class Classifier:
         max_contacts: int = 1,
         motion_on_skin: bool = False,
     ) -> None:
-        """Watch with a model.
+        """Decide with a model.
 
         Args:
             model: what decides.
             layout: the skin that gives the frames; the model's own where None.
             error: how often a label may be wrong, in (0, 1), to decide as soon as that allows;
                 None decides at the full window.
-            novelty_rate: how often a trained thing may be called unknown for lying far from all.
-            max_contacts: how many regions to follow at once; with 1, the largest alone.
+            novelty_rate: how often a trained thing may be called unknown for lying far from all
+                others.
+            max_contacts: how many regions to follow at once. With 1 it is the largest; with more,
+                each event names its contact, and a decision its position.
             motion_on_skin: decide a contact whose first frame has no joint angles by motion on
                 the skin, flagged `skin_motion`; else by what else is known, flagged
                 `missing_pose`.
@@ -105,7 +121,7 @@ class Classifier:
                 )
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
-        self.several = max_contacts > 1
+        self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
         self.tracker = ContactTracker(
             self.layout,
             info.tracking,
@@ -146,52 +162,89 @@ class Classifier:
                 number = self._begun
                 self._numbers[contact] = number
                 self._waiting.append(self._begin(contact, number))
-                events.append({"event": "onset", **self._which(number), "onset_s": contact.onset_s})
+                events.append(Onset(contact.onset_s, self._named(number)))
             if contact.ended:
                 del self._numbers[contact]
-                events.append(
-                    {
-                        "event": "release",
-                        **self._which(number),
-                        "onset_s": contact.onset_s,
-                        "release_s": frame.t,
-                    }
-                )
+                events.append(Release(contact.onset_s, frame.t, self._named(number)))
         for waiting in list(self._waiting):
             age = frame.t - waiting.contact.onset_s
             while waiting.tasks and age >= self.model.decision_points_s[waiting.decision_point]:
-                events += self._ask(waiting, began)
+                events += self._decide(waiting, began)
             if not waiting.tasks:
                 self._waiting.remove(waiting)
         return events
-
-    def _which(self, number: int) -> Event:
-        return {"contact": number} if self.several else {}
 
     def finish(self) -> list[Event]:
         """The stream has ended: decide what is still waiting, flagged `short`."""
         began = time.perf_counter()
         waiting, self._waiting = self._waiting, []
-        return [event for one in waiting for event in self._ask(one, began, short=True)]
+        return [event for one in waiting for event in self._decide(one, began, short=True)]
 
-    def _ask(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Event]:
-        """Look at a contact; what is decided no longer waits."""
+    def classify(self, recording: Recording) -> Iterator[Event]:
+        """Decide on a recording from its first frame, as the board would have.
+
+        Contacts that this classifier is following are left alone.
+
+        Args:
+            recording: of a skin of the model's kind; its own scale is taken into account.
+
+        Raises:
+            InputError: the recording does not suit the model.
+        """
+        if not (self._motion_on_skin and recording.joints is None):
+            joints = recording.joints
+            require_joints(self.model, None if joints is None else joints.shape[1], "the recording")
+        fresh = self._fresh(recording.layout)
+        for frame in recording:
+            yield from fresh.push(frame)
+        yield from fresh.finish()
+
+    def watch(
+        self, skin: Skin, *, joints: JointSource | None = None, lasts_s: float = math.inf
+    ) -> Iterator[Event]:
+        """Read a skin at its rate and decide, until the caller stops asking.
+
+        Args:
+            skin: open, real or fake.
+            joints: where joint angles come from, for a model that measures motion in the world.
+            lasts_s: how many seconds to read for; what is waiting then is decided, flagged
+                `short`.
+
+        Raises:
+            InputError: the skin does not suit the model, or joint angles are needed.
+        """
+        from edge.skin.loop import Loop  # a replay needs no bus
+
+        if joints is None and not self._motion_on_skin:
+            require_joints(self.model, None, "the skin")
+        fresh = self._fresh(skin.layout)
+        for frame in Loop(skin, joints=joints, lasts_s=lasts_s).frames():
+            yield from fresh.push(frame)
+        yield from fresh.finish()
+
+    def _fresh(self, layout: SkinLayout) -> Classifier:
+        return Classifier(
+            self.model,
+            layout,
+            error=self.error,
+            novelty_rate=self.novelty_rate,
+            max_contacts=self._max_contacts,
+            motion_on_skin=self._motion_on_skin,
+        )
+
+    def _named(self, number: int) -> int | None:
+        """A contact's number, where there may be several at once."""
+        return number if self._max_contacts > 1 else None
+
+    def _decide(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Decided]:
+        """Ask the model about a contact; a task that it settles no longer waits."""
         info = self.model.info
         last = len(self.model.decision_points_s) - 1
         decision_point = last if short else waiting.decision_point
-        window = self.model.decision_points_s[decision_point]
+        window_s = self.model.decision_points_s[decision_point]
         contact = waiting.contact
-        vector = feature_vector(contact.series(), window, info.samples, info.features)
-        common: Event = {
-            "event": "decision",
-            **self._which(waiting.number),
-            "window_s": window,
-            "onset_s": contact.onset_s,
-        }
-        if self.several:
-            position = contact.position()
-            common["place"] = None if position is None else [round(x, 6) for x in position.tolist()]
-        flags = [
+        vector = feature_vector(contact.series(), window_s, info.samples, info.features)
+        flags = tuple(
             flag
             for flag, raised in (
                 ("short", short),
@@ -200,64 +253,78 @@ class Classifier:
                 ("skin_motion", contact.chain is None and info.chain is not None),
             )
             if raised
-        ]
+        )
         try:
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
-            answers = {
-                task: {"label": None, "confidence": 0.0, "flags": [*flags, "out_of_range"]}
-                for task in waiting.tasks
-            }
+            none = _Answer(None, 0.0, (*flags, "out_of_range"))
+            answers = dict.fromkeys(waiting.tasks, none)
         else:
             answers = {
                 task: answer
                 for task in waiting.tasks
                 if (
                     answer := self._answer(
-                        waiting, task, decisions[task], flags, decision_point == last
+                        waiting, task, decisions[task], flags, last=decision_point == last
                     )
                 )
             }
         waiting.decision_point += 1
         waiting.tasks = [task for task in waiting.tasks if task not in answers]
-        latency = round((time.perf_counter() - began) * 1e3, 3)
+        position = None
+        if self._max_contacts > 1 and (at := contact.position()) is not None:
+            x, y, z = (round(value, 6) for value in at.tolist())
+            position = x, y, z
+        latency_ms = round((time.perf_counter() - began) * 1e3, 3)
         return [
-            {
-                **common,
-                "task": task,
-                "label": answer.pop("label"),
-                "confidence": answer.pop("confidence"),
-                "latency_ms": latency,
-                **answer,
-            }
+            Decided(
+                task,
+                answer.label,
+                answer.confidence,
+                window_s,
+                contact.onset_s,
+                latency_ms,
+                answer.flags,
+                error=self.error if answer.remaining is not None else None,
+                remaining=answer.remaining,
+                contact=self._named(waiting.number),
+                position=position,
+                decision=answer.decision,
+            )
             for task, answer in answers.items()
         ]
 
     def _answer(
-        self, waiting: _Waiting, task: str, decision: Decision, flags: list[str], last: bool
-    ) -> Event | None:
-        """What a look says of a task; None where it must go on waiting."""
-        candidates = waiting.candidates.get(task)
+        self,
+        waiting: _Waiting,
+        task: str,
+        decision: Decision,
+        flags: tuple[str, ...],
+        *,
+        last: bool,
+    ) -> _Answer | None:
+        """What a decision point says of a task; None where the task goes on waiting."""
         if decision.distances[0] == 0.0:
-            flags = [*flags, AS_TRAINED]
+            flags = (*flags, AS_TRAINED)
+        candidates = waiting.candidates.get(task)
         if candidates is None:
-            return {
-                "label": decision.label,
-                "confidence": decision.confidence,
-                "flags": [*flags, "tie"] if decision.tie else list(flags),
-            }
+            if decision.tie:
+                flags = (*flags, "tie")
+            return _Answer(decision.label, decision.confidence, flags, decision=decision)
         if decision.pvalues is not None and "short" not in flags:
-            candidates.update(decision.pvalues)
+            candidates.narrow(decision.pvalues)
         if not (candidates.settled or last):
             return None
         labels = self.model.info.tasks[task].labels
         best = candidates.best(labels.index(decision.label))
-        sure = candidates.settled
-        more = ["unknown"] if candidates.unknown else [] if sure else ["unsure"]
-        return {
-            "label": UNKNOWN if candidates.unknown else labels[best],
-            "confidence": round(candidates.confidence(best), 6),
-            "error": candidates.error,
-            "left": [labels[i] for i in candidates.left],
-            "flags": flags + more,
-        }
+        if candidates.unknown:
+            flags = (*flags, "unknown")
+        elif not candidates.settled:
+            flags = (*flags, "unsure")
+        return _Answer(
+            UNKNOWN if candidates.unknown else labels[best],
+            round(candidates.confidence(best), 6),
+            flags,
+            tuple(labels[i] for i in candidates.remaining),
+            decision,
+        )

@@ -6,6 +6,13 @@ class EdgeError(Exception):
 
     The text stays on one line whatever a file contributes to it: characters that cannot be
     printed are escaped as in Python, a line break as `\\n`.
+
+    >>> import edge
+    >>> try:
+    ...     edge.Chain([]).pose([0.0])
+    ... except edge.EdgeError as error:
+    ...     print(error)
+    the arm base to tip takes 0 joint angles (), not 1
     """
 
     def __str__(self) -> str:
@@ -14,4 +21,12 @@ class EdgeError(Exception):
 
 
 class InputError(EdgeError, ValueError):
-    """A file, option or value that cannot be used; the sentence names it and the remedy."""
+    """A file, option or value that cannot be used; the sentence names it and the remedy.
+
+    >>> import edge
+    >>> try:
+    ...     edge.load("touch.npz")
+    ... except edge.InputError as error:
+    ...     print(error)
+    touch.npz: no such file
+    """

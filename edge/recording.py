@@ -27,7 +27,12 @@ LARGEST_BYTES = 1 << 30
 
 @dataclass(frozen=True)
 class Recording:
-    """One trial.
+    """One trial; iterating over it gives its frames as the live skin would have.
+
+    >>> import edge, numpy as np
+    >>> recording = edge.Recording(np.array([0.0, 0.01]), np.zeros((2, 16, 24), np.uint16))
+    >>> [frame.t for frame in recording]
+    [0.0, 0.01]
 
     Attributes:
         t: (n,) seconds, never going back; of frames at equal times the last one counts.
@@ -242,6 +247,12 @@ def _no_constant(text: str) -> None:
 def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recording:
     """Read a recording.
 
+    >>> import edge
+    >>> from edge import demo
+    >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
+    >>> recording.labels["object"], recording.frames.shape[1:]
+    ('pillow', (16, 24))
+
     Args:
         path: of the `.npz`, which sentences name.
         file: its contents, where they have been read already.
@@ -268,6 +279,15 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
 
 def save(path: str | os.PathLike[str], recording: Recording, *, overwrite: bool = True) -> None:
     """Write a recording, whole or not at all; the same recording gives the same bytes.
+
+    >>> import edge, numpy as np, tempfile
+    >>> recording = edge.Recording(
+    ...     np.array([0.0]), np.zeros((1, 16, 24), np.uint16), meta={"labels": {"object": "cup"}}
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     edge.save(f"{folder}/cup.npz", recording)
+    ...     edge.load(f"{folder}/cup.npz").labels
+    {'object': 'cup'}
 
     Raises:
         InputError: the recording is not as the contract says, `path` cannot be written, or

@@ -1,4 +1,4 @@
-"""examples/ros2_node.py over a stand-in for rclpy, fed by `edge-classify run --udp`."""
+"""Each program in examples/ runs: the ROS node over a stand-in for rclpy, others as they are."""
 
 import json
 import runpy
@@ -8,10 +8,57 @@ import threading
 import types
 from pathlib import Path
 
+import pytest
+
+import edge
 from edge import demo
 from edge.cli import main
+from edge.fake.player import play, skin_file
 
-NODE = Path(__file__).parents[1] / "examples" / "ros2_node.py"
+EXAMPLES = Path(__file__).parents[1] / "examples"
+NODE = EXAMPLES / "ros2_node.py"
+PILLOW = demo.FOLDER / "pillow-movable.npz"
+
+
+def run(monkeypatch, capsys, program, *arguments):
+    """What an example prints, line by line."""
+    path = EXAMPLES / program
+    assert len(path.read_text().splitlines()) <= 10
+    monkeypatch.setattr(sys, "argv", [program, *map(str, arguments)])
+    runpy.run_path(str(path))
+    return capsys.readouterr().out.splitlines()
+
+
+def test_a_recording_is_classified(monkeypatch, capsys):
+    onset, *decided = run(monkeypatch, capsys, "classify_recording.py", demo.MODEL, PILLOW)
+    assert onset.startswith("Onset(onset_s=")
+    assert [line.split(",")[:2] for line in decided] == [
+        ["Decided(task='category'", " label='soft-movable'"],
+        ["Decided(task='mobility'", " label='movable'"],
+        ["Decided(task='object'", " label='pillow'"],
+    ]
+
+
+def test_a_skin_is_watched(monkeypatch, capsys):
+    """A fake skin feels a touch, and then the owner presses Ctrl-C."""
+    recording = edge.load(PILLOW)
+    skin, playback = play(skin_file(recording.layout), recording)
+    read = skin.read
+
+    def until_the_end():
+        if skin.clock.now() - playback.start > playback.ends:
+            raise KeyboardInterrupt
+        return read()
+
+    monkeypatch.setattr(skin, "read", until_the_end)
+    monkeypatch.setattr(edge.Skin, "open", lambda file: skin)
+    printed = []
+    monkeypatch.setattr("builtins.print", printed.append)
+    with pytest.raises(KeyboardInterrupt):
+        run(monkeypatch, capsys, "watch_skin.py", demo.MODEL, "skin.toml")
+    onset, *decided = printed
+    assert isinstance(onset, edge.Onset)
+    assert {event.task for event in decided} == {"category", "mobility", "object"}
 
 
 class Ros:

@@ -25,8 +25,8 @@ from edge.errors import EdgeError, InputError
 from edge.fake.player import frame_bits
 from edge.files import write_whole
 from edge.model.model import Model
-from edge.runtime.loop import garbage_aside
 from edge.skin.file import SkinFile, frame_rate, load
+from edge.skin.loop import garbage_aside
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from edge.commands.options import add_skin
 from edge.commands.source import open_skin
 from edge.errors import InputError
-from edge.runtime.loop import Loop
 from edge.skin.calibration import save_calibration
 from edge.skin.file import TaxelCalibration
+from edge.skin.loop import Loop
 from edge.skin.skin import Skin
 
 FRAMES = 1000

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from edge import demo
-from edge.classifier import Classifier, Event
+from edge.classifier import Classifier
+from edge.events import Decided, Event
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import Recording, load
-from edge.runtime.loop import Loop
 
 
 def add_parser(commands: Any) -> None:
@@ -34,10 +34,7 @@ def events(model: Model, recording: Recording) -> Iterator[Event]:
     """What `edge-classify run` would answer to a recording on fake chips."""
     skin, playback = play(skin_file(recording.layout), recording)
     with skin:
-        classifier = Classifier(model, skin.layout)
-        for frame in Loop(skin, joints=playback, lasts_s=playback.ends).frames():
-            yield from classifier.push(frame)
-        yield from classifier.finish()
+        yield from Classifier(model).watch(skin, joints=playback, lasts_s=playback.ends)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -55,10 +52,10 @@ def _show(model: Model, path: Path) -> tuple[int, int]:
     recording = load(path)
     right = asked = 0
     for event in events(model, recording):
-        line = {"source": path.stem, **event}
-        if event["event"] == "decision":
-            line["expected"] = recording.labels[event["task"]]
+        line = {"source": path.stem, **event.to_dict()}
+        if isinstance(event, Decided):
+            line["expected"] = recording.labels[event.task]
             asked += 1
-            right += line["expected"] == event["label"]
+            right += line["expected"] == event.label
         print(json.dumps(line, ensure_ascii=False), flush=True)
     return right, asked

@@ -19,7 +19,7 @@ from edge.commands.options import add_arm, add_joints, add_skin, open_arm
 from edge.commands.source import Opened, open_joints, open_skin
 from edge.errors import InputError
 from edge.recording import Recording, save
-from edge.runtime.loop import Loop, stop_on
+from edge.skin.loop import Loop, stop_on
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from edge.classifier import Classifier, Event
+from edge.classifier import Classifier
 from edge.commands.options import add_error, check_error
 from edge.commands.summary import Summary
 from edge.errors import InputError
@@ -38,8 +38,8 @@ def add_parser(commands: Any) -> None:
 
 def decide(
     model: Model, recording: Recording, name: str, error: float | None = None
-) -> list[Event]:
-    """All events of one recording, with early decisions if an error rate is given.
+) -> list[dict[str, Any]]:
+    """All events of one recording as lines, with early decisions if an error rate is given.
 
     Raises:
         InputError: the recording does not suit the model; the sentence names `name`.
@@ -50,8 +50,7 @@ def decide(
     require_joints(model, None if joints is None else joints.shape[1], name)
     try:
         classifier = Classifier(model, recording.layout, error=error)
-        events = [event for frame in recording for event in classifier.push(frame)]
-        events += classifier.finish()
+        events = [event.to_dict() for event in classifier.classify(recording)]
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     if not any(event["event"] == "onset" for event in events):

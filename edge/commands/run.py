@@ -9,14 +9,14 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from edge.classifier import Classifier, Event
+from edge.classifier import Classifier
 from edge.commands.options import add_error, add_joints, add_skin, check_error
 from edge.commands.source import check_joints, open_joints, open_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
-from edge.runtime.loop import Loop, Schedule, stop_on
 from edge.runtime.systemd import Notifier
 from edge.runtime.touch_map import MapFile
+from edge.skin.loop import Loop, Schedule, stop_on
 from edge.skin.skin import ChipStatus
 from edge.touch.track import MAX_CONTACTS
 
@@ -55,7 +55,7 @@ def add_parser(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def chip_event(status: ChipStatus, t: float) -> Event:
+def chip_event(status: ChipStatus, t: float) -> dict[str, Any]:
     """A chip that failed or recovered, as an event."""
     event = {
         "event": "chip",
@@ -67,7 +67,7 @@ def chip_event(status: ChipStatus, t: float) -> Event:
     return {**event, "error": status.error} if status.error else event
 
 
-def end_event(schedule: Schedule, frames: int) -> Event:
+def end_event(schedule: Schedule, frames: int) -> dict[str, Any]:
     """How well the loop kept its period, as an event."""
     return {
         "event": "end",
@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
             stop=stop,
         )
 
-        def emit(events: list[Event]) -> None:
+        def emit(events: list[dict[str, Any]]) -> None:
             lines.write(events)
             if touch_map is not None and events:
                 touch_map.write(events)
@@ -124,9 +124,9 @@ def run(arguments: argparse.Namespace) -> int:
             frames += 1
             notifier.alive()
             emit([chip_event(status, frame.t) for status in skin.changes()])
-            emit(classifier.push(frame))
+            emit([event.to_dict() for event in classifier.push(frame)])
         notifier.stopping()
-        emit(classifier.finish())
+        emit([event.to_dict() for event in classifier.finish()])
         emit([end_event(loop.schedule, frames)])
         if lines.lost:
             print(

@@ -15,9 +15,9 @@ from edge.fake.player import Playback, play, skin_file
 from edge.model.model import Model, require_joints
 from edge.recording import load
 from edge.runtime import joint_stream
-from edge.runtime.loop import JointSource
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
+from edge.skin.loop import JointSource
 from edge.skin.skin import Skin
 from edge.touch.arm import Chain
 from edge.touch.layout import for_device

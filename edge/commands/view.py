@@ -7,13 +7,14 @@ import signal
 import sys
 from typing import Any
 
-from edge.classifier import Classifier, Event
+from edge.classifier import Classifier
 from edge.commands import terminal
 from edge.commands.options import add_joints, add_skin
 from edge.commands.source import check_joints, open_joints, open_skin
 from edge.errors import InputError
+from edge.events import Decided, Onset
 from edge.model.model import Model
-from edge.runtime.loop import Loop, stop_on
+from edge.skin.loop import Loop, stop_on
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import find_regions
@@ -53,10 +54,10 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[st
     return [terminal.picture(colour), terminal.caption(frame, regions, layout), *said]
 
 
-def spoken(event: Event) -> str:
+def spoken(event: Decided) -> str:
     """A decision as text."""
-    text = f"{event['label']} ({event['confidence']:.0%})"
-    return f"{text} [{', '.join(event['flags'])}]" if event["flags"] else text
+    text = f"{event.label} ({event.confidence:.0%})"
+    return f"{text} [{', '.join(event.flags)}]" if event.flags else text
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -92,10 +93,10 @@ def _show(arguments: argparse.Namespace, skin: Any, model: Model | None, loop: L
     try:
         for frame in loop.frames():
             for event in classifier.push(frame) if classifier is not None else ():
-                if event["event"] == "onset":
+                if isinstance(event, Onset):
                     decisions = dict.fromkeys(tasks, "touching ...")
-                elif event["event"] == "decision":
-                    decisions[event["task"]] = spoken(event)
+                elif isinstance(event, Decided):
+                    decisions[event.task] = spoken(event)
             if frame.t < due:
                 continue
             due = frame.t + 1.0 / arguments.rate - 0.5 * skin.period_s

@@ -138,10 +138,8 @@ def response(code: int | None) -> Response:
 def bus_error(code: int | None, bus: str, address: int | None = None) -> BusError:
     """The named error of an errno, with a sentence that names the bus and the chip.
 
-    >>> raise bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
-    Traceback (most recent call last):
-    edge.i2c.bus.BusTimeout: /dev/i2c-1, address 0x2c: the transfer hung until its timeout
-    (ETIMEDOUT)
+    >>> bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
+    BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)')
     """
     code = code or errno.EIO
     place = bus if address is None else f"{bus}, address {address:#04x}"

@@ -179,6 +179,13 @@ class ModelInfo:
 class Decision(NamedTuple):
     """The answer to one task.
 
+    >>> import edge
+    >>> from edge import demo
+    >>> model = edge.Model(demo.MODEL)
+    >>> decision = model.decide([0.0] * model.info.width)["mobility"]
+    >>> len(decision.scores), len(decision.neighbours) == model.info.tasks["mobility"].k
+    (2, True)
+
     Attributes:
         label: what was touched.
         confidence: the label's share of the votes, 0 to 1.
@@ -201,6 +208,14 @@ class Decision(NamedTuple):
 
 class Model:
     """A `model.onnx`, ready to decide.
+
+    >>> import edge
+    >>> from edge import demo
+    >>> model = edge.Model(demo.MODEL)
+    >>> sorted(model.info.tasks), model.info.window_s
+    (['category', 'mobility', 'object'], 1.2)
+    >>> model.decide([0.0] * model.info.width)["mobility"].label in ("fixed", "movable")
+    True
 
     Raises:
         InputError: the file is missing, is not an exported model, or contradicts itself.

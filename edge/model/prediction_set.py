@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 
 UNKNOWN = "unknown"
-"""What a contact is called that no label fits."""
+"""The label of a contact that no trained label fits."""
 NOVELTY_RATE = 0.05
 """How often a contact with a trained thing may be called unknown for lying far from all."""
 
@@ -27,15 +27,14 @@ def check_rate(value: float, what: str) -> float:
 class PredictionSet:
     """The labels of one task that a contact can still have.
 
-    A model with decision points gives at every decision point, for each fold of its calibration, a
-    p-value a label
-    and one for its lying far from all that was trained (see `train.conformal`). A label keeps
-    the least p-value of its decision points in each fold; it is struck out, for good, once their
-    mean over the folds is at most `error`.
+    At each decision point, a calibrated model gives a p-value for every label and fold of its
+    calibration, and one for lying far from everything in training (see `train.conformal`). A
+    label keeps the least p-value of its decision points in each fold, and is ruled out for good
+    once their mean over the folds is at most `error`.
 
     Args:
         labels: how many there are.
-        error: how often the true label may be struck out, in (0, 1).
+        error: how often the true label may be ruled out, in (0, 1).
         novelty_rate: how often a trained thing may be called unknown for lying far from all.
     """
 
@@ -44,8 +43,8 @@ class PredictionSet:
         self._least: NDArray[np.float64] | None = None
         self._mean = np.ones(labels + 1)
 
-    def update(self, pvalues: NDArray[np.float64]) -> None:
-        """Take in a look's p-values (folds, labels + 1)."""
+    def narrow(self, pvalues: NDArray[np.float64]) -> None:
+        """Take in the p-values (folds, labels + 1) of the next decision point."""
         self._least = pvalues if self._least is None else np.minimum(self._least, pvalues)
         self._mean = self._least.mean(axis=0)
 
@@ -55,27 +54,27 @@ class PredictionSet:
         return self._mean[:-1]
 
     @property
-    def left(self) -> list[int]:
-        """Labels that are not struck out."""
+    def remaining(self) -> list[int]:
+        """Labels that are not ruled out, by their index."""
         return np.flatnonzero(self.pvalues > self.error).tolist()
 
     @property
     def unknown(self) -> bool:
-        """No label is left, or the contact lies too far from all that was trained."""
-        return bool(self._mean[-1] <= self.novelty_rate) or not self.left
+        """No label remains, or the contact lies too far from everything in training."""
+        return bool(self._mean[-1] <= self.novelty_rate) or not self.remaining
 
     @property
     def settled(self) -> bool:
-        """No later decision point can change the answer: one label is left, or it is unknown."""
-        return self.unknown or len(self.left) == 1
+        """No later decision point can change the answer: one label remains, or it is unknown."""
+        return self.unknown or len(self.remaining) == 1
 
     def best(self, favourite: int) -> int:
-        """The favourite (the vote's answer) where it is left, else the label likeliest to be.
+        """The favourite (the vote's answer) where it remains, else the label likeliest to be.
 
         The vote at the full window is right oftener than the largest of p-values that account
         for every decision point.
         """
-        if favourite in self.left:
+        if favourite in self.remaining:
             return favourite
         return int(self.pvalues.argmax())
 

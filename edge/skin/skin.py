@@ -75,12 +75,11 @@ class _Worker(threading.Thread):
 
 
 class Skin:
-    """A skin on its buses.
+    """A skin on its buses: `Skin.open` for real ones; those of `edge.fake` have the same face.
 
     >>> from edge.fake.player import still
     >>> from edge.skin import file
-    >>> skin = still(file.load(file.shipped("cody")))
-    >>> with skin:
+    >>> with still(file.load(file.shipped("cody"))) as skin:
     ...     frame = skin.read()
     >>> frame.counts.shape, bool(frame.valid.all())
     ((16, 24), True)

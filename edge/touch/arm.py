@@ -39,7 +39,8 @@ class Joint:
 class Chain:
     """Joints from a base to a tip.
 
-    >>> chain = Chain.cody()
+    >>> import edge
+    >>> chain = edge.Chain.cody()
     >>> chain.pose([0.0] * 5)[:3, 3].round(5).tolist()
     [0.00635, -0.21668, -0.55648]
     """

@@ -38,6 +38,14 @@ def feature_vector(
 ) -> NDArray[np.float64]:
     """Each feature at `samples` times, uniform from onset to onset + window, one after another.
 
+    >>> import edge
+    >>> from edge import demo
+    >>> from edge.touch.track import ContactTracker, first_contact
+    >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
+    >>> onset_s, series = first_contact(recording, ContactTracker(recording.layout))
+    >>> edge.feature_vector(series, window_s=1.2).shape
+    (120,)
+
     Between frames by linear interpolation, so that jitter and dropped frames do not shift the
     samples. After the last frame its values hold; a contact that has ended is at zero there.
     What cannot be known in a frame (where nothing lies; how far it moved, without the arm's

@@ -177,6 +177,12 @@ def find_regions(
 ) -> list[Region]:
     """All regions of connected taxels above the threshold.
 
+    >>> import edge, numpy as np
+    >>> counts = np.zeros((4, 6), np.uint16)
+    >>> counts[1, [0, 5]] = counts[3, 2] = 200
+    >>> [(region.area, region.peak) for region in edge.find_regions(counts, 100)]
+    [(2, 200), (1, 200)]
+
     Args:
         counts: whole numbers (rows, cols).
         threshold: one number, or one a taxel; a taxel above it is active.
@@ -202,6 +208,12 @@ def largest_region(
     previous: Region | None = None,
 ) -> Region | None:
     """The region of the largest area (paper, section III-B), or None where no taxel is active.
+
+    >>> import edge, numpy as np
+    >>> counts = np.zeros((4, 6), np.uint16)
+    >>> counts[1, 2:5] = 120, 300, 120
+    >>> edge.largest_region(counts, 100)
+    Region(area=3, peak=300, centroid=(1.00, 3.00))
 
     Equal areas go to the larger overlap with `previous` (the region followed so far), then to
     the higher peak, then to the lower index. The other arguments are those of `find_regions`.

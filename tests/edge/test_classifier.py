@@ -1,5 +1,6 @@
-"""The watcher: events in order, decisions at the right moment, flags where they belong."""
+"""The classifier: events in order, decisions at the right moment, flags where they belong."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 
 from edge.classifier import Classifier
 from edge.errors import InputError
+from edge.events import Decided, Onset, Release
+from edge.fake.player import play, skin_file
 from edge.model.model import Model, require_joints
 from edge.recording import Recording
 
@@ -22,36 +25,94 @@ def watch(model, recording):
     return events + [(None, event) for event in classifier.finish()]
 
 
+def test_the_latency_is_what_the_frame_took(model, make_touch):
+    recording = make_touch()
+    classifier = Classifier(model, recording.layout)
+    for frame in recording:
+        began = time.perf_counter()
+        events = classifier.push(frame)
+        took_ms = (time.perf_counter() - began) * 1e3
+        if events and isinstance(events[0], Decided):
+            assert all(0.0 < event.latency_ms <= took_ms + 0.001 for event in events)
+            return
+
+
+def test_classify_and_watch_give_what_pushing_the_frames_gives(model, make_touch):
+    recording = make_touch(seed=99)
+
+    def said(events):
+        return [{**event.to_dict(), "latency_ms": 0.0} for event in events]
+
+    pushed = said(event for _, event in watch(model, recording))
+    classifier = Classifier(model)
+    assert said(classifier.classify(recording)) == pushed
+    assert said(classifier.classify(recording)) == pushed
+    skin, playback = play(skin_file(recording.layout), recording)
+    with skin:
+        live = list(classifier.watch(skin, joints=playback, lasts_s=playback.ends))
+    assert [(type(e), e.to_dict().get("label")) for e in live] == [
+        (type(e), e.to_dict().get("label")) for _, e in watch(model, recording)
+    ]
+
+
+def test_joint_angles_are_asked_for_before_anything_is_read(model, make_touch):
+    bare = replace(make_touch(), joints=None)
+    with pytest.raises(InputError, match="the recording: has no joint angles"):
+        next(Classifier(model).classify(bare))
+    with pytest.raises(InputError, match="the skin: has no joint angles"):
+        next(Classifier(model).watch(None))
+    _, *decided = Classifier(model, motion_on_skin=True).classify(bare)
+    assert [event.flags for event in decided] == [("skin_motion",)] * 2
+
+
+def test_an_event_is_what_a_line_of_json_says():
+    decided = Decided(
+        "t", "a", 0.5, 1.2, 0.25, 0.3, ("unsure",), error=0.1, remaining=("a", "b"), contact=2
+    )
+    assert list(decided.to_dict().items()) == [
+        ("event", "decision"),
+        ("contact", 2),
+        ("window_s", 1.2),
+        ("onset_s", 0.25),
+        ("place", None),
+        ("task", "t"),
+        ("label", "a"),
+        ("confidence", 0.5),
+        ("latency_ms", 0.3),
+        ("error", 0.1),
+        ("left", ["a", "b"]),
+        ("flags", ["unsure"]),
+    ]
+    assert Release(0.25, 2.5, contact=2).to_dict() == {
+        "event": "release",
+        "contact": 2,
+        "onset_s": 0.25,
+        "release_s": 2.5,
+    }
+
+
 def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(model, make_touch):
     events = watch(model, make_touch(kind="soft", seed=3))
-    assert [(t, e["event"]) for t, e in events] == [
-        (0.21, "onset"),
-        (1.4, "decision"),
-        (1.4, "decision"),
-    ]
-    decision = events[1][1]
-    assert decision["task"] == "category"
-    assert decision["label"] == "soft-fixed"
-    assert decision["onset_s"] == 0.2
-    assert decision["window_s"] == 1.2
-    assert decision["confidence"] == 1.0
-    assert decision["latency_ms"] > 0.0
-    assert decision["flags"] == ["as_trained"]
+    assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (1.4, Decided), (1.4, Decided)]
+    decided = events[1][1]
+    assert decided.task == "category"
+    assert decided.label == "soft-fixed"
+    assert decided.onset_s == 0.2
+    assert decided.window_s == 1.2
+    assert decided.confidence == 1.0
+    assert decided.flags == ("as_trained",)
+    assert decided.decision.label == decided.label
 
 
 def test_a_new_touch_is_not_flagged(model, make_touch):
     events = [e for _, e in watch(model, make_touch(kind="soft", seed=99))]
-    assert [e["flags"] for e in events if e["event"] == "decision"] == [[], []]
+    assert [e.flags for e in events if isinstance(e, Decided)] == [(), ()]
 
 
 def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(model, make_touch):
     events = watch(model, make_touch(seconds=0.5))
-    assert [(t, e["event"]) for t, e in events] == [
-        (0.21, "onset"),
-        (None, "decision"),
-        (None, "decision"),
-    ]
-    assert "short" in events[1][1]["flags"]
+    assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (None, Decided), (None, Decided)]
+    assert "short" in events[1][1].flags
 
 
 def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(model, make_touch):
@@ -60,11 +121,11 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(mo
     frames = np.concatenate([one.frames, one.frames, np.zeros((1, 16, 24), dtype=np.uint16)])
     joints = np.concatenate([one.joints, one.joints, one.joints[-1:]])
     events = watch(model, Recording(t, frames, joints, None, one.meta))
-    kinds = [e["event"] for _, e in events]
-    assert kinds == ["onset", "release", "onset", *["decision"] * 4]
-    assert events[1][1]["onset_s"] == 0.2
-    assert events[1][1]["release_s"] == pytest.approx(0.84)
-    onsets = [e["onset_s"] for _, e in events if e["event"] == "decision"]
+    kinds = [type(e) for _, e in events]
+    assert kinds == [Onset, Release, Onset, *[Decided] * 4]
+    assert events[1][1].onset_s == 0.2
+    assert events[1][1].release_s == pytest.approx(0.84)
+    onsets = [e.onset_s for _, e in events if isinstance(e, Decided)]
     assert onsets == pytest.approx([0.2, 0.2, 1.0, 1.0])
 
 
@@ -73,7 +134,7 @@ def test_taxels_that_could_not_be_read_flag_the_decision(model, make_touch):
     valid = np.ones((16, 24), dtype=bool)
     valid[0, 0] = False
     events = watch(model, replace(whole, valid=valid))
-    assert "missing_taxels" in events[-1][1]["flags"]
+    assert "missing_taxels" in events[-1][1].flags
 
 
 def test_a_pose_that_is_missing_flags_the_decision(model, make_touch):
@@ -82,19 +143,16 @@ def test_a_pose_that_is_missing_flags_the_decision(model, make_touch):
     events = []
     for i, frame in enumerate(recording):
         events += classifier.push(replace(frame, joints=None) if i == 60 else frame)
-    assert "missing_pose" in events[-1]["flags"]
+    assert "missing_pose" in events[-1].flags
 
 
 def test_features_too_large_to_measure_give_no_label(model, make_touch):
     recording = make_touch()
     skin = {**recording.meta["skin"], "counts_per_newton": 1e-300}
     tiny = replace(recording, meta={**recording.meta, "skin": skin})
-    classifier = Classifier(model)
-    classifier.tracker.layout = tiny.layout
-    events = [e for f in tiny for e in classifier.push(replace(f, counts=f.counts))]
-    decision = events[-1]
-    assert decision["label"] is None
-    assert "out_of_range" in decision["flags"]
+    decided = list(Classifier(model).classify(tiny))[-1]
+    assert (decided.label, decided.decision) == (None, None)
+    assert "out_of_range" in decided.flags
 
 
 def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm):

@@ -8,6 +8,7 @@ import pytest
 from edge.classifier import Classifier
 from edge.cli import main as edge_classify
 from edge.errors import InputError
+from edge.events import Decided
 from edge.model.model import NO_DECISION_POINT, Model
 from edge.recording import load, save
 from export.__main__ import main, parse_decision_points
@@ -140,8 +141,8 @@ def test_what_is_not_finite_fits_nothing(model, at_decision_points):
 def replay(model, path, error):
     recording = load(path)
     classifier = Classifier(model, recording.layout, error=error)
-    events = [(f.t, e) for f in recording for e in classifier.push(f)]
-    return events + [(None, e) for e in classifier.finish()]
+    events = [(f.t, e.to_dict()) for f in recording for e in classifier.push(f)]
+    return events + [(None, e.to_dict()) for e in classifier.finish()]
 
 
 def test_a_task_is_decided_at_the_first_look_that_leaves_one_label(model, touches):
@@ -189,19 +190,19 @@ def test_a_contact_unlike_all_that_was_trained_is_unknown(model, touches):
     from dataclasses import replace
 
     strange = replace(recording, frames=frames)
-    events = [e for f in strange for e in classifier.push(f) if e["event"] == "decision"]
-    assert {e["label"] for e in events} == {"unknown"}
-    assert all("unknown" in e["flags"] for e in events)
-    assert all(e["window_s"] == 0.3 for e in events)
+    events = [e for f in strange for e in classifier.push(f) if isinstance(e, Decided)]
+    assert {e.label for e in events} == {"unknown"}
+    assert all("unknown" in e.flags for e in events)
+    assert all(e.window_s == 0.3 for e in events)
 
 
 def test_a_stream_that_ends_between_looks_takes_the_best_of_what_is_left(model, make_touch):
     short = make_touch(kind="soft", seconds=0.4, seed=4)
     classifier = Classifier(model, short.layout, error=0.12)
     events = [e for f in short for e in classifier.push(f)] + classifier.finish()
-    thing = next(e for e in events if e["event"] == "decision" and e["task"] == "object")
-    assert thing["flags"] == ["short", "unsure"]
-    assert thing["label"] in thing["left"]
+    thing = next(e for e in events if isinstance(e, Decided) and e.task == "object")
+    assert thing.flags == ("short", "unsure")
+    assert thing.label in thing.remaining
 
 
 def test_the_golden_file_covers_the_looks(looked, capsys, tmp_path):

@@ -182,7 +182,7 @@ def novelty(
                         candidates = PredictionSet(calibration.classes, error, rate)
                         for values in pvalues:
                             if not candidates.settled:
-                                candidates.update(values[place])
+                                candidates.narrow(values[place])
                         counts[rate][row] += (1, candidates.unknown)
     return [
         Novelty(rate, (int(k[0]), int(k[1])), (int(s[0]), int(s[1])))
@@ -203,14 +203,14 @@ def _decide(
     candidates = PredictionSet(len(classes), error, NOVELTY_RATE)
     answer, seconds, settled = "", decision_points_s[-1], False
     for decision_point, values in enumerate(pvalues):
-        candidates.update(values)
+        candidates.narrow(values)
         if candidates.settled and not settled:
             settled, seconds = True, decision_points_s[decision_point]
-            answer = "" if candidates.unknown else str(classes[candidates.left[0]])
+            answer = "" if candidates.unknown else str(classes[candidates.remaining[0]])
     unknown = settled and not answer
     if not settled:
         answer = str(classes[candidates.best(favourite)])
-    survivors = {str(classes[i]) for i in candidates.left}
+    survivors = {str(classes[i]) for i in candidates.remaining}
     wrong = answer != truth
     return truth not in survivors, wrong, settled and wrong, not settled, unknown, seconds
 

@@ -11,8 +11,8 @@ from edge.errors import InputError
 from edge.fake.clock import PacedClock
 from edge.fake.player import Playback, fake_skin, play, skin_file
 from edge.recording import Recording
-from edge.runtime.loop import Loop
 from edge.skin import file as skinfile
+from edge.skin.loop import Loop
 from edge.touch.layout import SkinLayout
 
 

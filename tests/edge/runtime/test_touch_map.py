@@ -96,7 +96,9 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
     for path in demo.recordings():
         recording = load(path)
         alone, several = Classifier(model), Classifier(model, max_contacts=8)
-        expected, seen = ([e for f in recording for e in w.push(f)] for w in (alone, several))
+        expected, seen = (
+            [e.to_dict() for f in recording for e in w.push(f)] for w in (alone, several)
+        )
         number = next(e["contact"] for e in seen if e["event"] == "decision")
         mine = [e for e in seen if e["contact"] == number]
         assert [strip(e) for e in mine] == [strip(e) for e in expected]

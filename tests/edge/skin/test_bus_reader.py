@@ -10,11 +10,12 @@ import pytest
 from bench.faults import Fault, positions, run, scripts
 from edge.classifier import Classifier
 from edge.commands.run import chip_event
+from edge.events import Decided
 from edge.fake.player import Playback, fake_skin
 from edge.model.model import Model
 from edge.recording import load
-from edge.runtime.loop import Loop
 from edge.skin import file as skinfile
+from edge.skin.loop import Loop
 
 ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
 UNKNOWABLE = [name for name in ROWS if name.endswith("*")]
@@ -92,9 +93,9 @@ def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):
             loop = Loop(skin, joints=playback, lasts_s=playback.ends)
             events = [event for frame in loop.frames() for event in classifier.push(frame)]
             changed = [status.state for status in skin.changes()]
-        decisions = [e for e in events if e["event"] == "decision"]
-        assert ["missing_taxels" in e["flags"] for e in decisions] == [flagged] * 2
-        assert decisions[0]["label"] == trial.labels["category"]
+        decisions = [e for e in events if isinstance(e, Decided)]
+        assert ["missing_taxels" in e.flags for e in decisions] == [flagged] * 2
+        assert decisions[0].label == trial.labels["category"]
         assert changed == []  # it came back before anyone asked
 
 

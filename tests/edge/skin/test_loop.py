@@ -9,8 +9,8 @@ import pytest
 
 from edge.fake.clock import VirtualClock
 from edge.fake.player import fake_skin, still
-from edge.runtime.loop import Loop, Periods, Schedule, Stop, garbage_aside, stop_on
 from edge.skin import file as skinfile
+from edge.skin.loop import Loop, Periods, Schedule, Stop, garbage_aside, stop_on
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 

@@ -1,0 +1,126 @@
+"""What a classifier tells of a stream of frames: contacts that begin, are decided, and end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from edge.model.model import Decision
+
+
+@dataclass(frozen=True)
+class Onset:
+    """A contact has begun.
+
+    >>> import edge
+    >>> edge.Onset(onset_s=1.25).to_dict()
+    {'event': 'onset', 'onset_s': 1.25}
+
+    Attributes:
+        onset_s: when, on the frames' clock.
+        contact: which one, counted from 1, where several are followed at once; else None.
+    """
+
+    onset_s: float
+    contact: int | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a line of JSON says it."""
+        return {"event": "onset", **_which(self.contact), "onset_s": self.onset_s}
+
+
+@dataclass(frozen=True)
+class Decided:
+    """A task has been decided for a contact.
+
+    >>> import edge
+    >>> decided = edge.Decided("mobility", "fixed", 1.0, window_s=1.2, onset_s=0.2, latency_ms=0.3)
+    >>> decided.label, decided.to_dict()["event"]
+    ('fixed', 'decision')
+
+    Attributes:
+        task: the question.
+        label: its answer; "unknown" where no trained label fits, None where the features are too
+            large to be measured against the training rows.
+        confidence: the label's share of the votes, 0 to 1; with an error rate, one less the
+            smallest error at which another label would remain.
+        window_s: seconds from onset that it was decided on.
+        onset_s: when the contact began.
+        latency_ms: from the frame that completed the window to the answer.
+        flags: what to know about it, see `Classifier`.
+        error: how often a label may be wrong, where that was asked for.
+        remaining: the labels that could not be ruled out at this error.
+        contact: as in `Onset`.
+        position: (x, y, z) where the contact was last seen, where several are followed (see
+            `edge.touch.contact.Contact.position`); None where it is not known.
+        decision: the model's own answer, with the votes and the nearest training trials; None
+            where there is no label.
+    """
+
+    task: str
+    label: str | None
+    confidence: float
+    window_s: float
+    onset_s: float
+    latency_ms: float
+    flags: tuple[str, ...] = ()
+    error: float | None = None
+    remaining: tuple[str, ...] | None = None
+    contact: int | None = None
+    position: tuple[float, float, float] | None = None
+    decision: Decision | None = field(default=None, compare=False, repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a line of JSON says it."""
+        line: dict[str, Any] = {
+            "event": "decision",
+            **_which(self.contact),
+            "window_s": self.window_s,
+            "onset_s": self.onset_s,
+        }
+        if self.contact is not None:
+            line["place"] = None if self.position is None else list(self.position)
+        line |= {
+            "task": self.task,
+            "label": self.label,
+            "confidence": self.confidence,
+            "latency_ms": self.latency_ms,
+        }
+        if self.remaining is not None:
+            line |= {"error": self.error, "left": list(self.remaining)}
+        return {**line, "flags": list(self.flags)}
+
+
+@dataclass(frozen=True)
+class Release:
+    """A contact has ended.
+
+    >>> import edge
+    >>> edge.Release(onset_s=1.25, release_s=3.5).to_dict()
+    {'event': 'release', 'onset_s': 1.25, 'release_s': 3.5}
+
+    Attributes:
+        onset_s: when it began.
+        release_s: when it was known to have ended.
+        contact: as in `Onset`.
+    """
+
+    onset_s: float
+    release_s: float
+    contact: int | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a line of JSON says it."""
+        return {
+            "event": "release",
+            **_which(self.contact),
+            "onset_s": self.onset_s,
+            "release_s": self.release_s,
+        }
+
+
+Event = Onset | Decided | Release
+
+
+def _which(contact: int | None) -> dict[str, int]:
+    return {} if contact is None else {"contact": contact}

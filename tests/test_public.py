@@ -1,0 +1,46 @@
+"""The public names: lazily loaded, each with an example that runs; and every other example."""
+
+import doctest
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import edge
+
+ROOT = Path(__file__).parents[1]
+WITH_EXAMPLES = sorted(
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for path in (ROOT / "edge").rglob("*.py")
+    if "    >>> " in path.read_text()
+)
+
+
+@pytest.mark.parametrize("name", edge.__all__)
+def test_every_public_name_is_there_with_an_example_in_its_docstring(name):
+    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(edge, name), name)
+    assert found.examples
+    assert not any(doctest.SKIP in example.options for example in found.examples)
+    assert name in dir(edge)
+
+
+@pytest.mark.parametrize("module", WITH_EXAMPLES)
+def test_the_examples_in_docstrings_run(module, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = doctest.testmod(import_module(module))
+    assert result.failed == 0
+
+
+def test_import_edge_loads_nothing_else():
+    code = "import sys, edge; print([m for m in sys.modules if m.startswith(('edge.', 'numpy'))])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_a_name_that_is_not_public_is_no_attribute():
+    with pytest.raises(AttributeError, match="no attribute 'Watcher'"):
+        edge.Watcher  # noqa: B018
