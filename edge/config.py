@@ -1,76 +1,271 @@
-"""TOML tables taken apart with one sentence for each mistake."""
+"""What a person or another program wrote, checked: TOML and JSON, with one sentence a mistake.
+
+Every complaint reads `FILE: KEY must be WHAT IS WANTED, not WHAT IS THERE`.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+import os
+import reprlib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from edge.errors import InputError
+from edge.files import parsing, read_bytes, read_text
+
+REQUIRED: Any = object()
+"""Default of a key that must be given."""
+LONGEST_WHOLE = 40
+"""Digits of a whole number; no key needs more than 20, and beyond 308 it is no float."""
+_repr = reprlib.Repr()
+_repr.maxstring = _repr.maxother = 60
 
 
-class Table:
-    """A TOML table whose keys are taken one by one; what is left over is unknown."""
+def shown(value: object) -> str:
+    """A value as an error shows it: short, however large it is.
 
-    def __init__(self, raw: object, where: str) -> None:
+    >>> shown([1] * 1000)
+    '[1, 1, 1, 1, 1, 1, ...]'
+    """
+    try:
+        return _repr.repr(value)
+    except ValueError:  # Python does not print whole numbers of more than 4300 digits
+        return "a number of thousands of digits"
+
+
+def _whole(text: str) -> int:
+    if len(text) > LONGEST_WHOLE:
+        raise ValueError(f"it has a whole number of {len(text)} digits")
+    return int(text)
+
+
+def _real(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError(f"the number {text[:LONGEST_WHOLE]} is too large")
+    return value
+
+
+def _constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not a JSON number")
+
+
+_DECODER = json.JSONDecoder(parse_int=_whole, parse_float=_real, parse_constant=_constant)
+
+
+def parse_json(text: str | bytes, where: str) -> Any:
+    """The value of a JSON text; every number in it is finite.
+
+    Raises:
+        InputError: it is not JSON, or not UTF-8; `where` is what the sentence calls it.
+    """
+    with parsing(where, "JSON"):
+        return _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
+
+
+def read_json(path: str | os.PathLike[str]) -> Any:
+    """The value that a JSON file holds, as `parse_json`.
+
+    Raises:
+        InputError: it cannot be read, or is not JSON.
+    """
+    return parse_json(read_bytes(path), os.fspath(path))
+
+
+def parse_toml(text: str, where: str) -> ConfigTable:
+    """The top table of a TOML text.
+
+    Raises:
+        InputError: it is not TOML; `where` is what the sentence calls it.
+    """
+    import tomllib  # a model brings its arm along: many runs read no TOML file
+
+    with parsing(where, "TOML"):
+        return ConfigTable(tomllib.loads(text), where)
+
+
+def read_toml(path: str | os.PathLike[str]) -> ConfigTable:
+    """The top table of a TOML file.
+
+    Raises:
+        InputError: it cannot be read, or is not TOML.
+    """
+    return parse_toml(read_text(path), os.fspath(path))
+
+
+class ConfigTable:
+    """A table whose keys are taken one by one; `done` refuses those that nobody took.
+
+    >>> table = ConfigTable({"rate_hz": 100}, "skin.toml", "read.")
+    >>> table.number("rate_hz", low=0.1, high=1e4)
+    100.0
+    >>> table.flag("verify_mux", True)
+    True
+    >>> table.done()
+    """
+
+    def __init__(self, raw: object, where: str, prefix: str = "") -> None:
+        """Take a table apart.
+
+        Args:
+            raw: what should be one.
+            where: what errors call the file.
+            prefix: what errors write before a key: `read.` in a table of that name.
+
+        Raises:
+            InputError: it is no table.
+        """
         if not isinstance(raw, Mapping):
-            raise InputError(f"{where} must be a table, not {raw!r}")
-        self.raw, self.where = raw, where
-        self._known: list[str] = []
+            name = prefix.rstrip(".: ") or "the file"
+            raise InputError(f"{where}: {name} must be a table, not {shown(raw)}")
+        self.raw, self.where, self.prefix = raw, where, prefix
+        self._taken: list[str] = []
 
-    def get(self, key: str, default: Any = None) -> Any:
-        """A key's value, or the default."""
-        self._known.append(key)
-        return self.raw.get(key, default)
+    def called(self, key: str) -> str:
+        """What errors call a key."""
+        return f"{self.where}: {self.prefix}{key}"
 
-    def fail(self, key: str, wanted: str) -> InputError:
-        """The error of a key that is not what is wanted."""
-        return InputError(f"{self.where}: {key} must be {wanted}, not {self.raw.get(key)!r}")
+    def fail(self, key: str, wanted: str, value: object = REQUIRED) -> InputError:
+        """The error of a key whose value is not what is wanted, to raise."""
+        value = self.raw.get(key) if value is REQUIRED else value
+        return InputError(f"{self.called(key)} must be {wanted}, not {shown(value)}")
 
-    def whole(self, key: str, default: int | None, allowed: Sequence[int] | range) -> int:
-        """A whole number among those allowed."""
+    def has(self, key: str) -> bool:
+        """Whether a key is given; JSON's null is as good as none."""
+        self._taken.append(key)
+        return self.raw.get(key) is not None
+
+    def get(self, key: str, default: Any = REQUIRED) -> Any:
+        """A key's value as it stands, or the default."""
+        if self.has(key):
+            return self.raw[key]
+        if default is REQUIRED:
+            raise InputError(f"{self.called(key)} is missing")
+        return default
+
+    def whole(
+        self,
+        key: str,
+        default: Any = REQUIRED,
+        allowed: Sequence[int] | range = range(1 << 62),
+        form: str = "d",
+    ) -> int:
+        """A whole number among those allowed; `form` is how errors write the limits."""
         value = self.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
-            if key not in self.raw:
-                raise InputError(f"{self.where}: {key} is missing")
-            if isinstance(allowed, range) and allowed[0] >= 0x20 and allowed[-1] < 0x78:
-                wanted = f"{allowed[0]:#04x} to {allowed[-1]:#04x}"
-            elif isinstance(allowed, range):
-                wanted = f"a whole number of {allowed[0]} to {allowed[-1]}"
-            else:
-                wanted = f"one of {', '.join(map(str, allowed))}"
-            raise self.fail(key, wanted)
+        if type(value) is not int or value not in allowed:
+            if not isinstance(allowed, range):
+                raise self.fail(key, f"one of {', '.join(map(str, allowed))}")
+            wanted = f"{allowed[0]:{form}} to {allowed[-1]:{form}}"
+            raise self.fail(key, wanted if form != "d" else f"a whole number from {wanted}")
         return value
 
-    def number(self, key: str, default: float, low: float, high: float) -> float:
-        """A number from low to high."""
-        value = self.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, "a number")
-        if not low <= value <= high:
-            raise self.fail(key, f"a number of {low:g} to {high:g}")
-        return float(value)
+    def number(
+        self,
+        key: str,
+        default: Any = REQUIRED,
+        low: float = -math.inf,
+        high: float = math.inf,
+        *,
+        open_low: bool = False,
+    ) -> float:
+        """A finite number from `low` (or above it where `open_low`) to `high`."""
+        return self.as_number(key, self.get(key, default), low, high, open_low=open_low)
 
-    def flag(self, key: str, default: bool) -> bool:
+    def as_number(
+        self, key: str, value: object, low: float, high: float, *, open_low: bool = False
+    ) -> float:
+        """A value that belongs to a key, a number of a list say, checked as `number` does."""
+        number = math.nan
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            try:
+                number = float(value)
+            except OverflowError:  # a whole number beyond all floats
+                number = math.nan
+        above = number > low if open_low else number >= low
+        if not (above and number <= high and math.isfinite(number)):
+            if math.isinf(low) and math.isinf(high):
+                wanted = "a finite number"
+            else:
+                wanted = f"a number {'above' if open_low else 'from'} {low:g}"
+                if open_low and math.isfinite(high):
+                    wanted += f", at most {high:g}"
+                elif math.isfinite(high):
+                    wanted += f" to {high:g}"
+                elif not open_low:
+                    wanted = f"a number of at least {low:g}"
+            raise self.fail(key, wanted, value)
+        return number
+
+    def numbers(
+        self,
+        key: str,
+        count: int | None = None,
+        default: Any = REQUIRED,
+        low: float = -math.inf,
+        high: float = math.inf,
+        *,
+        open_low: bool = False,
+    ) -> tuple[float, ...]:
+        """A list of numbers, of so many where a count is given."""
+        value = self.get(key, default)
+        if not isinstance(value, list | tuple) or count not in (None, len(value)):
+            raise self.fail(key, f"a list of {'' if count is None else f'{count} '}numbers")
+        return tuple(self.as_number(key, x, low, high, open_low=open_low) for x in value)
+
+    def flag(self, key: str, default: Any = REQUIRED) -> bool:
         """True or false."""
         value = self.get(key, default)
         if not isinstance(value, bool):
             raise self.fail(key, "true or false")
         return value
 
-    def pair(self, key: str, value: object) -> tuple[int, int]:
-        """Two whole numbers."""
-        if (
-            not isinstance(value, list)
-            or len(value) != 2
-            or any(isinstance(x, bool) or not isinstance(x, int) for x in value)
-        ):
-            raise InputError(f"{self.where}: {key} must be [row, col], not {value!r}")
+    def text(self, key: str, default: Any = REQUIRED) -> str:
+        """Text that is not empty."""
+        value = self.get(key, default)
+        if not isinstance(value, str) or not value.strip():
+            raise self.fail(key, "text")
+        return value
+
+    def choice(self, key: str, options: Sequence[str], default: Any = REQUIRED) -> str:
+        """One of some words."""
+        value = self.get(key, default)
+        if value not in options:
+            raise self.fail(key, f"one of {', '.join(options)}")
+        return str(value)
+
+    def texts(self, key: str, default: Any = REQUIRED) -> tuple[str, ...]:
+        """A list of texts."""
+        value = self.get(key, default)
+        if not isinstance(value, list | tuple) or not all(isinstance(x, str) for x in value):
+            raise self.fail(key, "a list of texts")
+        return tuple(value)
+
+    def pair(self, key: str, value: object = REQUIRED) -> tuple[int, int]:
+        """[row, col]: the key's value, or one that belongs to it."""
+        value = self.get(key) if value is REQUIRED else value
+        if not isinstance(value, list) or [type(x) for x in value] != [int, int]:
+            raise self.fail(key, "[row, col]", value)
         return value[0], value[1]
+
+    def table(self, key: str, default: Any = REQUIRED) -> ConfigTable:
+        """A table within this one."""
+        return ConfigTable(self.get(key, default), self.where, f"{self.prefix}{key}.")
+
+    def tables(self, key: str, item: str) -> list[ConfigTable]:
+        """A list of at least one table; errors call each `item` and its number from 0."""
+        entries = self.get(key, [])
+        if not isinstance(entries, list) or not entries:
+            raise self.fail(key, "a list of tables", entries)
+        return [ConfigTable(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)]
 
     def done(self) -> None:
         """Refuse the keys that nobody took."""
-        unknown = sorted(set(self.raw) - set(self._known))
-        if unknown:
-            raise InputError(
-                f"{self.where}: unknown key {unknown[0]!r}; allowed: {', '.join(self._known)}"
-            )
+        for key in self.raw:
+            if key not in self._taken:
+                allowed = ", ".join(dict.fromkeys(self._taken))
+                item, table = ("", self.prefix) if self.prefix[-1:] == "." else (self.prefix, "")
+                raise InputError(
+                    f"{self.where}: {item}unknown key {table}{shown(key)[1:-1]}; allowed: {allowed}"
+                )

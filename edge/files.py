@@ -1,14 +1,97 @@
-"""Files written whole or not at all."""
+"""Files at their edge: read with a limit, written whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from edge.errors import InputError
+from edge.errors import EdgeError, InputError
+
+LARGEST_TEXT = 16 << 20
+"""Bytes of a file that a person or a program wrote as text; the calibration of a skin of a
+million taxels takes 12 MB."""
+
+
+@contextmanager
+def parsing(name: str, what: str, mend: str = "") -> Iterator[None]:
+    """Turn any exception of a parser into one sentence: `NAME: not WHAT: reason; MEND`.
+
+    Parsers of damaged or hostile input raise what they like; no list of exceptions is complete.
+
+    Raises:
+        InputError: the block raised something else than an EdgeError.
+    """
+    try:
+        yield
+    except EdgeError:
+        raise
+    except UnicodeError:
+        raise InputError(f"{name}: not {what}: it is not UTF-8 text{mend}") from None
+    except RecursionError:
+        raise InputError(f"{name}: not {what}: it is nested too deeply{mend}") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
+    except Exception as error:
+        reason = str(error)[:200] or type(error).__name__
+        raise InputError(f"{name}: not {what}: {reason}{mend}") from None
+
+
+@contextmanager
+def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryIO]:
+    """Open a file for reading, if it is one: a FIFO would wait, a device may never end.
+
+    Raises:
+        InputError: it is missing, a folder, a FIFO or a device, or has more than `at_most` bytes.
+    """
+    name = os.fspath(path)
+    try:
+        # Without O_NONBLOCK, opening a FIFO waits for someone to write to it.
+        handle = os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
+    except ValueError as error:  # a NUL in the name
+        raise InputError(f"{name}: cannot be read: {error}") from None
+    with open(handle, "rb") as file:
+        status = os.fstat(handle)
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(f"{name}: cannot be read: it is a folder")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{name}: cannot be read: it is not a regular file")
+        if status.st_size > at_most:
+            raise InputError(
+                f"{name}: has {status.st_size} bytes; at most {at_most} are read from such a file"
+            )
+        yield file
+
+
+def read_bytes(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> bytes:
+    """The bytes of a regular file.
+
+    Raises:
+        InputError: as `open_regular`.
+    """
+    with open_regular(path, at_most) as file:
+        try:
+            # A file that grows while it is read is not followed.
+            return file.read(at_most)
+        except OSError as error:
+            raise InputError(
+                f"{os.fspath(path)}: cannot be read: {error.strerror or error}"
+            ) from None
+
+
+def read_text(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> str:
+    """The text of a regular file.
+
+    Raises:
+        InputError: as `open_regular`, or it is not UTF-8.
+    """
+    with parsing(os.fspath(path), "text"):
+        return read_bytes(path, at_most).decode()
 
 
 @contextmanager

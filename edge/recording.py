@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from edge import npz
+from edge.config import parse_json, shown
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.touch.arm import joint_columns
@@ -231,17 +231,10 @@ def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
         raise InputError(f"{name}: meta is missing; store a JSON object as text under it")
     if raw.dtype.kind != "U" or raw.size != 1:
         raise InputError(f"{name}: meta must be one JSON text, not {raw.dtype} {raw.shape}")
-    try:
-        meta = json.loads(str(raw.reshape(())[()]), parse_constant=_no_constant)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{name}: meta is not JSON: {error}") from None
+    meta = parse_json(str(raw.reshape(())[()]), f"{name}: meta")
     if not isinstance(meta, dict):
-        raise InputError(f"{name}: meta must be a JSON object, not {type(meta).__name__}")
+        raise InputError(f"{name}: meta must be a JSON object, not {shown(meta)}")
     return meta
-
-
-def _no_constant(text: str) -> None:
-    raise ValueError(f"{text} is not a JSON number")
 
 
 def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recording:
@@ -317,7 +310,7 @@ def save_arrays(
         if compress:
             np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
         else:
-            npz.write(file, {"meta": np.array(text), **arrays})
+            np.savez(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
 def find(paths: list[str]) -> list[Path]:

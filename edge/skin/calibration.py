@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.files import write_whole
-from edge.skin.file import SkinFile, TaxelCalibration, parse, read_text
+from edge.files import read_text, write_whole
+from edge.skin.file import SkinFile, TaxelCalibration, parse
 
 
 def calibration_text(calibration: TaxelCalibration) -> str:

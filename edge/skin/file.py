@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
@@ -12,16 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import Table
+from edge.config import ConfigTable, parse_toml, shown
 from edge.errors import InputError
-from edge.i2c import ad7147, block, mpr121, tca9548a
-from edge.i2c.bus import device_path
+from edge.files import read_text
 from edge.touch.layout import SkinLayout
 
-KINDS = ("ad7147", "mpr121", "block")
 UNUSED = -1
 """A stage that is no taxel."""
-FASTEST_MUX_HZ = 400_000
 
 
 @dataclass(frozen=True)
@@ -159,57 +155,32 @@ def shipped(name: str = "cody") -> Path:
     return Path(__file__).parents[1] / "skins" / f"{name}.toml"
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a file.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{os.fspath(path)}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{os.fspath(path)}: not UTF-8 text: {error.reason}") from None
-
-
 def parse(text: str, where: str = "skin") -> SkinFile:
     """Read the text of a skin's file; `where` is what errors call it.
 
     Raises:
         InputError: it makes no sense.
     """
-    try:
-        raw = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{where}: not TOML: {error}") from None
-    top = Table(raw, where)
-    skin = dict(Table(top.get("skin", {}), f"{where}: [skin]").raw)
-    name = skin.pop("name", Path(where).stem)
-    if not isinstance(name, str):
-        raise InputError(f"{where}: skin.name must be text, not {name!r}")
-    known = [f.name for f in fields(SkinLayout)]
-    unknown = sorted(set(skin) - set(known))
-    if unknown:
-        raise InputError(
-            f"{where}: [skin] has an unknown key {unknown[0]!r}; allowed: name, {', '.join(known)}"
-        )
-    layout = SkinLayout.from_dict(skin, where=where)
-    signal, sign = _signal(Table(top.get("signal", {}), f"{where}: [signal]"), layout)
-    reading = _reading(Table(top.get("read", {}), f"{where}: [read]"))
-    entries = top.get("bus")
-    if not isinstance(entries, list) or not entries:
-        raise InputError(f"{where}: no [[bus]] given")
-    buses = tuple(_bus(entry, i, layout, sign, where) for i, entry in enumerate(entries))
-    _check_buses(buses, layout, where)
-    calibration = top.get("calibration")
-    if calibration is not None:
-        calibration = _calibration(Table(calibration, f"{where}: [calibration]"), layout)
+    from edge.skin.wiring import read_buses
+
+    top = parse_toml(text, where)
+    skin = top.table("skin", {})
+    name = skin.text("name", Path(where).stem or "skin")
+    for key in (f.name for f in fields(SkinLayout)):
+        skin.has(key)
+    skin.done()
+    layout = SkinLayout.from_dict(skin.raw, where=where)
+    signal, sign = _signal(top.table("signal", {}), layout)
+    reading = _reading(top.table("read", {}))
+    buses = read_buses(top.tables("bus", "bus"), layout, sign)
+    calibration = None
+    if top.has("calibration"):
+        calibration = _calibration(top.table("calibration"), layout)
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
 
-def _signal(table: Table, layout: SkinLayout) -> tuple[Signal, int]:
+def _signal(table: ConfigTable, layout: SkinLayout) -> tuple[Signal, int]:
     sign = table.whole("sign", 1, (1, -1))
     dead = table.get("dead", [])
     if not isinstance(dead, list):
@@ -218,8 +189,8 @@ def _signal(table: Table, layout: SkinLayout) -> tuple[Signal, int]:
     for row, col in pairs:
         if not (0 <= row < layout.rows and 0 <= col < layout.cols):
             raise InputError(
-                f"{table.where}: dead names taxel [{row}, {col}] outside of "
-                f"{layout.rows} x {layout.cols}"
+                f"{table.called('dead')} names taxel [{shown(row)}, {shown(col)}], which lies "
+                f"outside of {layout.rows} x {layout.cols}"
             )
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
@@ -233,7 +204,7 @@ def _signal(table: Table, layout: SkinLayout) -> tuple[Signal, int]:
     return signal, sign
 
 
-def _reading(table: Table) -> Reading:
+def _reading(table: ConfigTable) -> Reading:
     reading = Reading(
         rate_hz=table.number("rate_hz", 100.0, 0.1, 10_000.0),
         timeout_s=table.number("timeout_s", 0.02, 0.001, 10.0),
@@ -246,130 +217,7 @@ def _reading(table: Table) -> Reading:
     return reading
 
 
-def _bus(entry: object, index: int, layout: SkinLayout, sign: int, where: str) -> BusSpec:
-    table = Table(entry, f"{where}: bus {index}")
-    device = table.get("device")
-    if isinstance(device, bool) or not isinstance(device, int | str) or device == "":
-        raise table.fail("device", 'a bus\'s number or its path, like 1 or "/dev/i2c-1"')
-    clock_hz = table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
-    common = {key: table.get(key) for key in ("kind", "mux", "block", "bits", "decimation")}
-    chips = table.get("chips")
-    if not isinstance(chips, list) or not chips:
-        raise InputError(f"{table.where}: chips are missing; give a list of tables")
-    table.done()
-    given = {key: value for key, value in common.items() if value is not None}
-    specs = []
-    for i, chip in enumerate(chips):
-        place = f"{where}: bus {index} chip {i}"
-        if not isinstance(chip, Mapping):
-            raise InputError(f"{place} must be a table, not {chip!r}")
-        specs.append(_chip(Table({**given, **chip}, place), layout, sign))
-    return BusSpec(device_path(device), tuple(specs), clock_hz)
-
-
-def _chip(table: Table, layout: SkinLayout, sign: int) -> ChipSpec:
-    kind = table.get("kind")
-    if kind not in KINDS:
-        raise table.fail("kind", f"one of {', '.join(KINDS)}")
-    addresses = {"ad7147": ad7147.ADDRESSES, "mpr121": mpr121.ADDRESSES}
-    address = table.whole("address", None, addresses.get(kind, range(0x08, 0x78)))
-    mux = table.get("mux")
-    channel = table.get("channel")
-    if mux is not None:
-        mux = table.whole("mux", None, tca9548a.ADDRESSES)
-        channel = table.whole("channel", None, range(tca9548a.CHANNELS))
-    elif channel is not None:
-        raise InputError(f"{table.where}: channel needs mux, the mux's address")
-    bits = table.whole("bits", 16, block.BITS)
-    decimation = table.whole("decimation", 64, tuple(ad7147.DECIMATION))
-    taxels = _taxels(table, layout)
-    stages = {"ad7147": ad7147.STAGES, "mpr121": mpr121.ELECTRODES}.get(kind, len(taxels))
-    if len(taxels) != stages:
-        raise InputError(
-            f"{table.where}: names {len(taxels)} taxels, an {kind.upper()} has {stages} stages; "
-            "write [] for a stage that is none"
-        )
-    if not 1 <= len(taxels) <= block.MOST_TAXELS:
-        raise InputError(f"{table.where}: names {len(taxels)} taxels, at most {block.MOST_TAXELS}")
-    own = table.whole("sign", sign, (1, -1))
-    table.done()
-    return ChipSpec(kind, address, taxels, mux, channel, own, decimation, bits)
-
-
-def _taxels(table: Table, layout: SkinLayout) -> tuple[int, ...]:
-    """Flat indices from `taxels`, or from `first` and `block`, row by row."""
-    listed, first, extent = table.get("taxels"), table.get("first"), table.get("block")
-    places: list[tuple[int, int] | None] = []
-    if listed is not None:
-        if not isinstance(listed, list):
-            raise table.fail("taxels", "a list of [row, col]")
-        places += [None if entry == [] else table.pair("taxels", entry) for entry in listed]
-    elif first is not None and extent is not None:
-        row, col = table.pair("first", first)
-        high, wide = table.pair("block", extent)
-        if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
-            raise table.fail("block", f"[rows, cols] within {layout.rows} x {layout.cols}")
-        places += [(row + i, col + j) for i in range(high) for j in range(wide)]
-    else:
-        raise InputError(f"{table.where}: taxels are missing; give first and block, or taxels")
-    flat = []
-    for place in places:
-        if place is None:
-            flat.append(UNUSED)
-            continue
-        row, col = place
-        if not (0 <= row < layout.rows and 0 <= col < layout.cols):
-            raise InputError(
-                f"{table.where}: taxel [{row}, {col}] lies outside of {layout.rows} x {layout.cols}"
-            )
-        flat.append(row * layout.cols + col)
-    return tuple(flat)
-
-
-def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> None:
-    """Raise InputError where two chips claim one place or one taxel."""
-    owner: dict[int, str] = {}
-    devices: dict[str, int] = {}
-    for b, bus in enumerate(buses):
-        if bus.device in devices:
-            raise InputError(f"{where}: bus {b} has the device of bus {devices[bus.device]}")
-        devices[bus.device] = b
-        direct = {c.address for c in bus.chips if c.mux is None}
-        muxes = {c.mux for c in bus.chips if c.mux is not None}
-        if muxes and bus.clock_hz > FASTEST_MUX_HZ:
-            raise InputError(
-                f"{where}: bus {b}: clock_hz {bus.clock_hz} is more than a TCA9548A carries, "
-                f"{FASTEST_MUX_HZ}"
-            )
-        if direct & muxes:
-            raise InputError(
-                f"{where}: bus {b}: {min(direct & muxes):#04x} is a mux's address and a chip's"
-            )
-        seen: dict[tuple[int | None, int | None, int], int] = {}
-        for c, chip in enumerate(bus.chips):
-            place = (chip.mux, chip.channel, chip.address)
-            if place in seen:
-                raise InputError(
-                    f"{where}: bus {b} chip {c} has the same address as chip {seen[place]}, "
-                    f"{chip.route}"
-                )
-            if chip.mux is not None and chip.address in direct | muxes:
-                raise InputError(
-                    f"{where}: bus {b} chip {c}: {chip.address:#04x} answers before the mux too"
-                )
-            seen[place] = c
-            for taxel in chip.taxels:
-                if taxel == UNUSED:
-                    continue
-                if taxel in owner:
-                    row, col = divmod(taxel, layout.cols)
-                    raise InputError(
-                        f"{where}: bus {b} chip {c}: taxel [{row}, {col}] is {owner[taxel]}'s too"
-                    )
-                owner[taxel] = f"bus {b} chip {c}"
-
-
-def _calibration(table: Table, layout: SkinLayout) -> TaxelCalibration:
+def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
     arrays: dict[str, NDArray[np.float64]] = {}
     for key in ("baseline", "noise"):
         value = table.get(key)
@@ -381,7 +229,7 @@ def _calibration(table: Table, layout: SkinLayout) -> TaxelCalibration:
         wanted = (int,) if key == "baseline" else (int, float)
         if not shaped or any(isinstance(x, bool) or not isinstance(x, wanted) for x in flat):
             raise InputError(
-                f"{table.where}: {key} must be {layout.rows} rows of {layout.cols} "
+                f"{table.called(key)} must be {layout.rows} rows of {layout.cols} "
                 f"{'whole ' if key == 'baseline' else ''}numbers; calibrate again"
             )
         try:
@@ -389,9 +237,11 @@ def _calibration(table: Table, layout: SkinLayout) -> TaxelCalibration:
         except OverflowError:  # a whole number beyond all floats
             array = np.array(np.inf)
         if not (np.isfinite(array).all() and (array >= 0).all() and (array <= 65535).all()):
-            raise InputError(f"{table.where}: {key} has a value outside of 0 to 65535")
+            raise InputError(
+                f"{table.called(key)} has a value outside of 0 to 65535; calibrate again"
+            )
         arrays[key] = array
-    taken = table.get("taken")
+    taken = table.get("taken", None)
     if taken is not None and not isinstance(taken, datetime):
         raise table.fail("taken", "a date and time")
     table.done()

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from edge.config import ConfigTable, read_toml
 from edge.errors import InputError
 
 Vector = tuple[float, float, float]
@@ -153,21 +154,17 @@ class Chain:
         Raises:
             InputError: a key is unknown or missing, or a value makes no sense.
         """
-        if not isinstance(arm, Mapping):
-            raise InputError(f"{where}: an arm must be a table of base, tip and joints")
-        entries = arm.get("joint")
-        if not isinstance(entries, list) or not entries:
-            raise InputError(f"{where}: no [[joint]] given")
-        joints = [_joint_from(entry, i, where) for i, entry in enumerate(entries)]
-        unknown = set(arm) - {"base", "tip", "joint"}
-        if unknown:
-            raise InputError(
-                f"{where}: unknown key {sorted(unknown)[0]!r}; allowed: base, tip, joint"
-            )
+        return cls._from_table(ConfigTable(arm, where))
+
+    @classmethod
+    def _from_table(cls, table: ConfigTable) -> Chain:
+        joints = [_joint_from(joint, i) for i, joint in enumerate(table.tables("joint", "joint"))]
+        base, tip = table.text("base", "base"), table.text("tip", "tip")
+        table.done()
         try:
-            return cls(joints, str(arm.get("base", "base")), str(arm.get("tip", "tip")))
+            return cls(joints, base, tip)
         except InputError as error:
-            raise InputError(f"{where}: {error}") from None
+            raise InputError(f"{table.where}: {error}") from None
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Chain:
@@ -176,16 +173,7 @@ class Chain:
         Raises:
             InputError: the file cannot be read, or is not a chain.
         """
-        import tomllib  # a model brings its arm along: most runs read no such file
-
-        try:
-            with open(path, "rb") as file:
-                arm = tomllib.load(file)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: not TOML: {error}") from None
-        return cls.from_dict(arm, where=str(path))
+        return cls._from_table(read_toml(path))
 
     @classmethod
     def cody(cls) -> Chain:
@@ -287,57 +275,28 @@ def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
     )
 
 
-def _vector(value: object, name: str, where: str) -> Vector:
-    if (
-        not isinstance(value, list | tuple)
-        or len(value) != 3
-        or any(isinstance(x, bool) or not isinstance(x, int | float) for x in value)
-    ):
-        raise InputError(f"{where}: {name} must be three numbers, not {value!r}")
-    x, y, z = map(float, value)
-    return x, y, z
-
-
-def _joint_from(entry: object, index: int, where: str) -> Joint:
-    if not isinstance(entry, Mapping):
-        raise InputError(f"{where}: joint {index} must be a table")
-    allowed = (
-        "name",
-        "type",
-        "axis",
-        "origin_xyz",
-        "origin_rpy",
-        "translate",
-        "limits",
-        "limits_deg",
-    )
-    unknown = set(entry) - set(allowed)
-    if unknown:
-        raise InputError(
-            f"{where}: joint {index} has an unknown key {sorted(unknown)[0]!r}; "
-            f"allowed: {', '.join(allowed)}"
-        )
-    name = str(entry.get("name", f"joint {index}"))
-    place = f"{where}: joint {name}"
-    if "axis" not in entry:
-        raise InputError(f"{place}: axis is missing")
-    vectors = {
-        key: _vector(entry[key], key, place)
-        for key in ("origin_xyz", "origin_rpy", "translate")
-        if key in entry
-    }
-    limits: tuple[float, float] | None = None
+def _joint_from(table: ConfigTable, index: int) -> Joint:
+    name = table.text("name", f"joint {index}")
+    steps: dict[str, Vector] = {}
+    for key in ("origin_xyz", "origin_rpy", "translate"):
+        if table.has(key):
+            steps[key] = _vector(table, key)
+    limits = None
     for key, unit in (("limits", 1.0), ("limits_deg", math.pi / 180.0)):
-        if key in entry:
-            pair = entry[key]
-            if not isinstance(pair, list) or len(pair) != 2:
-                raise InputError(f"{place}: {key} must be [lower, upper], not {pair!r}")
-            lower, upper, _ = _vector([*pair, 0.0], key, place)
+        if table.has(key):
+            lower, upper = table.numbers(key, 2)
             limits = (lower * unit, upper * unit)
-    return Joint(
+    joint = Joint(
         name=name,
-        axis=_vector(entry["axis"], "axis", place),
-        kind=str(entry.get("type", "revolute")),
+        axis=_vector(table, "axis"),
+        kind=table.choice("type", (*MOVING, "fixed"), "revolute"),
         limits=limits,
-        **vectors,
+        **steps,
     )
+    table.done()
+    return joint
+
+
+def _vector(table: ConfigTable, key: str) -> Vector:
+    x, y, z = table.numbers(key, 3)
+    return x, y, z

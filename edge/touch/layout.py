@@ -11,15 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.config import ConfigTable
 from edge.errors import InputError
-
-
-def _number(name: str, value: object, low: float, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{where}: skin.{name} must be a finite number, not {value!r}")
-    if value <= low:
-        raise InputError(f"{where}: skin.{name} must be above {low:g}, not {value!r}")
-    return float(value)
 
 
 @dataclass(frozen=True)
@@ -145,47 +138,28 @@ class SkinLayout:
         Raises:
             InputError: a value is missing or makes no sense; `where` names the file.
         """
-        if not isinstance(skin, Mapping):
-            raise InputError(f"{where}: skin must be an object, not {skin!r}")
+        table = ConfigTable(skin, where, "skin.")
         known: dict[str, Any] = {}
-        for name in ("rows", "cols", "threshold_counts", "onset_counts"):
-            value = skin.get(name)
-            if value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 65535:
-                raise InputError(
-                    f"{where}: skin.{name} must be a whole number of 0 to 65535, not {value!r}"
-                )
-            known[name] = value
         for name in ("rows", "cols"):
-            if name not in known:
-                raise InputError(f"{where}: skin.{name} is missing")
-        wraps = skin.get("wraps", False)
-        if not isinstance(wraps, bool):
-            raise InputError(f"{where}: skin.wraps must be true or false, not {wraps!r}")
-        known["wraps"] = wraps
+            known[name] = table.whole(name, allowed=range(65536))
+        for name in ("threshold_counts", "onset_counts"):
+            if table.has(name):
+                known[name] = table.whole(name, allowed=range(65536))
+        known["wraps"] = table.flag("wraps", False)
         for name in ("radius_m", "counts_per_newton"):
-            if skin.get(name) is not None:
-                known[name] = _number(name, skin[name], 0.0, where)
-        if skin.get("row0_z_m") is not None:
-            known["row0_z_m"] = _number("row0_z_m", skin["row0_z_m"], -math.inf, where)
-        pitch = skin.get("pitch_m")
-        if isinstance(pitch, list | tuple):
-            if len(pitch) != 2:
-                raise InputError(f"{where}: skin.pitch_m must be one number or two, not {pitch!r}")
-            known["pitch_m"] = tuple(_number("pitch_m", p, 0.0, where) for p in pitch)
-        elif pitch is not None:
-            known["pitch_m"] = _number("pitch_m", pitch, 0.0, where)
-        angles = skin.get("column_angles_deg")
-        if angles is not None:
-            if not isinstance(angles, list | tuple):
-                raise InputError(f"{where}: skin.column_angles_deg must be a list")
-            known["column_angles_deg"] = tuple(
-                _number("column_angles_deg", a, -math.inf, where) for a in angles
-            )
-        dead = skin.get("dead", ())
+            if table.has(name):
+                known[name] = table.number(name, low=0.0, open_low=True)
+        if table.has("row0_z_m"):
+            known["row0_z_m"] = table.number("row0_z_m")
+        if isinstance(table.get("pitch_m", None), list | tuple):
+            known["pitch_m"] = table.numbers("pitch_m", 2, low=0.0, open_low=True)
+        elif table.has("pitch_m"):
+            known["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
+        if table.has("column_angles_deg"):
+            known["column_angles_deg"] = table.numbers("column_angles_deg")
+        dead = table.get("dead", ())
         if not isinstance(dead, list | tuple) or not all(type(i) is int for i in dead):
-            raise InputError(f"{where}: skin.dead must be a list of flat taxel indices")
+            raise table.fail("dead", "a list of flat taxel indices")
         known["dead"] = tuple(dead)
         try:
             return cls(**known)

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 from edge.errors import InputError
+from edge.files import parsing, read_bytes
 
 
 def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[dict[str, Any]]:
@@ -16,12 +17,8 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[di
     Raises:
         InputError: the file cannot be read, or no chain leads from `base` to `tip`.
     """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise InputError(f"{path}: not a URDF file: {error}") from None
+    with parsing(os.fspath(path), "a URDF file"):
+        root = ElementTree.fromstring(read_bytes(path))
     if root.tag != "robot":
         raise InputError(f"{path}: not a URDF file: its root is <{root.tag}>, not <robot>")
     links = [link.get("name") for link in root.findall("link")]

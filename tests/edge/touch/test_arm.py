@@ -140,18 +140,15 @@ def test_a_urdf_whose_links_go_round_in_a_loop_ends(tmp_path):
     ("text", "word"),
     [
         ("x = ", "not TOML"),
-        ("", r"no \[\[joint\]\]"),
-        ("speed = 1\n[[joint]]\naxis = [0, 0, 1]", "unknown key 'speed'"),
+        ("", "joint must be a list of tables"),
+        ("speed = 1\n[[joint]]\naxis = [0, 0, 1]", "unknown key speed"),
         ("[[joint]]\nname = 'j'", "axis is missing"),
-        ("[[joint]]\naxis = [0, 0]", "three numbers"),
+        ("[[joint]]\naxis = [0, 0]", "a list of 3 numbers"),
         ("[[joint]]\naxis = [0, 0, 0]", "axis is zero"),
-        ("[[joint]]\naxis = [0, 0, inf]", "not finite"),
-        (
-            "[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]",
-            "its lower limit 0.0523599 exceeds its upper limit 0.0174533",
-        ),
-        ("[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'", "'ball' is not one of"),
-        ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "unknown key 'offset'; allowed: name"),
+        ("[[joint]]\naxis = [0, 0, inf]", "a finite number, not inf"),
+        ("[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]", "its lower limit 0.0523599 exceeds its upper"),
+        ("[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'", "type must be one of .* not 'ball'"),
+        ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "joint 0: unknown key offset; allowed: name"),
     ],
 )
 def test_a_wrong_toml_chain_is_named(text, word, tmp_path):

@@ -1,0 +1,158 @@
+"""The `[[bus]]` tables of a skin's file: which chip is where, and which taxels it serves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from edge.config import ConfigTable, shown
+from edge.errors import InputError
+from edge.i2c import ad7147, block, mpr121, tca9548a
+from edge.i2c.bus import device_path
+from edge.skin.file import UNUSED, BusSpec, ChipSpec
+from edge.touch.layout import SkinLayout
+
+KINDS = ("ad7147", "mpr121", "block")
+FASTEST_MUX_HZ = 400_000
+ADDRESSES = range(0x08, 0x78)
+"""7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
+SHARED = ("kind", "mux", "block", "bits", "decimation")
+"""Keys that a bus may give for all its chips."""
+
+
+def read_buses(tables: Sequence[ConfigTable], layout: SkinLayout, sign: int) -> tuple[BusSpec, ...]:
+    """The buses of a skin.
+
+    Args:
+        tables: one for each bus.
+        layout: the skin's.
+        sign: of a chip that has none of its own.
+
+    Raises:
+        InputError: a value makes no sense, or two chips claim one address or one taxel.
+    """
+    buses = tuple(_bus(table, layout, sign) for table in tables)
+    _check_buses(buses, layout, tables[0].where)
+    return buses
+
+
+def _bus(table: ConfigTable, layout: SkinLayout, sign: int) -> BusSpec:
+    device = table.get("device", None)
+    number = type(device) is int and 0 <= device < 1 << 20
+    if not number and not (isinstance(device, str) and device and "\0" not in device):
+        raise table.fail("device", 'the number of a bus or its path, like 1 or "/dev/i2c-1"')
+    clock_hz = table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
+    shared = {key: table.raw[key] for key in SHARED if table.has(key)}
+    chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
+    table.done()
+    specs = [
+        _chip(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix), layout, sign)
+        for chip in chips
+    ]
+    return BusSpec(device_path(device), tuple(specs), clock_hz)
+
+
+def _chip(table: ConfigTable, layout: SkinLayout, sign: int) -> ChipSpec:
+    kind = table.choice("kind", KINDS)
+    addresses = {"ad7147": ad7147.ADDRESSES, "mpr121": mpr121.ADDRESSES}.get(kind, ADDRESSES)
+    address = table.whole("address", allowed=addresses, form="#04x")
+    mux = channel = None
+    if table.has("mux"):
+        mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")
+        channel = table.whole("channel", allowed=range(tca9548a.CHANNELS))
+    elif table.has("channel"):
+        raise InputError(f"{table.called('channel')} needs mux, the address of the mux")
+    bits = table.whole("bits", 16, block.BITS)
+    decimation = table.whole("decimation", 64, tuple(ad7147.DECIMATION))
+    taxels = _taxels(table, layout)
+    stages = {"ad7147": ad7147.STAGES, "mpr121": mpr121.ELECTRODES}.get(kind, len(taxels))
+    if len(taxels) != stages:
+        raise InputError(
+            f"{table.called('taxels')} names {len(taxels)} taxels, but an {kind.upper()} has "
+            f"{stages} stages; write [] for a stage that is no taxel"
+        )
+    if not 1 <= len(taxels) <= block.MOST_TAXELS:
+        raise InputError(
+            f"{table.called('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
+            f"{block.MOST_TAXELS}"
+        )
+    own = table.whole("sign", sign, (1, -1))
+    table.done()
+    return ChipSpec(kind, address, taxels, mux, channel, own, decimation, bits)
+
+
+def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
+    """Flat indices from `taxels`, or from `first` and `block`, row by row."""
+    taxels: list[tuple[int, int] | None] = []
+    given = [table.has(key) for key in ("taxels", "first", "block")]
+    if given[0]:
+        listed = table.get("taxels")
+        if not isinstance(listed, list):
+            raise table.fail("taxels", "a list of [row, col]")
+        taxels += [None if entry == [] else table.pair("taxels", entry) for entry in listed]
+    elif all(given[1:]):
+        row, col = table.pair("first")
+        high, wide = table.pair("block")
+        if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
+            raise table.fail("block", f"[rows, cols] within {layout.rows} x {layout.cols}")
+        taxels += [(row + i, col + j) for i in range(high) for j in range(wide)]
+    else:
+        raise InputError(f"{table.called('taxels')} is missing; give it, or first and block")
+    flat = []
+    for taxel in taxels:
+        if taxel is None:
+            flat.append(UNUSED)
+            continue
+        row, col = taxel
+        if not (0 <= row < layout.rows and 0 <= col < layout.cols):
+            raise InputError(
+                f"{table.called('taxel')} [{shown(row)}, {shown(col)}] lies outside "
+                f"of {layout.rows} x {layout.cols}"
+            )
+        flat.append(row * layout.cols + col)
+    return tuple(flat)
+
+
+def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> None:
+    """Raise InputError where two chips claim one address or one taxel."""
+    owner: dict[int, str] = {}
+    devices: dict[str, int] = {}
+    for b, bus in enumerate(buses):
+        if bus.device in devices:
+            raise InputError(f"{where}: bus {b} has the same device as bus {devices[bus.device]}")
+        devices[bus.device] = b
+        direct = {c.address for c in bus.chips if c.mux is None}
+        muxes = {c.mux for c in bus.chips if c.mux is not None}
+        if muxes and bus.clock_hz > FASTEST_MUX_HZ:
+            raise InputError(
+                f"{where}: bus {b}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most "
+                f"{FASTEST_MUX_HZ}"
+            )
+        if direct & muxes:
+            raise InputError(
+                f"{where}: bus {b}: a mux and a chip have the same address, "
+                f"{min(direct & muxes):#04x}"
+            )
+        seen: dict[tuple[int | None, int | None, int], int] = {}
+        for c, chip in enumerate(bus.chips):
+            route = (chip.mux, chip.channel, chip.address)
+            if route in seen:
+                raise InputError(
+                    f"{where}: bus {b} chip {c} has the same address as chip {seen[route]}, "
+                    f"{chip.route}"
+                )
+            if chip.mux is not None and chip.address in direct | muxes:
+                raise InputError(
+                    f"{where}: bus {b} chip {c}: another chip, in front of the mux, has the same "
+                    f"address {chip.address:#04x}"
+                )
+            seen[route] = c
+            for taxel in chip.taxels:
+                if taxel == UNUSED:
+                    continue
+                if taxel in owner:
+                    row, col = divmod(taxel, layout.cols)
+                    raise InputError(
+                        f"{where}: bus {b} chip {c}: taxel [{row}, {col}] belongs to "
+                        f"{owner[taxel]} already"
+                    )
+                owner[taxel] = f"bus {b} chip {c}"
