@@ -9,7 +9,8 @@ import json
 import math
 import os
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from edge.errors import InputError
@@ -72,6 +73,19 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         InputError: it cannot be read, or is not JSON.
     """
     return parse_json(read_bytes(path), os.fspath(path))
+
+
+@contextmanager
+def json_file(path: str | os.PathLike[str], what: str, mend: str) -> Iterator[Any]:
+    """The value that a JSON file holds, to be taken apart in the block.
+
+    Raises:
+        InputError: it cannot be read; or it is no JSON, or the block raised what a missing key
+            or a wrong type raises: then it is not `what`, and `mend` says how to make one.
+    """
+    text = read_bytes(path)
+    with parsing(os.fspath(path), what, f"; {mend}"):
+        yield _DECODER.decode(text.decode())
 
 
 def parse_toml(text: str, where: str) -> ConfigTable:
@@ -240,6 +254,13 @@ class ConfigTable:
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or not all(isinstance(x, str) for x in value):
             raise self.fail(key, "a list of texts")
+        return tuple(value)
+
+    def wholes(self, key: str, default: Any = REQUIRED) -> tuple[int, ...]:
+        """A list of whole numbers."""
+        value = self.get(key, default)
+        if not isinstance(value, list | tuple) or not all(type(x) is int for x in value):
+            raise self.fail(key, "a list of whole numbers")
         return tuple(value)
 
     def pair(self, key: str, value: object = REQUIRED) -> tuple[int, int]:

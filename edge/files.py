@@ -35,6 +35,8 @@ def parsing(name: str, what: str, mend: str = "") -> Iterator[None]:
         raise InputError(f"{name}: not {what}: it is nested too deeply{mend}") from None
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
+    except KeyError as error:
+        raise InputError(f"{name}: not {what}: {error} is missing{mend}") from None
     except Exception as error:
         reason = str(error)[:200] or type(error).__name__
         raise InputError(f"{name}: not {what}: {reason}{mend}") from None
@@ -51,11 +53,10 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
     try:
         # Without O_NONBLOCK, opening a FIFO waits for someone to write to it.
         handle = os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
-    except ValueError as error:  # a NUL in the name
-        raise InputError(f"{name}: cannot be read: {error}") from None
-    with open(handle, "rb") as file:
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{name}: cannot be read: {reason}") from None
+    try:
         status = os.fstat(handle)
         if stat.S_ISDIR(status.st_mode):
             raise InputError(f"{name}: cannot be read: it is a folder")
@@ -65,7 +66,10 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
             raise InputError(
                 f"{name}: has {status.st_size} bytes; at most {at_most} are read from such a file"
             )
-        yield file
+        with open(handle, "rb", closefd=False) as file:
+            yield file
+    finally:
+        os.close(handle)
 
 
 def read_bytes(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> bytes:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from edge.config import json_file
 from edge.errors import InputError
 from train.projection import SCALINGS
 
@@ -53,8 +53,7 @@ class ParetoFront:
         Raises:
             InputError: the file cannot be read, or is not a front.json.
         """
-        try:
-            found = json.loads(path.read_bytes())
+        with json_file(path, "a front.json", "make one with `make tradeoff`") as found:
             points = [
                 OperatingPoint(
                     window_s=float(point["window_s"]),
@@ -66,12 +65,6 @@ class ParetoFront:
                 for point in found["points"]
             ]
             task = str(found["task"])
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-        except (KeyError, RecursionError, TypeError, ValueError):
-            raise InputError(
-                f"{path}: is not a front.json; make one with `make tradeoff`"
-            ) from None
         if not points or not all(point.scaling in SCALINGS for point in points):
             raise InputError(f"{path}: has no point to choose from; make one with `make tradeoff`")
         return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from edge.config import ConfigTable, parse_json, shown
 from edge.errors import EdgeError, InputError
 from edge.model import onnx_file as onnxfile
 from edge.touch import measures
@@ -110,44 +111,38 @@ class ModelInfo:
         Raises:
             InputError: something is missing or of the wrong kind; the sentence names `name`.
         """
+        where = f"{name}: its metadata"
         try:
-            meta = json.loads(text)
-            if meta["format"] != FORMAT:
+            meta = ConfigTable(parse_json(text, where), where)
+            if meta.whole("format") != FORMAT:
                 raise InputError(
-                    f"{name}: its format is {meta['format']}, this edge-classify reads {FORMAT}; "
-                    "export it with the same version"
+                    f"{where} is of format {shown(meta.raw['format'])}, this edge-classify reads "
+                    f"{FORMAT}"
                 )
+            tasks, tracking = meta.table("tasks"), meta.table("tracking")
             info = cls(
-                tasks={
-                    str(task): Task(
-                        labels=tuple(map(str, entry["labels"])),
-                        k=int(entry["k"]),
-                        components=int(entry["components"]),
-                        scaling=str(entry["scaling"]),
-                        accuracy=float(entry["accuracy"]),
-                    )
-                    for task, entry in meta["tasks"].items()
-                },
-                layout=SkinLayout.from_dict(meta["skin"], where=name),
-                tracking=TrackSettings(**meta["tracking"]),
-                window_s=float(meta["window_s"]),
-                samples=int(meta["samples"]),
-                features=tuple(map(str, meta["features"])),
-                units={str(k): str(v) for k, v in meta["units"].items()},
-                motion_frame=str(meta["motion_frame"]),
-                chain=None if meta["arm"] is None else Chain.from_dict(meta["arm"], where=name),
-                rows=int(meta["rows"]),
-                data_digest=str(meta["data_digest"]),
-                versions={str(k): str(v) for k, v in meta.get("versions", {}).items()},
-                decision_points_s=tuple(map(float, meta.get("decision_points_s", ()))),
-                folds=tuple(map(int, meta.get("folds", ()))),
+                tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
+                layout=SkinLayout.from_dict(meta.get("skin"), where=where),
+                tracking=TrackSettings(
+                    tracking.whole("debounce", allowed=range(1, 1001)),
+                    tracking.whole("release", allowed=range(1, 1001)),
+                    tracking.whole("connectivity", allowed=(4, 8)),
+                ),
+                window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
+                samples=meta.whole("samples", allowed=range(2, 10_001)),
+                features=meta.texts("features"),
+                units={str(k): str(v) for k, v in meta.table("units").raw.items()},
+                motion_frame=meta.choice("motion_frame", ("world", "skin")),
+                chain=Chain.from_dict(meta.get("arm"), where=where) if meta.has("arm") else None,
+                rows=meta.whole("rows"),
+                data_digest=meta.text("data_digest"),
+                versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
+                decision_points_s=meta.numbers("decision_points_s", default=()),
+                folds=tuple(meta.wholes("folds", default=())),
             )
-        except InputError:
-            raise
-        except KeyError as error:
-            raise InputError(f"{name}: its metadata lacks {error}; export it again") from None
-        except (TypeError, ValueError, AttributeError, RecursionError):
-            raise InputError(f"{name}: its metadata cannot be read; export it again") from None
+            tracking.done()
+        except InputError as error:
+            raise InputError(f"{error}; export it again") from None
         info._check(name)
         return info
 
@@ -159,10 +154,8 @@ class ModelInfo:
                 f"{name}: was made for the features {', '.join(self.features)}; {error}; "
                 "export it with this version of edge-classify"
             ) from None
-        if not self.tasks or not all(task.labels for task in self.tasks.values()):
-            raise InputError(f"{name}: its metadata names no task or no label; export it again")
-        if not (0.0 < self.window_s <= 3600.0 and 2 <= self.samples <= 10000):
-            raise InputError(f"{name}: its window or samples make no sense; export it again")
+        if not self.tasks:
+            raise InputError(f"{name}: its metadata names no task; export it again")
         if self.decision_points_s:
             before = (0.0, *self.decision_points_s[:-1])
             rising = all(a < b for a, b in zip(before, self.decision_points_s, strict=True))
@@ -174,6 +167,21 @@ class ModelInfo:
                 raise InputError(f"{name}: its decision points make no sense; export it again")
         if (self.motion_frame == "world") != (self.chain is not None):
             raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
+
+
+def _task(table: ConfigTable) -> Task:
+    labels = table.texts("labels")
+    if not labels:
+        raise table.fail("labels", "a list of at least one text")
+    task = Task(
+        labels,
+        k=table.whole("k", allowed=range(1, 1 << 31)),
+        components=table.whole("components", allowed=range(1, 1 << 31)),
+        scaling=table.text("scaling"),
+        accuracy=table.number("accuracy", low=0.0, high=1.0),
+    )
+    table.done()
+    return task
 
 
 class Decision(NamedTuple):

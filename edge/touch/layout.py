@@ -157,10 +157,7 @@ class SkinLayout:
             known["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
         if table.has("column_angles_deg"):
             known["column_angles_deg"] = table.numbers("column_angles_deg")
-        dead = table.get("dead", ())
-        if not isinstance(dead, list | tuple) or not all(type(i) is int for i in dead):
-            raise table.fail("dead", "a list of flat taxel indices")
-        known["dead"] = tuple(dead)
+        known["dead"] = table.wholes("dead", ())
         try:
             return cls(**known)
         except InputError as error:

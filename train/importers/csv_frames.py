@@ -7,7 +7,6 @@ are not their times in seconds; `FOLDER/labels.csv` has the columns `trial` and 
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.config import read_json
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.touch.arm import Chain
@@ -60,10 +60,7 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
 def _skin(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
-    try:
-        skin = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: cannot be read as JSON: {error}") from None
+    skin = read_json(path)
     if not isinstance(skin, dict):
         raise InputError(f"{path}: must be a JSON object, the skin of a recording")
     return skin

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.config import read_json
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.touch.arm import Chain, joint_columns
@@ -65,10 +66,7 @@ class Log:
         beside = path.with_name(path.stem + ".json")
         if not beside.is_file():
             return cls(path, {}, arm)
-        try:
-            said = json.loads(beside.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError) as error:
-            raise InputError(f"{beside}: cannot be read as JSON: {error}") from None
+        said = read_json(beside)
         if not isinstance(said, dict):
             raise InputError(f"{beside}: must be a JSON object with labels, skin, arm")
         if arm is None and "arm" in said:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 
+from edge.config import json_file
 from edge.errors import InputError
 
 STAGES = ("track", "features", "decision")
@@ -50,13 +50,8 @@ def read(path: str | os.PathLike[str]) -> Board:
         InputError: it is missing, or is none; the sentence names it.
     """
     name = os.fspath(path)
-    try:
-        with open(name, "rb") as file:
-            text = file.read(1 << 20)
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
-    try:
-        found = json.loads(text)
+    mend = f"make one with `edge-classify bench --out {name}`"
+    with json_file(name, "a board file", mend) as found:
         board = Board(
             name=f"{found['machine']['kind']} ({found['machine']['name']})",
             digest=str(found["model"]["data_digest"]),
@@ -71,10 +66,6 @@ def read(path: str | os.PathLike[str]) -> Board:
         )
         if board.features < 1 or not all(0.0 < board.stages_us[s][0] < 1e9 for s in STAGES):
             raise ValueError("a stage takes no time")
-    except (AttributeError, KeyError, RecursionError, TypeError, ValueError):
-        raise InputError(
-            f"{name}: not a board file; make one with `edge-classify bench --out {name}`"
-        ) from None
     return board
 
 

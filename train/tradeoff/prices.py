@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.config import json_file
 from edge.errors import InputError
 from train.crossval import MAX_K, accuracies, neighbours
 from train.dataset import DataSet
@@ -64,9 +64,8 @@ def read(path: str | os.PathLike[str], digest: str) -> Prices:
         InputError: it is missing, is none, or is of other recordings.
     """
     name = os.fspath(path)
-    try:
-        with open(name, "rb") as file:
-            found = json.loads(file.read(1 << 20))
+    mend = f"make one with `python -m export.prices --out {name}`"
+    with json_file(name, "a prices file", mend) as found:
         decisions = tuple(
             Price(
                 rows=int(one["rows"]),
@@ -82,12 +81,6 @@ def read(path: str | os.PathLike[str], digest: str) -> Prices:
         numbers = [(d.rows, d.components, d.k, d.us, d.kilobytes) for d in decisions]
         if not numbers or not all(0 < x < 1e12 for row in numbers for x in row):
             raise ValueError("no decision, or one of no size")
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
-    except (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError):
-        raise InputError(
-            f"{name}: not a prices file; make one with `python -m export.prices --out {name}`"
-        ) from None
     if prices.digest != digest:
         raise InputError(
             f"{name}: is of other recordings (digest {prices.digest[:12]}, these have "

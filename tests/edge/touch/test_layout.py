@@ -73,7 +73,7 @@ def test_metadata_round_trip():
         ({"threshold_counts": 50, "onset_counts": 40}, "below"),
         ({"column_angles_deg": [0.0]}, "1 values"),
         ({"dead": [12]}, "dead has a taxel"),
-        ({"dead": [1.5]}, "flat taxel indices"),
+        ({"dead": [1.5]}, "skin.dead must be a list of whole numbers"),
     ],
 )
 def test_what_makes_no_sense_names_its_key_and_the_file(change, word):
