@@ -235,10 +235,10 @@ class ConfigTable:
             raise self.fail(key, "true or false")
         return value
 
-    def text(self, key: str, default: Any = REQUIRED) -> str:
-        """Text that is not empty."""
+    def text(self, key: str, default: Any = REQUIRED, *, empty: bool = False) -> str:
+        """Text, which may be blank only where `empty`."""
         value = self.get(key, default)
-        if not isinstance(value, str) or not value.strip():
+        if not isinstance(value, str) or not (empty or value.strip()):
             raise self.fail(key, "text")
         return value
 

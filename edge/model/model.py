@@ -135,7 +135,7 @@ class ModelInfo:
                 motion_frame=meta.choice("motion_frame", ("world", "skin")),
                 chain=Chain.from_dict(meta.get("arm"), where=where) if meta.has("arm") else None,
                 rows=meta.whole("rows"),
-                data_digest=meta.text("data_digest"),
+                data_digest=meta.text("data_digest", empty=True),
                 versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
                 decision_points_s=meta.numbers("decision_points_s", default=()),
                 folds=tuple(meta.wholes("folds", default=())),
@@ -176,7 +176,7 @@ def _task(table: ConfigTable) -> Task:
     task = Task(
         labels,
         k=table.whole("k", allowed=range(1, 1 << 31)),
-        components=table.whole("components", allowed=range(1, 1 << 31)),
+        components=table.whole("components", allowed=range(1 << 31)),
         scaling=table.text("scaling"),
         accuracy=table.number("accuracy", low=0.0, high=1.0),
     )

@@ -45,23 +45,6 @@ def test_the_mpr121_example_covers_its_pad():
     assert {chip.sign for chip in pad.chips} == {-1}
 
 
-def test_first_and_block_number_the_stages_row_by_row():
-    chip = skinfile.parse(SMALL).buses[0].chips[1]
-    assert chip.taxels == (3, 4, 5, 9, 10, 11, 15, 16, 17, 21, 22, 23)
-    assert (chip.kind, chip.mux, chip.channel, chip.address) == ("ad7147", 0x70, 0, 0x2D)
-
-
-def test_taxels_name_each_stage_and_an_empty_one_is_none():
-    listed = ", ".join(f"[{i // 3}, {i % 3}]" for i in range(11)) + ", []"
-    text = SMALL.replace(
-        "{ channel = 0, address = 0x2C, first = [0, 0] }",
-        f"{{ channel = 0, address = 0x2C, taxels = [{listed}] }}",
-    )
-    file = skinfile.parse(text)
-    assert file.chips[0].taxels == (0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, skinfile.UNUSED)
-    assert file.uncovered == 1
-
-
 def test_what_is_not_said_has_a_default():
     assert skinfile.parse(SMALL).reading == Reading()
 
@@ -69,7 +52,6 @@ def test_what_is_not_said_has_a_default():
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("rows = 4", "rows = 0", "skin: 0 x 6 taxels"),
         ("rows = 4", "", "skin.rows is missing"),
         ("rows = 4", "rows = 4\nrwos = 3", "unknown key skin.rwos; allowed: name, rows"),
         ("sign = -1", "sign = 0", "signal.sign must be one of 1, -1, not 0"),
@@ -82,24 +64,6 @@ def test_what_is_not_said_has_a_default():
             "[reed]\n[signal]",
             "unknown key reed; allowed: skin, signal, read, bus, calibration",
         ),
-        ("device = 1", "", "bus 0: device must be the number of a bus or its path"),
-        (
-            "device = 1",
-            "device = 1\nclock_hz = 1000000",
-            "is 1000000; a TCA9548A carries at most 400000",
-        ),
-        ('kind = "ad7147"', 'kind = "adxl"', "bus 0 chip 0: kind must be one of ad7147"),
-        ("mux = 0x70", "mux = 0x60", "bus 0 chip 0: mux must be 0x70 to 0x77, not 96"),
-        ("mux = 0x70", "", "bus 0 chip 0: channel needs mux"),
-        ("channel = 0, address = 0x2D", "channel = 8, address = 0x2D", "channel must be a whole"),
-        ("address = 0x2D", "address = 0x2C", "bus 0 chip 1 has the same address as chip 0"),
-        ("address = 0x2D", "address = 0x5A", "bus 0 chip 1: address must be 0x2c to 0x2f, not 90"),
-        ("address = 0x2D, ", "", "bus 0 chip 1: address is missing"),
-        ("first = [0, 3]", "first = [0, 2]", "taxel [0, 2] belongs to bus 0 chip 0 already"),
-        ("first = [0, 3]", "first = [0, 4]", "bus 0 chip 1: taxel [0, 6] lies outside of 4 x 6"),
-        ("first = [0, 3]", "first = 3", "bus 0 chip 1: first must be [row, col], not 3"),
-        ("block = [4, 3]", "block = [4, 2]", "names 8 taxels, but an AD7147 has 12 stages"),
-        ("chips = [", "chip = [", "bus 0: chips must be a list of tables, not []"),
         ("[[bus]]", "[bus]", "bus must be a list of tables"),
         ("[skin]", "[skin", "not TOML"),
     ],

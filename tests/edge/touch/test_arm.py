@@ -148,10 +148,10 @@ def test_a_urdf_whose_links_go_round_in_a_loop_ends(tmp_path):
         ("[[joint]]\naxis = [0, 0, inf]", "a finite number, not inf"),
         (
             "[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]",
-            "its lower limit 0.0523599 exceeds its upper",
+            "lower limit 0.0523599 exceeds",
         ),
         ("[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'", "type must be one of .* not 'ball'"),
-        ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "joint 0: unknown key offset; allowed: name"),
+        ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "joint 0: unknown key offset"),
     ],
 )
 def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
