@@ -128,6 +128,7 @@ class Classifier:
             chain=info.chain,
             horizon_s=info.window_s,
             features=info.features,
+            joints=info.joints,
             max_contacts=max_contacts,
             motion_on_skin=motion_on_skin,
         )

@@ -260,6 +260,7 @@ def describe(
         units=dataset.units,
         motion_frame="skin" if dataset.chain is None else "world",
         chain=dataset.chain,
+        joints=dataset.joints,
         rows=len(dataset.trials),
         data_digest=dataset.digest,
         versions={

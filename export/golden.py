@@ -105,7 +105,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         "series_counts": np.concatenate([s.integers for _, s in found]),
         "vectors": vectors,
     }
-    if info.chain is not None:
+    if info.dof is not None:
         arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
     answers = outputs(model, vectors)
     arrays |= {f"{task}_{what}": answers[f"{task}_{what}"] for task, what in wanted(model)}

@@ -59,6 +59,8 @@ class DataSet:
     untouched: tuple[Path, ...]
     digest: str
     names: tuple[str, ...] = FEATURES
+    joints: int = 0
+    """Joint angles of a frame, where a feature is made of them."""
 
     @property
     def tasks(self) -> tuple[str, ...]:
@@ -101,6 +103,8 @@ def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Ch
         return None
     dof = recording.joints.shape[1]
     arm = recording.meta.get("arm")
+    if "arm" in recording.meta and arm is None:
+        return None  # the joints are not those of an arm that carries the skin
     if arm is not None:
         chain = Chain.from_dict(arm, where=f"{where}: meta.arm")
     elif unnamed is not None:
@@ -197,6 +201,9 @@ def load_trials(
         for other, path in zip(arms, paths, strict=True):
             if other is not None and other.to_dict() != chain.to_dict():
                 raise InputError(f"{path}: its arm is not that of {paths[0]}; train on one arm")
+    joints = 0
+    if any(measures.feature(name).of_joints for name in names):
+        joints = _joint_angles(recordings, paths)
     settings = tracking or TrackSettings()
     trials: list[Trial] = []
     untouched: list[Path] = []
@@ -205,7 +212,12 @@ def load_trials(
         try:
             layout = for_device(reference, recording.layout)
             tracker = ContactTracker(
-                layout, settings, chain=chain, horizon_s=horizon_s, features=names
+                layout,
+                settings,
+                chain=chain,
+                horizon_s=horizon_s,
+                features=names,
+                joints=joints,
             )
             found = first_contact(recording, tracker)
         except InputError as error:
@@ -219,12 +231,25 @@ def load_trials(
             f"no contact in any of {len(paths)} recordings; lower the threshold "
             f"of {reference.threshold_counts} counts"
         )
-    dataset = DataSet(tuple(trials), reference, settings, chain, tuple(untouched), digest, names)
+    dataset = DataSet(
+        tuple(trials), reference, settings, chain, tuple(untouched), digest, names, joints
+    )
     if not dataset.tasks:
         raise InputError(
             "the recordings share no label; give every one the same keys under meta.labels"
         )
     return dataset
+
+
+def _joint_angles(recordings: list[Recording], paths: list[Path]) -> int:
+    """How many every recording has."""
+    counts = [0 if r.joints is None else r.joints.shape[1] for r in recordings]
+    for count, path in zip(counts, paths, strict=True):
+        if count == 0:
+            raise InputError(f"{path}: has no joint angles; leave out the features made of them")
+        if count != counts[0]:
+            raise InputError(f"{path}: has {count} joint angles, {paths[0]} has {counts[0]}")
+    return counts[0]
 
 
 def _dead(recordings: list[Recording]) -> tuple[int, ...]:

@@ -128,7 +128,7 @@ def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
 
 def touch(model: Model, seconds: float) -> list[Frame]:
     """Frames of a touch that begins at once and grows in force and area on the model's skin."""
-    layout, chain = model.info.layout, model.info.chain
+    layout, dof = model.info.layout, model.info.dof
     rows = np.arange(layout.rows)[:, None] - layout.rows // 2
     cols = np.arange(layout.cols) - layout.cols // 2
     distance = np.hypot(rows, cols)
@@ -138,7 +138,7 @@ def touch(model: Model, seconds: float) -> list[Frame]:
         force = (layout.onset + 1) * (2.0 + 3.0 * age)
         reach = 1.0 + 2.0 * age
         counts = np.minimum(force * np.maximum(0.0, 1.0 - distance / (reach + 1.0)), 65535)
-        joints = None if chain is None else np.full(chain.dof, 0.1 * age)
+        joints = None if dof is None else np.full(dof, 0.1 * age)
         frames.append(
             Frame(
                 counts=counts.astype(np.uint16),
@@ -164,7 +164,12 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     inside = frames[1:-2]
     settings = {"threshold": layout.threshold_counts, "valid": None, "wraps": layout.wraps}
     tracker = ContactTracker(
-        layout, info.tracking, chain=info.chain, horizon_s=info.window_s, features=info.features
+        layout,
+        info.tracking,
+        chain=info.chain,
+        horizon_s=info.window_s,
+        features=info.features,
+        joints=info.joints,
     )
     series = None
     for frame in frames:
@@ -192,7 +197,12 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
 
     def fresh() -> ContactTracker:
         return ContactTracker(
-            layout, info.tracking, chain=info.chain, horizon_s=info.window_s, features=info.features
+            layout,
+            info.tracking,
+            chain=info.chain,
+            horizon_s=info.window_s,
+            features=info.features,
+            joints=info.joints,
         )
 
     deciding = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)

@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, decide and print until the recording, the user or the service manager ends it."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
-    chain = model.info.chain
+    chain, dof = model.info.chain, model.info.dof
     with ExitStack() as stack:
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
         notifier = stack.enter_context(Notifier(now=time.monotonic))
@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not on_skin:
             check_joints(model, arguments, opened)
         skin = opened.skin
-        joints = stack.enter_context(open_joints(arguments, opened, chain))
+        joints = stack.enter_context(open_joints(arguments, opened, chain, dof))
         classifier = Classifier(
             model,
             skin.layout,
@@ -108,7 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
             touch_map = stack.enter_context(MapFile(arguments.map, model.info))
         loop = Loop(
             skin,
-            joints=joints if chain is not None else None,
+            joints=joints if dof is not None else None,
             lasts_s=opened.lasts_s,
             stop=stop,
         )

@@ -66,16 +66,17 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--rate must be 0.1 to 60 pictures a second, not {arguments.rate:g}")
     model = None if arguments.model is None else Model(arguments.model)
     chain = None if model is None else model.info.chain
+    dof = None if model is None else model.info.dof
     with (
         stop_on(signal.SIGINT) as stop,
         open_skin(arguments, paced=sys.stdout.isatty(), arm=chain) as opened,
     ):
         if model is not None:
             check_joints(model, arguments, opened)
-        with open_joints(arguments, opened, chain) as joints:
+        with open_joints(arguments, opened, chain, dof) as joints:
             _show(arguments, opened.skin, model, Loop(
                 opened.skin,
-                joints=joints if chain is not None else None,
+                joints=joints if dof is not None else None,
                 lasts_s=opened.lasts_s,
                 stop=stop,
             ))  # fmt: skip

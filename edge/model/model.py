@@ -15,6 +15,7 @@ from edge.errors import EdgeError, InputError
 from edge.model import onnx_file as onnxfile
 from edge.touch import measures
 from edge.touch.arm import Chain
+from edge.touch.features import widths
 from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 
@@ -66,11 +67,18 @@ class ModelInfo:
     """Windows at which the model can be asked, the last the full one; none without calibration."""
     folds: tuple[int, ...] = ()
     """Trials in each fold of the calibration."""
+    joints: int = 0
+    """Joint angles of a frame, where a feature is made of them."""
 
     @property
     def width(self) -> int:
         """Length of a feature vector."""
-        return len(self.features) * self.samples
+        return sum(widths(self.features, self.samples, self.layout, self.joints))
+
+    @property
+    def dof(self) -> int | None:
+        """Joint angles that a frame must bring; None where the model needs none."""
+        return (self.joints or None) if self.chain is None else self.chain.dof
 
     @property
     def smallest_error(self) -> float:
@@ -95,6 +103,7 @@ class ModelInfo:
                 "units": self.units,
                 "motion_frame": self.motion_frame,
                 "arm": None if self.chain is None else self.chain.to_dict(),
+                **({"joints": self.joints} if self.joints else {}),
                 "rows": self.rows,
                 "data_digest": self.data_digest,
                 "versions": self.versions,
@@ -139,6 +148,7 @@ class ModelInfo:
                 versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
                 decision_points_s=meta.numbers("decision_points_s", default=()),
                 folds=tuple(meta.wholes("folds", default=())),
+                joints=meta.whole("joints", 0, allowed=range(0, 1001)),
             )
             tracking.done()
         except InputError as error:
@@ -148,12 +158,16 @@ class ModelInfo:
 
     def _check(self, name: str) -> None:
         try:
-            measures.features(self.features)
+            types = measures.features(self.features)
         except InputError as error:
             raise InputError(
                 f"{name}: was made for the features {', '.join(self.features)}; {error}; "
                 "export it with this version of edge-classify"
             ) from None
+        of_joints = any(feature.of_joints for feature in types)
+        dof = self.joints if self.chain is None else self.chain.dof
+        if self.joints != (dof if of_joints else 0) or of_joints > (self.joints > 0):
+            raise InputError(f"{name}: its features and its joints disagree; export it again")
         if not self.tasks:
             raise InputError(f"{name}: its metadata names no task; export it again")
         if self.decision_points_s:
@@ -427,16 +441,17 @@ def require_joints(model: Model, dof: int | None, where: str) -> None:
     Raises:
         InputError: the sentence names `where`.
     """
-    chain = model.info.chain
-    if chain is None:
+    needed = model.info.dof
+    if needed is None:
         return
     if dof is None:
+        what = "is made of" if model.info.chain is None else "measures motion with"
         raise InputError(
-            f"{where}: has no joint angles, the model measures motion with {chain.dof}; "
+            f"{where}: has no joint angles, the model {what} {needed}; "
             "record them, or export a model without joints"
         )
-    if dof != chain.dof:
-        raise InputError(f"{where}: has {dof} joint angles, the model's arm has {chain.dof}")
+    if dof != needed:
+        raise InputError(f"{where}: has {dof} joint angles, the model's arm has {needed}")
 
 
 class _Answer(NamedTuple):

@@ -73,6 +73,7 @@ def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeri
         chain=info.chain,
         horizon_s=info.window_s,
         features=info.features,
+        joints=info.joints,
     )
     return first_contact(recording, tracker)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import COLS, FORCE, ROWS, Measurer
+from edge.touch.measurer import COLS, FORCE, ROWS, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 
@@ -35,6 +36,10 @@ class FeatureSeries:
         regions: (n,) regions of the frame, or None.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
         turn: columns of a whole turn where the skin wraps, or None.
+        taxels: (n, cells) counts of each cell of the skin (`edge.touch.cells`), or None.
+        joints: (n, dof) joint angles in radians, NaN where they were not known, or None.
+        threshold_counts: a taxel above it is active.
+        pitch: distance between rows of taxels, metres; 1 taxel where it is unknown.
     """
 
     t: NDArray[np.float64]
@@ -48,11 +53,40 @@ class FeatureSeries:
     regions: NDArray[np.int64] | None = None
     force_motion: NDArray[np.float64] | None = None
     turn: int | None = None
+    taxels: NDArray[np.int64] | None = None
+    joints: NDArray[np.float64] | None = None
+    threshold_counts: int = 0
+    pitch: float = 1.0
+
+    def thinned(self, every: int) -> FeatureSeries:
+        """Every n-th frame, as a slower wire would deliver them."""
+
+        def some(rows: NDArray[Any] | None) -> Any:
+            return None if rows is None else rows[::every]
+
+        return replace(
+            self,
+            zones={zone: rows[::every] for zone, rows in self.zones.items()},
+            **{
+                name: some(getattr(self, name))
+                for name in (
+                    "t",
+                    "peak",
+                    "area",
+                    "sums",
+                    "motion",
+                    "regions",
+                    "force_motion",
+                    "taxels",
+                    "joints",
+                )
+            },
+        )
 
     @property
     def integers(self) -> NDArray[np.int64]:
-        """(n, m) all that was counted: peak, area, sums, then the zones and the regions."""
-        more = [] if self.regions is None else [self.regions]
+        """(n, m) all that was counted: peak, area, sums, the zones, the regions, the cells."""
+        more = [rows for rows in (self.regions, self.taxels) if rows is not None]
         return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *more])
 
     @property
@@ -108,6 +142,8 @@ class Contact:
                 ("motion", np.float64),
                 ("force_motion", np.float64),
                 ("counted", np.int64, (PLAIN + measurer.width,)),
+                ("taxels", np.int64, (0 if measurer.cells is None else measurer.cells.count,)),
+                ("joints", np.float64, (measurer.joints,)),
             ],
         )
         self._n = 0
@@ -138,9 +174,22 @@ class Contact:
             self.region, self.joints = region, frame.joints
             motions, sums = self._moved(frame, region, more)
         peak, area = (0, 0) if region is None else (region.peak, region.area)
-        self._rows[self._n] = (age, *motions, (peak, area, *sums, *more))
+        taxels = () if called.cells is None else called.cells.read(frame)
+        joints = self._joints_of(frame) if called.joints else ()
+        self._rows[self._n] = (age, *motions, (peak, area, *sums, *more), taxels, joints)
         self._n += 1
         self._age = age
+
+    def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
+        if frame.joints is None:
+            self.missing_pose = True
+            return np.full(self._measurer.joints, np.nan)
+        if len(frame.joints) != self._measurer.joints:
+            raise InputError(
+                f"a frame has {len(frame.joints)} joint angles, "
+                f"the features were measured with {self._measurer.joints}"
+            )
+        return frame.joints
 
     def _forget_last(self) -> None:
         self._n -= 1
@@ -224,6 +273,10 @@ class Contact:
             regions=more[:, -1] if called.regions else None,
             force_motion=rows["force_motion"] if called.force_motion else None,
             turn=self.layout.cols if self.layout.wraps else None,
+            taxels=None if called.cells is None else rows["taxels"],
+            joints=rows["joints"] if called.joints else None,
+            threshold_counts=self.layout.threshold_counts,
+            pitch=self.layout.pitch[0],
         )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -12,22 +13,50 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch import measures
+from edge.touch.cells import Cells
 from edge.touch.contact import FeatureSeries
-from edge.touch.measures import (
-    AREA,
-    COLS,
-    COLS_COLS,
-    FORCE,
-    PEAK,
-    ROWS,
-    ROWS_COLS,
-    ROWS_ROWS,
-    Feature,
-)
+from edge.touch.layout import SkinLayout
+from edge.touch.measurer import AREA, COLS, COLS_COLS, FORCE, PEAK, ROWS, ROWS_COLS, ROWS_ROWS
+from edge.touch.measures import Feature
 
 FEATURES = measures.PAPER
 SAMPLES = 40
 WINDOW_S = 1.2
+WIDE_SAMPLES = 10
+"""Times at which a feature of many values a frame, a cell's or a joint's, enters the vector."""
+MOTION_FLOOR = 0.1
+"""Motion below it, in distances between taxels, is that of a centroid over noise."""
+
+
+def widths(
+    names: Sequence[str], samples: int, layout: SkinLayout, joints: int = 0
+) -> tuple[int, ...]:
+    """How many values of a vector each feature takes, in their order.
+
+    A course takes `samples`, but that of each cell or joint `WIDE_SAMPLES` at most; what is one
+    number for the window takes 1, of each cell or joint.
+
+    Args:
+        names: of the features.
+        samples: times per feature.
+        layout: the skin.
+        joints: joint angles of a frame.
+
+    Raises:
+        InputError: a feature does not exist.
+    """
+    cells = (
+        Cells(layout).count
+        if any(measures.feature(n).quantity == "taxel_force" for n in names)
+        else 0
+    )
+    out = []
+    for name in names:
+        feature = measures.feature(name)
+        rows = joints if feature.of_joints else cells if feature.wide else 1
+        times = min(samples, WIDE_SAMPLES) if feature.wide else samples
+        out.append(rows if feature.single else rows * times)
+    return tuple(out)
 
 
 def feature_vector(
@@ -36,7 +65,7 @@ def feature_vector(
     samples: int = SAMPLES,
     features: Sequence[str] = FEATURES,
 ) -> NDArray[np.float64]:
-    """Each feature at `samples` times, uniform from onset to onset + window, one after another.
+    """The features of the window from onset to onset + window, one after another.
 
     >>> import edge
     >>> from edge import demo
@@ -46,10 +75,16 @@ def feature_vector(
     >>> edge.feature_vector(series, window_s=1.2).shape
     (120,)
 
-    Between frames by linear interpolation, so that jitter and dropped frames do not shift the
-    samples. After the last frame its values hold; a contact that has ended is at zero there.
-    What cannot be known in a frame (where nothing lies; how far it moved, without the arm's
-    pose) is interpolated between the frames that know it, and 0 where none does.
+    A course is taken at `samples` times, uniform in the window, those of each cell or joint at
+    `WIDE_SAMPLES` (fewer where there are fewer samples), one cell or joint after another; see
+    `widths`. Between frames by linear interpolation, so that jitter and dropped frames do not
+    shift the samples. After the last frame its values hold; a contact that has ended is at zero
+    there. What cannot be known in a frame (where nothing lies; how far it moved, without the
+    arm's pose) is interpolated between the frames that know it, and 0 where none does.
+
+    Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus
+    a floor, so that it stays finite where nothing is: the least force of a taxel in contact, one
+    taxel, a tenth of the distance between taxels; 1 where it follows another transform.
 
     Args:
         series: the contact.
@@ -58,8 +93,8 @@ def feature_vector(
         features: names, see `edge.touch.measures`; the series must have been measured for them.
 
     Returns:
-        (features * samples,) float64: by default max_force in newtons (or counts),
-        contact_area in taxels, contact_motion in metres.
+        (sum of `widths`,) float64: by default max_force in newtons (or counts),
+        contact_area in taxels, contact_motion in metres, each at `samples` times.
 
     Raises:
         InputError: the window or the number of samples makes no sense, the series is empty, or
@@ -72,47 +107,148 @@ def feature_vector(
     if series.t.size == 0:
         raise InputError("the contact has no frame")
     wanted = measures.features(tuple(features))
-    step = window_s / (samples - 1)
-    times = np.arange(samples, dtype=np.float64) * step
-    zones: dict[str, _Zone] = {}
-    values = np.array([_measured(series, feature, zones) for feature in wanted])
-    known = np.isfinite(values)
-    if known.all():
-        vector = _resample(times, series.t, values)
-    else:
-        vector = np.zeros((len(wanted), samples))
-        for out, row, seen in zip(vector, values, known, strict=True):
-            if seen.any():
-                out[:] = _resample(times, series.t[seen], row[seen])
-    for out, feature in zip(vector, wanted, strict=True):
-        if feature.rate:
-            out[:] = np.gradient(out, step)
-    return vector.reshape(-1)
+    course = _Course(series, window_s)
+    blocks = []
+    for (wide, transforms, summary), alike in groupby(wanted, key=_kind):
+        group = tuple(alike)
+        if wide:
+            blocks += [_finish(*course.wide(f, samples), transforms, summary) for f in group]
+        else:
+            blocks.append(_finish(*course.narrow(group, samples), transforms, summary))
+    return np.concatenate(blocks)
 
 
-def _measured(
-    series: FeatureSeries, feature: Feature, zones: dict[str, _Zone]
+def _kind(feature: Feature) -> tuple[bool, tuple[str, ...], str]:
+    """Features that are worked out in one go."""
+    return feature.wide, feature.transforms, feature.summary
+
+
+def _finish(
+    values: NDArray[np.float64],
+    floors: NDArray[np.float64],
+    step: float,
+    together: bool,
+    transforms: tuple[str, ...],
+    summary: str,
 ) -> NDArray[np.float64]:
-    """(n,) the feature's value (not its rate) in every frame; NaN where it cannot be known."""
-    zone, quantity = feature.zone, feature.quantity
-    values: NDArray[Any] | None = None
-    if quantity == "motion":
-        values = series.contact_motion
-    elif quantity == "force_motion":
-        values = series.force_motion
-    elif quantity == "regions":
-        values = series.regions
-    elif (zone, quantity) == ("contact", "max_force"):
-        values = series.max_force
-    elif (zone, quantity) == ("contact", "area"):
-        values = series.contact_area
-    elif zone in series.zones:
-        if zone not in zones:
-            zones[zone] = _Zone(series.zones[zone], series)
-        values = getattr(zones[zone], quantity)()
-    if values is None:
-        raise InputError(f"{feature.name} was not measured; name it where contacts are followed")
-    return np.asarray(values, dtype=np.float64)
+    """Samples (rows, n) a `step` apart, transformed and summed up, one row after another.
+
+    Args:
+        floors: (rows, 1) what a logarithm adds to the values.
+        together: the rows are the cells or joints of one feature, with one largest value.
+    """
+    for transform in transforms:
+        if transform == "log":
+            values = np.log(values + floors)
+        elif transform == "sqrt":
+            values = np.copysign(np.sqrt(np.abs(values)), values)
+        else:
+            largest = np.abs(values).max(axis=None if together else 1, keepdims=True)
+            values = np.divide(values, largest, out=np.zeros_like(values), where=largest > 0.0)
+        floors = np.ones_like(floors)
+    if summary == "rate":
+        values = np.gradient(values, step, axis=1)
+    elif summary == "mean":
+        values = values.mean(axis=1)
+    elif summary == "deviation":
+        values = values.std(axis=1)
+    elif summary == "roughness":
+        values = np.abs(np.diff(values, axis=1)).mean(axis=1)
+    return values.reshape(-1)
+
+
+class _Course:
+    """What was measured on a contact, at times of its window."""
+
+    def __init__(self, series: FeatureSeries, window_s: float) -> None:
+        self._series, self._window_s = series, window_s
+        self._zones: dict[str, _Zone] = {}
+        scale = series.counts_per_newton or 1.0
+        self._force_floor = (series.threshold_counts + 1) / scale
+        self._length_floor = MOTION_FLOOR * series.pitch
+
+    def narrow(
+        self, group: tuple[Feature, ...], samples: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, bool]:
+        """Features of one value a frame: samples, floors, the step, and that rows stand alone."""
+        series = self._series
+        times, step = self._times(samples)
+        values = np.array([self._measured(feature) for feature in group])
+        known = np.isfinite(values)
+        if known.all():
+            sampled = _resample(times, series.t, values)
+        else:
+            sampled = np.zeros((len(group), samples))
+            for out, row, seen in zip(sampled, values, known, strict=True):
+                if seen.any():
+                    out[:] = _resample(times, series.t[seen], row[seen])
+        floors = np.array([[self._floor(feature)] for feature in group])
+        return sampled, floors, step, False
+
+    def wide(
+        self, feature: Feature, samples: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, bool]:
+        """A feature of many values a frame, likewise; its rows have one largest value."""
+        series = self._series
+        times, step = self._times(samples if feature.single else min(samples, WIDE_SAMPLES))
+        if feature.of_joints:
+            joints = series.joints
+            if joints is None:
+                raise InputError(f"{feature.name} was not measured; it is made of joint angles")
+            seen = np.isfinite(joints).all(axis=1)
+            sampled = np.zeros((joints.shape[1], len(times)))
+            if seen.any():
+                sampled = _resample(times, series.t[seen], joints[seen].T)
+                if feature.quantity == "joint_change":
+                    sampled -= _resample(np.zeros(1), series.t[seen], joints[seen].T)
+        else:
+            if series.taxels is None:
+                raise _not_measured(feature)
+            scale = series.counts_per_newton or 1.0
+            sampled = _resample(times, series.t, series.taxels.T / scale)
+        return sampled, np.full((len(sampled), 1), self._floor(feature)), step, True
+
+    def _times(self, samples: int) -> tuple[NDArray[np.float64], float]:
+        step = self._window_s / (samples - 1)
+        return np.arange(samples, dtype=np.float64) * step, step
+
+    def _floor(self, feature: Feature) -> float:
+        quantity = feature.quantity
+        if quantity in ("max_force", "force", "pressure", "taxel_force"):
+            return self._force_floor
+        if quantity in ("motion", "force_motion"):
+            return self._length_floor
+        return 0.0 if quantity == "stiffness" else 1.0
+
+    def _measured(self, feature: Feature) -> NDArray[np.float64]:
+        """(n,) the feature's value in every frame; NaN where it cannot be known."""
+        series, zone, quantity = self._series, feature.zone, feature.quantity
+        values: NDArray[Any] | None = None
+        if quantity == "motion":
+            values = series.contact_motion
+        elif quantity == "force_motion":
+            values = series.force_motion
+        elif quantity == "regions":
+            values = series.regions
+        elif (zone, quantity) == ("contact", "max_force"):
+            values = series.max_force
+        elif (zone, quantity) == ("contact", "area"):
+            values = series.contact_area
+        elif zone in series.zones:
+            if zone not in self._zones:
+                self._zones[zone] = _Zone(series.zones[zone], series)
+            if quantity != "stiffness":
+                values = getattr(self._zones[zone], quantity)()
+            elif series.force_motion is not None:
+                force = self._zones[zone].force() + self._force_floor
+                values = force / (series.force_motion + self._length_floor)
+        if values is None:
+            raise _not_measured(feature)
+        return np.asarray(values, dtype=np.float64)
+
+
+def _not_measured(feature: Feature) -> InputError:
+    return InputError(f"{feature.name} was not measured; name it where contacts are followed")
 
 
 class _Zone:
@@ -131,6 +267,11 @@ class _Zone:
 
     def area(self) -> NDArray[np.int64]:
         return self._sums[:, AREA]
+
+    def pressure(self) -> NDArray[np.float64]:
+        """Force over area; 0 where nothing lies."""
+        area = self._sums[:, AREA]
+        return np.asarray(self._force / (np.maximum(area, 1) * self._scale))
 
     def along(self) -> NDArray[np.float64]:
         return self._centroid(ROWS)

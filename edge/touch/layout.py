@@ -88,6 +88,11 @@ class SkinLayout:
         """`metre`, or `taxel` where the pitch is unknown."""
         return "taxel" if self.pitch_m is None else "metre"
 
+    @property
+    def pitch(self) -> tuple[float, float]:
+        """Distance between taxels along the rows and along the columns; 1 where unknown."""
+        return self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
+
     def position(self, row: float, col: float) -> NDArray[np.float64]:
         """Place of a point of the surface in the link's frame.
 
@@ -98,9 +103,7 @@ class SkinLayout:
         Returns:
             (3,) metres, or taxels where the pitch is unknown.
         """
-        along, around = (
-            self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
-        )
+        along, around = self.pitch
         if self.radius_m is None:
             return np.array([col * around, row * along, 0.0])
         angle = self._angle(col)

@@ -11,7 +11,8 @@ from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries, region_time
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import PAPER, Measurer
+from edge.touch.measurer import Measurer
+from edge.touch.measures import PAPER
 from edge.touch.region import ActiveTaxels, Region
 
 MAX_CONTACTS = 8
@@ -117,6 +118,7 @@ class ContactTracker:
         chain: Chain | None = None,
         horizon_s: float = math.inf,
         features: Sequence[str] = PAPER,
+        joints: int = 0,
         max_contacts: int = 1,
         motion_on_skin: bool = False,
     ) -> None:
@@ -130,6 +132,7 @@ class ContactTracker:
             horizon_s: seconds from onset after which a contact's series takes in no more.
             features: what the series is to hold (see `edge.touch.measures`); what is not called
                 for is not measured.
+            joints: joint angles of a frame, where a feature is made of them.
             max_contacts: how many are followed at once, the largest first.
             motion_on_skin: a contact whose first frame has no joint angles has its motion
                 measured on the skin; else it is unknown where they lack.
@@ -143,7 +146,7 @@ class ContactTracker:
         self.region: Region | None = None
         self._settings = settings or TrackSettings()
         self._chain, self._motion_on_skin = chain, motion_on_skin
-        self._measurer = Measurer(layout, features)
+        self._measurer = Measurer(layout, features, joints)
         self._max_contacts = max_contacts
         self._tracks: list[RegionTrack] = []
         self._t = -math.inf

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.contact import FeatureSeries
 from train.crossval import votes_right
 from train.evaluate import Grid, Labels, Result, evaluate, stratified_folds
 from train.pipeline import Choice
@@ -103,24 +102,6 @@ def evaluate_split(
         right = votes_right(seen[c], here, labels[test])[:, j]
         answers[task] = SplitResult(Choice(scaling, COMPONENTS[c], j + 1), right)
     return answers
-
-
-def thinned(series: FeatureSeries, every: int) -> FeatureSeries:
-    """Every n-th frame of a series, as a slower wire would deliver them."""
-    if every == 1:
-        return series
-    pick = slice(None, None, every)
-    return replace(
-        series,
-        t=series.t[pick],
-        peak=series.peak[pick],
-        area=series.area[pick],
-        sums=series.sums[pick],
-        motion=series.motion[pick],
-        zones={name: values[pick] for name, values in series.zones.items()},
-        regions=None if series.regions is None else series.regions[pick],
-        force_motion=None if series.force_motion is None else series.force_motion[pick],
-    )
 
 
 @dataclass(frozen=True)

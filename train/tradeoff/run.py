@@ -23,7 +23,7 @@ from train.simulate import scene as scenes
 from train.study import skins
 from train.tradeoff import board as boards
 from train.tradeoff import early, prices, sections
-from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front, thinned
+from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front
 from train.tradeoff.wires import Wire, wires
 
 WINDOWS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
@@ -162,7 +162,7 @@ def _vectors(series: Sequence[FeatureSeries | None], case: Case) -> NDArray[np.f
     X = np.zeros((len(series), len(features) * SAMPLES))
     for row, one in zip(X, series, strict=True):
         if one is not None:
-            row[:] = feature_vector(thinned(one, every), window, SAMPLES, features)
+            row[:] = feature_vector(one.thinned(every), window, SAMPLES, features)
     return X
 
 

@@ -14,7 +14,8 @@ from edge.touch.arm import Chain
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import QUANTITIES, ZONES, Measurer, feature, features, names
+from edge.touch.measurer import Measurer
+from edge.touch.measures import QUANTITIES, ZONES, feature, features, names
 from edge.touch.region import ActiveTaxels, find_regions
 from edge.touch.track import ContactTracker
 
@@ -310,7 +311,7 @@ def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
 
 def test_the_papers_three_are_the_default_and_come_first():
     assert FEATURES == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
-    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 3
+    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 7
     assert [feature(name).name for name in ALL] == ALL
 
 
@@ -323,6 +324,12 @@ def test_units_are_those_of_the_skin():
         "skin_slant": "taxel^2",
         "regions": "region",
         "force_motion": "metre",
+        "skin_pressure": "newton/taxel",
+        "stiffness": "newton/metre",
+        "log_stiffness": "log(newton/metre)",
+        "sqrt_relative_taxel_force_rate": "sqrt(1)/s",
+        "log_skin_force_mean": "log(newton)",
+        "joint_change_rate": "radian/s",
     }
     assert {name: feature(name).unit(metric) for name in units} == units
     assert feature("skin_force").unit(replace(metric, counts_per_newton=None)) == "count"
@@ -335,6 +342,10 @@ def test_units_are_those_of_the_skin():
         (["contact_max_force"], "no feature 'contact_max_force'"),
         (["max_force_rate_rate"], "no feature"),
         ([""], "no feature ''"),
+        (["log_"], "no feature 'log_'"),
+        (["log_sqrt_log_max_force"], "applies one transform twice"),
+        (["sqrt_log_joint_change"], "may be negative and has no logarithm; take sqrt_joint_change"),
+        (["log_skin_slant_mean"], "may be negative"),
         ([], "no feature named"),
         (["max_force", "regions", "max_force"], "max_force is named twice"),
     ],
@@ -349,6 +360,13 @@ def test_a_feature_that_was_not_measured_is_one_sentence():
     counts = np.zeros((5, 7), dtype=np.uint16)
     counts[1, 1] = 50
     series = series_of(FLAT, [Frame(t, counts) for t in (0.0, 0.5)], ["max_force"])
-    for name in ("skin_force", "regions", "force_motion"):
+    for name in (
+        "skin_force",
+        "regions",
+        "force_motion",
+        "stiffness",
+        "taxel_force",
+        "joint_angle",
+    ):
         with pytest.raises(InputError, match=f"{name} was not measured"):
             feature_vector(series, 1.0, 2, [name])

@@ -17,7 +17,7 @@ from train.__main__ import main as train
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.study.score import Result
 from train.tradeoff import board, early
-from train.tradeoff.accuracy import MeasuredPoint, nearest, nested, pareto_front, thinned
+from train.tradeoff.accuracy import MeasuredPoint, nearest, nested, pareto_front
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
 
@@ -58,7 +58,7 @@ def series(n):
 
 
 def test_a_slower_wire_brings_every_nth_frame():
-    thin = thinned(series(9), 4)
+    thin = series(9).thinned(4)
     assert thin.t.tolist() == [0.0, 0.04, 0.08]
     assert thin.peak.tolist() == thin.sums[:, 1].tolist() == [0, 4, 8]
 

@@ -1,0 +1,27 @@
+"""What tells things that were never met: how force grows, with area and with motion.
+
+| feature | unit | from |
+|---|---|---|
+| `log_max_force` | log(newton) | the largest count of the region |
+| `log_skin_force` | log(newton) | the sum of active counts |
+| `relative_skin_force`, its `_rate` | 1, 1/s | the same |
+| `log_contact_area`, `relative_contact_area` | log(taxel), 1 | the region's number of taxels |
+| `log_contact_pressure` | log(newton/taxel) | the region's sum of counts over its area |
+| `force_motion`, its `_rate` | metre, metre/s | its sums of counts times row, column; the pose |
+| `log_stiffness` | log(newton/metre) | the skin's sum of counts over force-weighted motion |
+
+Logarithms make of a product a sum: what differs from thing to thing by a factor is a shift.
+"""
+
+FEATURES = (
+    "log_max_force",
+    "log_skin_force",
+    "log_contact_area",
+    "log_contact_pressure",
+    "log_stiffness",
+    "force_motion",
+    "force_motion_rate",
+    "relative_skin_force",
+    "relative_contact_area",
+    "relative_skin_force_rate",
+)

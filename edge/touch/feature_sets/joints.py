@@ -1,0 +1,15 @@
+"""The arm's joint angles.
+
+| feature, of each joint | unit | from |
+|---|---|---|
+| `joint_change`, at ten times | radian | the recording's angles, from onset on |
+| `joint_change_rate` | radian/s | the same |
+| `joint_angle`, at ten times | radian | the angles themselves |
+
+How far joints yield tells the thing that is touched. The angles themselves (`POSTURE`) tell a
+gripper the thing's size, and an arm where the thing stood: where each thing stood in a place of
+its own, they tell the thing for a reason that holds in that room alone.
+"""
+
+FEATURES = ("joint_change", "joint_change_rate")
+POSTURE = ("joint_angle",)

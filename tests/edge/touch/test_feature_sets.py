@@ -1,0 +1,248 @@
+"""Named sets, transforms, summaries and features of cells and joints, against exact values."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from edge.touch.feature_sets import SETS, expand
+from edge.touch.features import FEATURES, WIDE_SAMPLES, feature_vector, widths
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import TRANSFORMS, feature, names
+from edge.touch.track import ContactTracker
+
+SKIN = SkinLayout(
+    4, 6, threshold_counts=9, onset_counts=9, counts_per_newton=100.0, pitch_m=0.02, dead=(5,)
+)
+
+
+def series_of(frames, wanted, layout=SKIN, joints=0, **options):
+    tracker = ContactTracker(layout, features=wanted, joints=joints, **options)
+    contact = None
+    for frame in frames:
+        (contact,) = tracker.push(frame) or [contact]
+    return contact.series()
+
+
+def touch(peaks, step=0.25, joints=None):
+    """A touch of two taxels, one of them half as strong."""
+    frames = []
+    for i, peak in enumerate(peaks):
+        counts = np.zeros(SKIN.shape, dtype=np.uint16)
+        counts[1, 1], counts[1, 2] = peak, peak // 2
+        frames.append(Frame(i * step, counts, joints=None if joints is None else joints[i]))
+    return frames
+
+
+def vector_of(frames, *wanted, samples=5, window=1.0, **options):
+    return feature_vector(series_of(frames, wanted, **options), window, samples, wanted)
+
+
+PEAKS = (100, 300, 200, 400, 400)
+
+
+def test_every_set_has_features_that_exist_and_none_is_in_two_sets():
+    members = [name for one in SETS.values() for name in one.features]
+    assert len(members) == len(set(members))
+    assert [feature(name).name for name in members] == members
+    assert SETS["paper"].features == FEATURES
+
+
+def test_sets_and_features_expand_to_features_in_their_order_each_once():
+    assert expand(["contact_area", "paper", "regions"]) == (
+        "contact_area",
+        "max_force",
+        "contact_motion",
+        "regions",
+    )
+    assert expand(["joints", "posture"]) == ("joint_change", "joint_change_rate", "joint_angle")
+
+
+@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("samples", [2, 10, 40])
+def test_a_vector_has_the_widths_that_are_told(name, samples):
+    wanted = SETS[name].features
+    frames = touch(PEAKS, joints=np.zeros((5, 3)))
+    vector = vector_of(frames, *wanted, samples=samples, joints=3)
+    told = widths(wanted, samples, SKIN, joints=3)
+    assert len(told) == len(wanted)
+    assert len(vector) == sum(told)
+    assert np.isfinite(vector).all()
+
+
+def test_widths_are_those_of_courses_cells_joints_and_single_numbers():
+    wanted = ["max_force", "max_force_mean", "taxel_force", "sqrt_taxel_force_deviation"]
+    assert widths(wanted, 40, SKIN) == (40, 1, 23 * WIDE_SAMPLES, 23)
+    assert widths(["joint_change", "joint_angle_mean", "taxel_force"], 4, SKIN, 7) == (28, 7, 92)
+
+
+def test_transforms_are_those_of_the_samples_the_one_next_to_the_name_first():
+    peak = np.array(PEAKS) / 100.0
+    assert vector_of(touch(PEAKS), "sqrt_max_force").tolist() == np.sqrt(peak).tolist()
+    assert vector_of(touch(PEAKS), "relative_max_force").tolist() == (peak / 4.0).tolist()
+    first_root = vector_of(touch(PEAKS), "relative_sqrt_max_force")
+    assert first_root == pytest.approx(np.sqrt(peak) / 2.0, rel=1e-15)
+    first_part = vector_of(touch(PEAKS), "log_relative_max_force")
+    assert first_part == pytest.approx(np.log(peak / 4.0 + 1.0), rel=1e-15)
+
+
+def test_a_square_root_keeps_the_sign():
+    falling = np.zeros(SKIN.shape, dtype=np.uint16)
+    falling[[0, 1, 2], [2, 1, 0]] = 50
+    frames = [Frame(t, falling) for t in (0.0, 1.0)]
+    slant = vector_of(frames, "skin_slant")
+    assert (slant < 0.0).all()
+    assert vector_of(frames, "sqrt_skin_slant") == pytest.approx(-np.sqrt(-slant))
+
+
+def test_summaries_are_one_number_of_the_transformed_samples():
+    roots = [math.sqrt(p / 100) for p in PEAKS]
+    mean = math.fsum(roots) / 5
+    deviation = math.sqrt(math.fsum((r - mean) ** 2 for r in roots) / 5)
+    steps = [abs(b - a) for a, b in pairwise(roots)]
+    seen = vector_of(
+        touch(PEAKS),
+        "sqrt_max_force_mean",
+        "sqrt_max_force_deviation",
+        "sqrt_max_force_roughness",
+    )
+    assert seen == pytest.approx([mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15)
+
+
+def test_a_rate_is_that_of_the_transformed_samples():
+    rate = vector_of(touch(PEAKS), "relative_skin_force_rate")
+    force = np.array([p + p // 2 for p in PEAKS]) / 600.0
+    assert rate == pytest.approx(np.gradient(force, 0.25))
+
+
+@pytest.mark.parametrize("threshold", [0, 9, 60000])
+@pytest.mark.parametrize("scale", [None, 1e-6, 1e12])
+@pytest.mark.parametrize("pitch", [None, 1e-6, (1e3, 2.0)])
+def test_every_logarithm_is_finite_where_nothing_is(threshold, scale, pitch):
+    """After the contact's end every force, area and motion is 0."""
+    layout = replace(
+        SKIN, threshold_counts=threshold, onset_counts=None, counts_per_newton=scale, pitch_m=pitch
+    )
+    counts = np.zeros(SKIN.shape, dtype=np.uint16)
+    counts[1, 1] = 65535
+    still = np.zeros_like(counts)
+    frames = [Frame(i / 10, counts if i < 2 else still) for i in range(11)]
+    wanted = []
+    for name in names():
+        try:
+            wanted.append(feature(f"log_{name}").name)
+        except InputError:
+            continue
+    assert len(wanted) > 45
+    series = series_of(frames, wanted, layout)
+    assert (series.peak[2:] == 0).all()
+    with np.errstate(all="raise"):
+        vector = feature_vector(series, 1.0, 5, wanted)
+    assert np.isfinite(vector).all()
+
+
+def test_the_floor_of_a_logarithm_is_the_least_that_is_in_contact():
+    frames = touch([100, 100, 0, 0, 0])
+    seen = vector_of(
+        frames, "log_max_force", "log_contact_area", "log_force_motion", "log_taxel_force_mean"
+    )
+    assert seen[4] == math.log(0.1)  # a threshold of 9 counts, 100 counts a newton
+    assert seen[9] == math.log(1.0)
+    assert seen[14] == pytest.approx(math.log(0.002))  # a tenth of 20 mm
+    assert seen[15] == pytest.approx(math.log(0.1))  # a taxel that was never touched
+    assert seen[0] == math.log(1.0 + 0.1)
+
+
+def test_pressure_is_force_over_area_and_stiffness_force_over_motion():
+    frames = touch([100, 100, 100])
+    frames[1].counts[1, 3] = 200
+    frames[2].counts[:] = 0
+    pressure = vector_of(frames, "skin_pressure", "left_pressure", window=0.5, samples=3)
+    assert pressure == pytest.approx([0.75, 3.5 / 3, 0.0, 0.75, 0.75, 0.0])
+    wanted = ["stiffness", "skin_force", "force_motion"]
+    stiffness, force, motion = vector_of(frames, *wanted, window=0.5, samples=3).reshape(3, 3)
+    assert stiffness[:2] == pytest.approx((force[:2] + 0.1) / (motion[:2] + 0.002))
+    assert stiffness[0] == pytest.approx(1.6 / 0.002)
+
+
+def test_taxels_stand_in_their_places_one_after_another():
+    seen = vector_of(touch(PEAKS), "taxel_force", samples=5).reshape(23, 5)
+    place = 6  # row 1, column 1: the sixth but for the dead one before it
+    assert seen[place].tolist() == [p / 100 for p in PEAKS]
+    assert seen[place + 1].tolist() == [p // 2 / 100 for p in PEAKS]
+    assert np.count_nonzero(seen.any(axis=1)) == 2
+
+
+def test_cells_have_one_largest_value():
+    seen = vector_of(touch(PEAKS), "relative_taxel_force", samples=5).reshape(23, 5)
+    assert seen[6].tolist() == [0.25, 0.75, 0.5, 1.0, 1.0]
+    assert seen[7].tolist() == [0.125, 0.375, 0.25, 0.5, 0.5]
+
+
+def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
+    angles = np.array([[1.0, -2.0], [1.5, -2.0], [2.0, -2.5], [2.0, -3.0], [2.0, -3.0]])
+    seen = vector_of(
+        touch(PEAKS, joints=angles), "joint_change", "joint_angle", "joint_change_rate", joints=2
+    )
+    change, angle, rate = seen.reshape(3, 2, 5)
+    assert change.tolist() == (angles - angles[0]).T.tolist()
+    assert angle.tolist() == angles.T.tolist()
+    assert rate.tolist() == np.gradient(angles.T, 0.25, axis=1).tolist()
+
+
+def test_angles_that_lack_are_interpolated_and_flagged():
+    angles = [np.array([1.0]), None, np.array([2.0]), np.array([np.nan]), np.array([3.0])]
+    tracker = ContactTracker(SKIN, features=["joint_angle"], joints=1)
+    for frame, known in zip(touch(PEAKS), angles, strict=True):
+        (contact,) = tracker.push(replace(frame, joints=known)) or [None]
+    assert contact.missing_pose
+    vector = feature_vector(contact.series(), 1.0, 5, ["joint_angle"])
+    assert vector.tolist() == [1.0, 1.5, 2.0, 2.5, 3.0]
+    never = series_of(touch(PEAKS), ["joint_change"], joints=1)
+    assert feature_vector(never, 1.0, 5, ["joint_change"]).tolist() == [0.0] * 5
+
+
+def test_another_number_of_angles_is_one_sentence():
+    with pytest.raises(InputError, match="has 2 joint angles, the features were measured with 3"):
+        series_of(touch(PEAKS, joints=np.zeros((5, 2))), ["joint_change"], joints=3)
+
+
+def test_every_nth_frame_of_a_series_has_all_that_was_measured():
+    wanted = [*SETS["moments"].features, "taxel_force", "joint_angle", "regions", "force_motion"]
+    whole = series_of(touch(PEAKS, joints=np.arange(10.0).reshape(5, 2)), wanted, joints=2)
+    thin = whole.thinned(2)
+    assert thin.integers.tolist() == whole.integers[::2].tolist()
+    assert thin.joints.tolist() == [[0.0, 1.0], [4.0, 5.0], [8.0, 9.0]]
+    assert thin.t.tolist() == [0.0, 0.5, 1.0]
+    assert len(feature_vector(thin, 1.0, 5, wanted)) == sum(widths(wanted, 5, SKIN, 2))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    peaks=st.lists(st.integers(10, 65535), min_size=5, max_size=5),
+    transform=st.sampled_from(TRANSFORMS),
+)
+def test_transforms_are_within_four_roundings_of_exact_arithmetic(peaks, transform):
+    seen = vector_of(touch(peaks), f"{transform}_skin_force")
+    force = [Fraction(p + (p // 2 if p // 2 > 9 else 0), 100) for p in peaks]
+    with mpmath.workdps(40):
+        exact = [mpmath.mpf(f.numerator) / f.denominator for f in force]
+        if transform == "log":
+            exact = [mpmath.log(v + mpmath.mpf(1) / 10) for v in exact]
+        elif transform == "sqrt":
+            exact = [mpmath.sqrt(v) for v in exact]
+        else:
+            exact = [v / max(exact) for v in exact]
+        exact = [float(v) for v in exact]
+    # A logarithm near 0 keeps the rounding of its argument.
+    assert seen == pytest.approx(
+        exact, rel=4 * 2.0**-53, abs=4 * 2.0**-53 if transform == "log" else 0
+    )
