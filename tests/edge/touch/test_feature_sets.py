@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from edge.touch.feature_sets import SETS, expand
+from edge.touch.feature_sets import SETS, contact, expand, joints, moments, paper, taxels
 from edge.touch.features import FEATURES, WIDE_SAMPLES, feature_vector, widths
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -53,7 +53,11 @@ def test_every_set_has_features_that_exist_and_none_is_in_two_sets():
     members = [name for one in SETS.values() for name in one.features]
     assert len(members) == len(set(members))
     assert [feature(name).name for name in members] == members
-    assert SETS["paper"].features == FEATURES
+    assert SETS["paper"].features == paper.FEATURES == FEATURES
+    assert SETS["moments"].features == moments.FEATURES
+    assert SETS["contact"].features == contact.FEATURES
+    assert SETS["sqrt_taxels"].features == taxels.SQRT
+    assert SETS["posture"].features == joints.POSTURE
 
 
 def test_sets_and_features_expand_to_features_in_their_order_each_once():
