@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset, Release
 from edge.model.model import Decision, Model, require_joints
-from edge.model.prediction_set import NOVELTY_RATE, UNKNOWN, PredictionSet, check_rate
+from edge.model.stopping import NOVELTY_RATE, UNKNOWN, StoppingRule, check_rate
 from edge.recording import Recording
 from edge.touch.contact import Contact
 from edge.touch.features import feature_vector
@@ -37,8 +37,8 @@ class _Waiting:
     decision_point: int
     """The next of the model's decision points."""
     tasks: list[str]
-    candidates: dict[str, PredictionSet] = field(default_factory=dict)
-    """By task, where an error rate was asked for."""
+    runs: dict[str, tuple[str, int]] = field(default_factory=dict)
+    """By task, the label of the last decision points in a row that were sure, and their number."""
 
 
 class _Answer(NamedTuple):
@@ -47,7 +47,7 @@ class _Answer(NamedTuple):
     label: str | None
     confidence: float
     flags: tuple[str, ...]
-    remaining: tuple[str, ...] | None = None
+    stopped_by: str | None = None
     decision: Decision | None = None
 
 
@@ -68,10 +68,12 @@ class Classifier:
     contact begins, a `Decided` for each task once its window is over, and a `Release` when the
     contact ends.
 
-    With an error rate, a task is decided at the first of the model's decision points at which one
-    label remains, or else at the full window. Further flags are then `unknown` (the label is
-    "unknown": none remains, or the contact lies too far from everything in training) and `unsure`
-    (several remain, and the best of them was taken).
+    With an error rate, each task follows the fastest stopping rule that the model holds certified
+    for that rate: it is decided at the first decision point that is sure enough, and at the rule's
+    last in any case (see `edge.model.stopping`). A task for which no rule is certified is decided
+    at the full window, flagged `uncertified`. Further flags are then `unknown` (the label is
+    "unknown": the contact is unlike everything in training) and `unsure` (the window ended before
+    the confidence was reached).
 
     Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended
     inside the window; the last values were held), `missing_taxels` (taxels could not be read),
@@ -96,10 +98,10 @@ class Classifier:
         Args:
             model: what decides.
             layout: the skin that gives the frames; the model's own where None.
-            error: how often a label may be wrong, in (0, 1), to decide as soon as that allows;
+            error: how often a decision may be wrong, in (0, 1), to decide as soon as that allows;
                 None decides at the full window.
-            novelty_rate: how often a trained thing may be called unknown for lying far from all
-                others.
+            novelty_rate: how often a contact with a trained thing may be called unknown. The
+                certified errors hold for the default.
             max_contacts: how many regions to follow at once. With 1 it is the largest; with more,
                 each event names its contact, and a decision its position.
             motion_on_skin: decide a contact whose first frame has no joint angles by motion on
@@ -108,17 +110,13 @@ class Classifier:
 
         Raises:
             InputError: the skin is not the one that the model was made for, a rate is outside
-                (0, 1), or the model has no calibration to hold an error rate with.
+                (0, 1), or the model certifies the error rate for no task.
         """
         info = model.info
+        self._rules: dict[str, StoppingRule | None] = {}
         if error is not None:
-            check_rate(error, "the error rate")
             check_rate(novelty_rate, "the rate of false alarms")
-            if not info.decision_points_s:
-                raise InputError(
-                    f"{model.path}: has no calibration to hold an error rate with; "
-                    "export it with --decision-points"
-                )
+            self._rules = stopping_rules(model, error)
         self.model = model
         self.layout = for_device(info.layout, layout or info.layout)
         self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
@@ -142,11 +140,7 @@ class Classifier:
         tasks = self.model.info.tasks
         if self.error is None:
             return _Waiting(contact, number, len(self.model.decision_points_s) - 1, list(tasks))
-        left = {
-            name: PredictionSet(len(task.labels), self.error, self.novelty_rate)
-            for name, task in tasks.items()
-        }
-        return _Waiting(contact, number, 0, list(tasks), left)
+        return _Waiting(contact, number, 0, list(tasks))
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -242,6 +236,7 @@ class Classifier:
         info = self.model.info
         last = len(self.model.decision_points_s) - 1
         decision_point = last if short else waiting.decision_point
+        waiting.decision_point = decision_point
         window_s = self.model.decision_points_s[decision_point]
         contact = waiting.contact
         vector = feature_vector(contact.series(), window_s, info.samples, info.features)
@@ -261,15 +256,12 @@ class Classifier:
             none = _Answer(None, 0.0, (*flags, "out_of_range"))
             answers = dict.fromkeys(waiting.tasks, none)
         else:
-            answers = {
-                task: answer
-                for task in waiting.tasks
-                if (
-                    answer := self._answer(
-                        waiting, task, decisions[task], flags, last=decision_point == last
-                    )
-                )
-            }
+            novel = self._novel(decision_point, decisions)
+            answers = {}
+            for task in waiting.tasks:
+                answer = self._answer(waiting, task, decisions[task], flags, novel)
+                if answer is not None:
+                    answers[task] = answer
         waiting.decision_point += 1
         waiting.tasks = [task for task in waiting.tasks if task not in answers]
         position = None
@@ -286,8 +278,8 @@ class Classifier:
                 contact.onset_s,
                 latency_ms,
                 answer.flags,
-                error=self.error if answer.remaining is not None else None,
-                remaining=answer.remaining,
+                error=self.error if answer.stopped_by is not None else None,
+                stopped_by=answer.stopped_by,
                 contact=self._named(waiting.number),
                 position=position,
                 decision=answer.decision,
@@ -295,37 +287,89 @@ class Classifier:
             for task, answer in answers.items()
         ]
 
+    def _novel(self, decision_point: int, decisions: dict[str, Decision]) -> float:
+        """The smallest rate of false alarms at which the contact counts as unknown."""
+        novelty = self.model.info.novelty
+        if self.error is None or novelty is None:
+            return 1.0
+        return novelty.rate(decision_point, float(decisions[novelty.task].distances[0]))
+
     def _answer(
         self,
         waiting: _Waiting,
         task: str,
         decision: Decision,
         flags: tuple[str, ...],
-        *,
-        last: bool,
+        novel: float,
     ) -> _Answer | None:
-        """What a decision point says of a task; None where the task goes on waiting."""
+        """What a decision point says of a task; None where the task goes on waiting.
+
+        Args:
+            novel: from `_novel`.
+        """
         if decision.distances[0] == 0.0:
             flags = (*flags, AS_TRAINED)
-        candidates = waiting.candidates.get(task)
-        if candidates is None:
+        if self.error is None:
             if decision.tie:
                 flags = (*flags, "tie")
             return _Answer(decision.label, decision.confidence, flags, decision=decision)
-        if decision.pvalues is not None and "short" not in flags:
-            candidates.narrow(decision.pvalues)
-        if not (candidates.settled or last):
-            return None
+        assert decision.label_distances is not None
+        at = waiting.decision_point
         labels = self.model.info.tasks[task].labels
-        best = candidates.best(labels.index(decision.label))
-        if candidates.unknown:
+        confidence = self.model.info.stopping[task].confidence(
+            at, decision.label_distances.tolist(), labels.index(decision.label)
+        )
+        rule = self._rules[task]
+        sure = rule is not None and self._sure(waiting, task, decision.label, confidence, rule)
+        last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
+        if not sure and at < last and "short" not in flags:
+            return None
+        unknown = novel <= self.novelty_rate
+        if unknown:
             flags = (*flags, "unknown")
-        elif not candidates.settled:
+        elif rule is not None and not sure and not rule.fixed:
             flags = (*flags, "unsure")
+        if rule is None:
+            flags = (*flags, "uncertified")
         return _Answer(
-            UNKNOWN if candidates.unknown else labels[best],
-            round(candidates.confidence(best), 6),
+            UNKNOWN if unknown else decision.label,
+            round(1.0 - novel if unknown else confidence, 6),
             flags,
-            tuple(labels[i] for i in candidates.remaining),
+            None if rule is None else "confidence" if sure else "window",
             decision,
         )
+
+    @staticmethod
+    def _sure(
+        waiting: _Waiting, task: str, label: str, confidence: float, rule: StoppingRule
+    ) -> bool:
+        """Whether so many decision points in a row as the rule asks for were sure of the label."""
+        before, run = waiting.runs.get(task, ("", 0))
+        if confidence < rule.confidence:
+            run = 0
+        else:
+            run = run + 1 if label == before else 1
+        waiting.runs[task] = label, run
+        return run >= rule.agree
+
+
+def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:
+    """{task: the fastest rule that the model holds certified for an error rate, or None}.
+
+    Raises:
+        InputError: the rate is outside (0, 1), or is certified for no task; the sentence says
+            which errors are.
+    """
+    check_rate(error, "the error rate")
+    if not model.info.decision_points_s:
+        raise InputError(
+            f"{model.path}: the model has no calibration, so no error rate can be held; "
+            "export it with --decision-points"
+        )
+    rules = {task: stopping.rule(error) for task, stopping in model.info.stopping.items()}
+    if not any(rules.values()):
+        reasons = (f"{task}: {one.refusal(error)}" for task, one in model.info.stopping.items())
+        raise InputError(
+            f"{model.path}: an error of {error:g} cannot be certified; {'; '.join(reasons)}"
+        )
+    return rules

@@ -42,14 +42,15 @@ class Decided:
         task: the question.
         label: its answer; "unknown" where no trained label fits, None where the features are too
             large to be measured against the training rows.
-        confidence: the label's share of the votes, 0 to 1; with an error rate, one less the
-            smallest error at which another label would remain.
+        confidence: the label's share of the votes, 0 to 1; with an error rate, the calibrated
+            probability that the label is right.
         window_s: seconds from onset that it was decided on.
         onset_s: when the contact began.
         latency_ms: from the frame that completed the window to the answer.
         flags: what to know about it, see `Classifier`.
-        error: how often a label may be wrong, where that was asked for.
-        remaining: the labels that could not be ruled out at this error.
+        error: how often a decision may be wrong, where that was asked for and is certified.
+        stopped_by: then `confidence`, or `window` where the stopping rule's last decision point
+            came first.
         contact: as in `Onset`.
         position: (x, y, z) where the contact was last seen, where several are followed (see
             `edge.touch.contact.Contact.position`); None where it is not known.
@@ -65,7 +66,7 @@ class Decided:
     latency_ms: float
     flags: tuple[str, ...] = ()
     error: float | None = None
-    remaining: tuple[str, ...] | None = None
+    stopped_by: str | None = None
     contact: int | None = None
     position: tuple[float, float, float] | None = None
     decision: Decision | None = field(default=None, compare=False, repr=False)
@@ -86,8 +87,8 @@ class Decided:
             "confidence": self.confidence,
             "latency_ms": self.latency_ms,
         }
-        if self.remaining is not None:
-            line |= {"error": self.error, "left": list(self.remaining)}
+        if self.stopped_by is not None:
+            line |= {"error": self.error, "stopped_by": self.stopped_by}
         return {**line, "flags": list(self.flags)}
 
 

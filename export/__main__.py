@@ -22,15 +22,14 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from export import golden
 from export.graph import to_onnx
 from train import operating_points
-from train.conformal import FEWEST, FOLDS, SequentialClassifier
 from train.crossval import Chosen, choose, jobs_here
 from train.dataset import DataSet, load_trials
 from train.pipeline import ContactClassifier
 from train.projection import CLOSE_EIGENVALUES, SCALINGS, check_columns
+from train.stopping import FEWEST, SequentialClassifier
 
 FRONTS = Path("build/tradeoff/front.json")
-DECISION_POINTS = "0.2:1.2:0.2"
-"""Twice as many decide no sooner on the simulated set, and take twice the memory."""
+DECISION_POINTS = "0.2:1.2:0.1"
 MOST_TRIALS = 2000
 """Beyond them calibration takes minutes, and must be asked for."""
 
@@ -69,7 +68,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
         f"seconds from onset or at a list a,b,c; `none` for none (default: {DECISION_POINTS} with "
-        f"{FEWEST * FOLDS} to {MOST_TRIALS} trials, else none)",
+        f"{FEWEST} to {MOST_TRIALS} trials, else none)",
     )
     top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
     top.add_argument("--onset", type=int, help="counts above which a contact begins")
@@ -125,9 +124,9 @@ def run(arguments: argparse.Namespace) -> int:
         at_decision_points = np.stack(
             [dataset.features(s, arguments.samples) for s in decision_points]
         )
-        sequential = SequentialClassifier(choices, decision_points, dataset.names).fit(
-            at_decision_points, y
-        )
+        sequential = SequentialClassifier(
+            choices, decision_points, dataset.names, jobs=arguments.jobs
+        ).fit(at_decision_points, y)
         classifier = sequential.decision_points_[-1]
     else:
         sequential = None
@@ -180,10 +179,10 @@ def _decision_points(arguments: argparse.Namespace, trials: int) -> tuple[float,
     """The decision points asked for, or the default ones where they can be calibrated."""
     if arguments.decision_points is not None:
         return parse_decision_points(arguments.decision_points, arguments.window)
-    if FEWEST * FOLDS <= trials <= MOST_TRIALS:
+    if FEWEST <= trials <= MOST_TRIALS:
         return parse_decision_points(DECISION_POINTS, arguments.window)
     print(
-        f"no decision points before the full window: {trials} trials are not the {FEWEST * FOLDS} "
+        f"no decision points before the full window: {trials} trials are not the {FEWEST} "
         f"to {MOST_TRIALS} that --decision-points takes by default",
         file=sys.stderr,
     )
@@ -269,7 +268,8 @@ def describe(
             **{name: version(name) for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")},
         },
         decision_points_s=() if sequential is None else tuple(sequential.decision_points_s),
-        folds=() if sequential is None else sequential.sizes_,
+        stopping={} if sequential is None else sequential.stopping_,
+        novelty=None if sequential is None else sequential.novelty_,
     )
 
 

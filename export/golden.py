@@ -22,7 +22,7 @@ VECTORS = 256
 BOUNDS = {
     "scores": 1e-15,
     "distances": 1e-12,
-    "pvalues": 1e-15,
+    "label_distances": 1e-12,
     "features": 1e-12,
     "time_s": 1e-9,
 }
@@ -30,8 +30,7 @@ BOUNDS = {
 squares of coordinates that are the same bits everywhere: its relative error is below
 22 * 2^-53 = 2.4e-15. Features are interpolated in a few operations, and motion passes through
 sines and cosines that differ by an ulp between C libraries: below 100 ulp of metres. The bounds
-leave a factor of 40 and more. P-values are quotients of counts; what is counted has a slack of
-1e-9 (`train.conformal.SLACK`), a million times what distances differ by."""
+leave a factor of 40 and more."""
 
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:
@@ -129,6 +128,10 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
             arrays[f"{task}_decision_point_{what}"] = np.stack(
                 [one[f"{task}_{what}"] for one in seen]
             )
-    bounds = {key: BOUNDS[key] for key in BOUNDS if info.decision_points_s or key != "pvalues"}
+    bounds = {
+        key: bound
+        for key, bound in BOUNDS.items()
+        if info.decision_points_s or key != "label_distances"
+    }
     meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays, meta, compress=True)

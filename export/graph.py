@@ -21,9 +21,8 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 from edge.model.model import METADATA_KEY, ModelInfo
 from edge.model.onnx_file import check
 from export.build import OPSET, Builder, project, widened
-from export.pvalues import pvalues
-from train.conformal import SequentialClassifier
-from train.pipeline import ContactClassifier, Space
+from train.pipeline import NEAREST_OF_LABEL, ContactClassifier, Space
+from train.stopping import SequentialClassifier
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
@@ -43,9 +42,15 @@ def _gaps(build: Builder, z: str, rows: Sequence[NDArray[np.float64]]) -> str:
     return build.node("Sub", [columns, build.node("Unsqueeze", [z, build.ints(2)])])
 
 
-def _nearest(build: Builder, gaps: str, k: int, outputs: tuple[str, str] = ("", "")) -> list[str]:
+def _squares(build: Builder, gaps: str) -> str:
+    """Squared distances (n, rows) of the differences (n, c, rows)."""
+    return build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)
+
+
+def _nearest(
+    build: Builder, squares: str, k: int, outputs: tuple[str, str] = ("", "")
+) -> list[str]:
     """Squared distances and rows (n, k) of the nearest, every row measured directly."""
-    squares = build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)
     return build.nodes("TopK", [squares, build.ints(k)], list(outputs), largest=0, sorted=1)
 
 
@@ -118,7 +123,9 @@ def _shortlisted(
     all_sure = build.node("ReduceMin", [flags, ints(0, 1)], keepdims=0)
     kinds = {"squares": (TensorProto.DOUBLE, 2), "rows": (TensorProto.INT64, 2)}
     then = build.branch("shortlisted", kinds, lambda: [short, found])
-    other = build.branch("measured", kinds, lambda: _nearest(build, _gaps(build, z, rows), k))
+    other = build.branch(
+        "measured", kinds, lambda: _nearest(build, _squares(build, _gaps(build, z, rows)), k)
+    )
     near_squares, near_rows = build.nodes(
         "If",
         [build.node("Cast", [all_sure], to=TensorProto.BOOL)],
@@ -206,19 +213,23 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     tasks = {task: names[f"{task}_label"].removesuffix("_label") for task in model.choices}
     near: dict[tuple[Space, int], list[str]] = {}
     gaps: dict[Space, str] = {}
+    all_squares: dict[tuple[Space, int], str] = {}
+    early = isinstance(model, SequentialClassifier)
     for (space, components), most in groups.items():
         rows = widened([m.rows_[space] for m in decision_points])
         have, k = rows[0].shape[1], model.choices[most].k
         # The rows of the task that asks for most neighbours are its output as they are.
         outputs = ("", f"{tasks[most]}_neighbours")
-        # A shortlist of most rows saves nothing.
-        if len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0]):
+        # A shortlist of most rows saves nothing, nor does one where each label's distance is asked.
+        if not early and len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0]):
             z = _first(build, points[space], have, components)
             found = _shortlisted(build, z, [r[:, :components] for r in rows], k, outputs)
         else:
             if space not in gaps:
                 gaps[space] = _gaps(build, points[space], rows)
-            found = _nearest(build, _first(build, gaps[space], have, components), k, outputs)
+            measured = _squares(build, _first(build, gaps[space], have, components))
+            all_squares[space, components] = measured
+            found = _nearest(build, measured, k, outputs)
         near[space, components] = found
     for task, choice in model.choices.items():
         key = (choice.space(task), kept[task])
@@ -229,8 +240,31 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         squares = _first(build, squares, have, choice.k)
         classes = len(last.classes_[task])
         _decide(build, tasks[task], last.labels_[task], classes, choice.k, [squares, rows_of])
-    if isinstance(model, SequentialClassifier):
-        pvalues(build, x, operator.inputs[1].full_name, model, names)
+        if early:
+            labels, output = last.labels_[task], names[f"{task}_label_distances"]
+            _label_distances(build, all_squares[key], labels, classes, output)
+
+
+def _label_distances(
+    build: Builder, squares: str, labels: NDArray[np.int64], classes: int, output: str
+) -> None:
+    """(n, labels) of squared distances (n, rows): `train.pipeline.label_distances`."""
+    sizes = np.bincount(labels, minlength=classes)
+    # A label's rows, filled up with one more column that is infinitely far away.
+    rows = np.full((classes, max(int(sizes.max()), NEAREST_OF_LABEL)), len(labels))
+    for label, size in enumerate(sizes):
+        rows[label, :size] = np.flatnonzero(labels == label)
+    ints = build.ints
+    wider = build.node("Pad", [squares, ints(0, 0, 0, 1), build.constant(np.inf)])
+    own = build.node("Gather", [wider, build.constant(rows, np.int64)], axis=1)
+    nearest, _ = build.nodes(
+        "TopK", [own, ints(NEAREST_OF_LABEL)], ["", ""], axis=2, largest=0, sorted=1
+    )
+    counts = np.minimum(sizes, NEAREST_OF_LABEL)
+    there = np.arange(NEAREST_OF_LABEL) < counts[:, None]
+    kept = build.node("Where", [build.constant(there, bool), nearest, build.constant(0.0)])
+    total = build.node("ReduceSum", [kept, ints(2)], keepdims=0)
+    build.node("Div", [total, build.constant(counts.astype(np.float64))], output)
 
 
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
@@ -244,8 +278,7 @@ def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str,
             (f"{task}_neighbours", Int64TensorType([None, choice.k])),
         ]
         if isinstance(model, SequentialClassifier):
-            shape = [None, model.folds, classes + 1]
-            found.append((f"{task}_pvalues", DoubleTensorType(shape)))
+            found.append((f"{task}_label_distances", DoubleTensorType([None, classes])))
     return found
 
 
@@ -295,8 +328,8 @@ def _in_order(nodes: list[onnx.NodeProto], known: set[str]) -> list[onnx.NodePro
 def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
-    A `SequentialClassifier` gives a second input, `decision point` int64 (1,), and for each task
-    the output `<task>_pvalues` (n, folds, labels + 1); see `train.conformal`.
+    A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), and for each task
+    the output `<task>_label_distances` (n, labels); see `edge.model.stopping`.
     """
     kind = type(model)
     update_registered_converter(

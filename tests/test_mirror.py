@@ -30,6 +30,7 @@ TOPICS = {
     "train/simulate/test_simulate_scene.py",
     "train/simulate/test_simulate_paper.py",
     # Reports, by what stands in them; an export as a whole.
+    "export/test_early_stopping.py",
     "train/study/test_study_report.py",
     "train/tradeoff/test_tradeoff.py",
     "train/test_more_features.py",

@@ -77,6 +77,21 @@ class NearestNeighbours(ClassifierMixin, BaseEstimator):
         return np.asarray(self.classes_[winners])
 
 
+NEAREST_OF_LABEL = 3
+"""Training trials of a label whose mean squared distance stands for the label."""
+
+
+def label_distances(
+    squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int
+) -> NDArray[np.float64]:
+    """(m, classes) mean of the smallest (up to `NEAREST_OF_LABEL`) squares (m, n) of each label."""
+    out = np.empty((len(squares), classes))
+    for label in range(classes):
+        own = np.sort(squares[:, labels == label], axis=1)[:, :NEAREST_OF_LABEL]
+        out[:, label] = own.sum(axis=1) / max(own.shape[1], 1)
+    return out
+
+
 Space = tuple[object, ...]
 """What projections of two tasks must have in common to be one."""
 
@@ -173,6 +188,12 @@ class ContactClassifier:
             self.rows_[space][:, :c], self.classes_[task][self.labels_[task]]
         )
         return nearest.kneighbors(self.project(space, X)[:, :c])
+
+    def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, n) squared distances of vectors (m, p) to all training trials, taken directly."""
+        space, c = self.spaces_[task], self.components_[task]
+        rows = self.rows_[space][:, :c]
+        return np.stack([((rows - z) ** 2).sum(axis=1) for z in self.project(space, X)[:, :c]])
 
     def predict(self, X: NDArray[np.float64]) -> dict[str, NDArray[np.str_]]:
         """{task: (m,) labels} for vectors (m, p)."""

@@ -6,9 +6,9 @@ import argparse
 import math
 import sys
 
+from edge.classifier import stopping_rules
 from edge.errors import InputError
 from edge.model.model import Model
-from edge.model.prediction_set import check_rate
 from edge.runtime.joint_stream import OLDEST_S
 from edge.touch.arm import Chain
 
@@ -112,24 +112,28 @@ def add_error(parser: argparse.ArgumentParser) -> None:
 
 
 def check_error(model: Model, error: float | None) -> None:
-    """Refuse an error rate that cannot be held; warn where no label can be ruled out at it.
+    """Refuse an error rate that no task is certified for; warn where a single task is not.
 
     Raises:
-        InputError: it is outside (0, 1), or the model has no calibration.
+        InputError: it is outside (0, 1), or the model cannot hold it.
     """
     if error is None:
         return
-    check_rate(error, "--error")
-    if not model.info.decision_points_s:
-        raise InputError(
-            f"{model.path}: the model has no calibration, so --error cannot be held; "
-            "export it with --decision-points"
-        )
-    smallest = model.info.smallest_error
-    if error < smallest:
-        print(
-            f"edge-classify: no label can be ruled out at --error {error:g}: the model was "
-            f"calibrated with {sum(model.info.folds)} trials, which resolve error rates down to "
-            f"{smallest:.3f}; decisions will come at the full window, flagged unsure",
-            file=sys.stderr,
-        )
+    for task, rule in stopping_rules(model, error).items():
+        if rule is None:
+            print(
+                f"edge-classify: {task}: an error of {error:g} cannot be certified, so it is "
+                f"decided at the full window: {model.info.stopping[task].refusal(error)}",
+                file=sys.stderr,
+            )
+        else:
+            how = (
+                f"always after {model.decision_points_s[rule.last]:g} s"
+                if rule.fixed
+                else f"from a confidence of {rule.confidence:g} on"
+            )
+            print(
+                f"edge-classify: {task}: decided {how}, {rule.mean_s:.2f} s on average in "
+                f"training; at most {rule.error:.1%} wrong",
+                file=sys.stderr,
+            )

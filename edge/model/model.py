@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import EdgeError, InputError
 from edge.model import onnx_file as onnxfile
+from edge.model.stopping import Novelty, Stopping
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.features import widths
@@ -22,8 +24,6 @@ from edge.touch.track import TrackSettings
 METADATA_KEY = "edge-classify"
 FORMAT = 2
 LARGEST_BYTES = 1 << 30
-NO_DECISION_POINT = -1
-"""Asks the graph for the full window, and not for p-values."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,10 @@ class ModelInfo:
     versions: dict[str, str] = field(default_factory=dict)
     decision_points_s: tuple[float, ...] = ()
     """Windows at which the model can be asked, the last the full one; none without calibration."""
-    folds: tuple[int, ...] = ()
-    """Trials in each fold of the calibration."""
+    stopping: dict[str, Stopping] = field(default_factory=dict)
+    """Of each task, where there are decision points."""
+    novelty: Novelty | None = None
+    """Where there are decision points."""
     joints: int = 0
     """Joint angles of a frame, where a feature is made of them."""
 
@@ -80,16 +82,15 @@ class ModelInfo:
         """Joint angles that a frame must bring; None where the model needs none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
 
-    @property
-    def smallest_error(self) -> float:
-        """No label can be struck out at a smaller one: there are too few calibration trials."""
-        return sum(1.0 / (1 + size) for size in self.folds) / len(self.folds)
-
     def to_json(self) -> str:
         """As the model file carries it."""
-        calibration = {}
-        if self.decision_points_s:
-            calibration = {"decision_points_s": self.decision_points_s, "folds": self.folds}
+        calibration: dict[str, Any] = {}
+        if self.decision_points_s and self.novelty is not None:
+            calibration = {
+                "decision_points_s": self.decision_points_s,
+                "stopping": {task: one.to_dict() for task, one in self.stopping.items()},
+                "novelty": self.novelty.to_dict(),
+            }
         return json.dumps(
             {
                 **calibration,
@@ -129,6 +130,8 @@ class ModelInfo:
                     f"{FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
+            points = tuple(meta.numbers("decision_points_s", default=()))
+            stopping, novelty = _calibration(meta.raw, len(points), where)
             info = cls(
                 tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
                 layout=SkinLayout.from_dict(meta.get("skin"), where=where),
@@ -146,8 +149,9 @@ class ModelInfo:
                 rows=meta.whole("rows"),
                 data_digest=meta.text("data_digest", empty=True),
                 versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
-                decision_points_s=meta.numbers("decision_points_s", default=()),
-                folds=tuple(meta.wholes("folds", default=())),
+                decision_points_s=points,
+                stopping=stopping,
+                novelty=novelty,
                 joints=meta.whole("joints", 0, allowed=range(0, 1001)),
             )
             tracking.done()
@@ -176,7 +180,9 @@ class ModelInfo:
             if (
                 not rising
                 or self.decision_points_s[-1] != self.window_s
-                or min(self.folds, default=0) < 1
+                or self.stopping.keys() != self.tasks.keys()
+                or self.novelty is None
+                or self.novelty.task not in self.tasks
             ):
                 raise InputError(f"{name}: its decision points make no sense; export it again")
         if (self.motion_frame == "world") != (self.chain is not None):
@@ -198,6 +204,20 @@ def _task(table: ConfigTable) -> Task:
     return task
 
 
+def _calibration(
+    meta: Mapping[str, Any], points: int, where: str
+) -> tuple[dict[str, Stopping], Novelty | None]:
+    """The stopping rules of each task and the limits of novelty, of a model that has them."""
+    if not points:
+        return {}, None
+    try:
+        stopping = meta["stopping"].items()
+        rules = {str(task): Stopping.from_dict(entry, points) for task, entry in stopping}
+        return rules, Novelty.from_dict(meta["novelty"], points)
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
+        raise InputError(f"{where}: its stopping rules cannot be read") from None
+
+
 class Decision(NamedTuple):
     """The answer to one task.
 
@@ -215,8 +235,8 @@ class Decision(NamedTuple):
         distances: (k,) of the neighbours, nearest first, in PCA space.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
-        pvalues: (folds, labels + 1) at the decision point that was asked for; see
-            `edge.model.prediction_set`.
+        label_distances: (labels,) mean squared distance to the nearest (up to three) training
+            trials of each label, of a model with decision points; see `edge.model.stopping`.
     """
 
     label: str
@@ -225,7 +245,7 @@ class Decision(NamedTuple):
     distances: NDArray[np.float64]
     neighbours: NDArray[np.int64]
     tie: bool
-    pvalues: NDArray[np.float64] | None = None
+    label_distances: NDArray[np.float64] | None = None
 
 
 class Model:
@@ -279,7 +299,7 @@ class Model:
         # decision then allocates next to nothing.
         self._shape = (self.info.width,)
         self._input = np.zeros((1, *self._shape))
-        self._decision_point = np.full(1, NO_DECISION_POINT, dtype=np.int64)
+        self._decision_point = np.full(1, len(self.decision_points_s) - 1, dtype=np.int64)
         outputs: dict[str, NDArray[Any]] = {
             output.name: np.zeros(
                 [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
@@ -301,7 +321,7 @@ class Model:
                 outputs[f"{task}_scores"][0],
                 outputs[f"{task}_distances"][0],
                 outputs[f"{task}_neighbours"][0],
-                outputs[f"{task}_pvalues"][0] if self.info.decision_points_s else None,
+                outputs[f"{task}_label_distances"][0] if self.info.decision_points_s else None,
             )
             for task, entry in self.info.tasks.items()
         ]
@@ -326,6 +346,8 @@ class Model:
         outputs = {output.name: output.shape for output in self._session.get_outputs()}
         for task, entry in self.info.tasks.items():
             widths = {"scores": len(entry.labels), "distances": entry.k, "neighbours": entry.k}
+            if self.info.decision_points_s:
+                widths["label_distances"] = len(entry.labels)
             if f"{task}_label" not in outputs:
                 raise InputError(f"{name}: has no output {task}_label; export it again")
             for part, width in widths.items():
@@ -335,15 +357,6 @@ class Model:
                         f"{name}: has no output {task}_{part} of width {width}, "
                         "as its metadata says; export it again"
                     )
-            folds = [len(self.info.folds), len(entry.labels) + 1]
-            if (
-                self.info.decision_points_s
-                and list(outputs.get(f"{task}_pvalues", ()))[1:] != folds
-            ):
-                raise InputError(
-                    f"{name}: has no output {task}_pvalues of shape {folds}, "
-                    "as its metadata says; export it again"
-                )
 
     @property
     def decision_points_s(self) -> tuple[float, ...]:
@@ -381,8 +394,7 @@ class Model:
 
         Args:
             vector: (width,) measured over the window of the decision point.
-            decision_point: place in `decision_points_s`, to know the p-values there; the full
-                window without them where None.
+            decision_point: place in `decision_points_s`; the last, the full window, where None.
 
         Raises:
             InputError: the vector has another length, or a value that is not finite (or is so
@@ -393,15 +405,13 @@ class Model:
         if x.shape != self._shape:
             raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
         self._input[0] = x
-        self._decision_point[0] = (
-            NO_DECISION_POINT if decision_point is None else self._place(decision_point)
-        )
+        self._decision_point[0] = self._place(decision_point)
         try:
             self._session.run_with_iobinding(self._binding)
         except Exception as error:  # an index past its tensor, a shape that came out otherwise
             raise self._broken(str(error)) from None
         decisions: dict[str, Decision] = {}
-        for name, labels, label, scores, distances, neighbours, pvalues in self._answers:
+        for name, labels, label, scores, distances, neighbours, apart in self._answers:
             index = int(label[0])
             if index < 0:
                 raise self._refusal(x)
@@ -415,7 +425,7 @@ class Model:
                 distances.copy(),
                 neighbours.copy(),
                 shares.count(shares[index]) > 1,
-                None if decision_point is None or pvalues is None else pvalues.copy(),
+                None if apart is None else apart.copy(),
             )
         return decisions
 
@@ -463,7 +473,7 @@ class _Answer(NamedTuple):
     scores: NDArray[np.float64]
     distances: NDArray[np.float64]
     neighbours: NDArray[np.int64]
-    pvalues: NDArray[np.float64] | None
+    label_distances: NDArray[np.float64] | None
 
 
 def _contents(name: str) -> tuple[onnxfile.Contents, os.stat_result]:

@@ -27,6 +27,7 @@ OPERATORS = frozenset(
         "Less",
         "MatMul",
         "Mul",
+        "Pad",
         "Not",
         "ReduceMax",
         "ReduceMin",

@@ -10,7 +10,7 @@
 | `series_counts` | int64 (s, c) | `FeatureSeries.integers`: exact |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
-| `<task>_pvalues` | float64 (v, folds, labels + 1) | likewise, of a model with decision points |
+| `<task>_label_distances` | float64 (v, labels) | likewise, of a model with decision points |
 | `decision_point_vectors` | float64 (points, w, width) | likewise, for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
 | `meta` | JSON text | `skin`, `bounds` {`scores`, `distances`, `features`, `time_s`} |
@@ -210,7 +210,7 @@ def _verify_graph(
 
 def parts(model: Model) -> tuple[str, ...]:
     """What a model says of a task."""
-    return (*PARTS, "pvalues") if model.info.decision_points_s else PARTS
+    return (*PARTS, "label_distances") if model.info.decision_points_s else PARTS
 
 
 def outputs(

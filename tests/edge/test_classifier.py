@@ -67,7 +67,7 @@ def test_joint_angles_are_asked_for_before_anything_is_read(model, make_touch):
 
 def test_an_event_is_what_a_line_of_json_says():
     decided = Decided(
-        "t", "a", 0.5, 1.2, 0.25, 0.3, ("unsure",), error=0.1, remaining=("a", "b"), contact=2
+        "t", "a", 0.5, 1.2, 0.25, 0.3, ("unsure",), error=0.1, stopped_by="window", contact=2
     )
     assert list(decided.to_dict().items()) == [
         ("event", "decision"),
@@ -80,7 +80,7 @@ def test_an_event_is_what_a_line_of_json_says():
         ("confidence", 0.5),
         ("latency_ms", 0.3),
         ("error", 0.1),
-        ("left", ["a", "b"]),
+        ("stopped_by", "window"),
         ("flags", ["unsure"]),
     ]
     assert Release(0.25, 2.5, contact=2).to_dict() == {

@@ -1,28 +1,21 @@
-"""Second moments of a region, and p-values of a trial that was seen before."""
+"""Second moments of a region, and the evidence that distances give for a label."""
 
 from __future__ import annotations
 
-import tempfile
-from dataclasses import replace
+import math
 from fractions import Fraction
-from functools import cache
-from pathlib import Path
 
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from edge.model.model import Model
+from edge.model.stopping import log_odds
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
-from export.graph import to_onnx
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM
-from tests.hard_cases.models import describe, features, labels_for, usual_pipeline
-from train.conformal import SequentialClassifier
-from train.pipeline import Choice
 
 MOMENTS = ("skin_length", "skin_width", "skin_spread_along", "skin_slant")
 BAND = 12
@@ -106,55 +99,25 @@ def moment_usual() -> str:
     )
 
 
-TRIALS = 60
+def evidence_error(power: int, labels: int, seed: int) -> float:
+    """How far `log_odds` is from the logarithm of exact odds, distances of a size 10^power."""
+    stream = np.random.default_rng(seed)
+    distances = (10.0**power * stream.uniform(0.5, 2.0, labels)).tolist()
+    exact = [Fraction(d) for d in distances]
+    worst = 0.0
+    for label, own in enumerate(exact):
+        against = sum((own / other for i, other in enumerate(exact) if i != label), Fraction(0))
+        truth = -math.log(against.numerator / against.denominator)
+        worst = max(worst, abs(log_odds(distances, label) - truth))
+    return worst
 
 
-@cache
-def sequential(seed: int, classes: int) -> tuple[SequentialClassifier, Model, NDArray[np.float64]]:
-    X = features(TRIALS, seed)[None]
-    fitted = SequentialClassifier({"t": Choice("none", 6, 1)}, (1.2,), seed=seed)
-    fitted.fit(X, {"t": labels_for(X[0], classes, seed)})
-    info = replace(
-        describe(fitted.decision_points_[-1]), decision_points_s=(1.2,), folds=fitted.sizes_
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "model.onnx"
-        path.write_bytes(to_onnx(fitted, info))
-        return fitted, Model(path), X
-
-
-def seen_before_error(seed: int, classes: int, nudge: int) -> float:
-    """Trials of which a repetition gets a smaller p-value than the trial itself had.
-
-    A p-value counts the calibration trials that are at least as strange; the trial's twin is,
-    by being equal. The graph computes its rank anew, and must not lose it to a rounding: of its
-    own, or one that another machine's features bring, `nudge` units in the last place.
-    """
-    fitted, model, X = sequential(seed, classes)
-    calibration = fitted.calibrations_["t"]
-    labels = fitted.decision_points_[-1].labels_["t"]
-    lost = 0
-    for k, size in enumerate(calibration.sizes):
-        own = np.flatnonzero(_folds(seed) == k)
-        queries = X[0, own] * (1.0 + nudge * 2.0**-52)
-        given = model.run(queries, 0)["t_pvalues"][:, k]
-        for i, (trial, strangeness) in enumerate(zip(own, calibration.maxima[0, k], strict=False)):
-            at_least = int((calibration.maxima[0, k, :size] >= strangeness).sum())
-            lost += bool(given[i, labels[trial]] < (1 + at_least) / (1 + int(size)))
-    return float(lost)
-
-
-def _folds(seed: int) -> NDArray[np.int64]:
-    from train.conformal import FOLDS, deal
-
-    return deal(TRIALS, FOLDS, seed)
-
-
-def seen_before_usual() -> str:
-    X = features(TRIALS)
-    pipe = usual_pipeline(X, 6, 2, labels_for(X))
-    shares = np.unique(pipe.predict_proba(features(200, 1)).max(axis=1)).tolist()
-    return f"no p-values; scikit-learn's largest vote share with k = 2 is one of {shares}"
+def evidence_usual() -> str:
+    """The usual softmax of negative squared distances."""
+    with np.errstate(all="ignore"):
+        squares = np.array([1e4, 2e4])
+        shares = np.exp(-squares) / np.exp(-squares).sum()
+    return f"exp(-d) / sum exp(-d) of the squared distances 1e4 and 2e4 is {shares.tolist()}"
 
 
 CASES = [
@@ -179,17 +142,21 @@ CASES = [
     ),
     Case(
         "early stopping",
-        "p-values of a trial that repeats one of the calibration",
-        "counted by rank",
-        "repetitions with a smaller p-value",
-        0,
-        seen_before_error,
+        "log-odds of a label from distances of any size",
+        "fractions",
+        "of the log-odds",
+        2.0**-44,
+        evidence_error,
         [
-            {"seed": seed, "classes": classes, "nudge": nudge}
-            for seed in range(3)
-            for classes in (2, 5)
-            for nudge in (0, 1, -1, 64, -64)
+            {"power": power, "labels": labels, "seed": 0}
+            for power in (-150, -8, 0, 8, 150)
+            for labels in (2, 36)
         ],
-        usual=seen_before_usual,
+        {
+            "power": st.integers(-150, 150),
+            "labels": st.integers(2, 40),
+            "seed": st.integers(0, 999),
+        },
+        usual=evidence_usual,
     ),
 ]

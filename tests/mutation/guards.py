@@ -231,11 +231,16 @@ GUARDS = (
         "width",
     ),
     Guard(
-        "a trial seen before is as strange as it was",
-        "train/conformal.py:",
-        "SLACK = 1e-9",
-        "SLACK = 0.0",
-        "repeats",
+        "evidence is bounded",
+        "edge/model/stopping.py:log_odds",
+        "if against == math.inf: ...",
+        "if False: ...",
+    ),
+    Guard(
+        "a walk keeps the largest limit met",
+        "train/stopping.py:certify",
+        "max(limit, least)",
+        "limit",
     ),
     Guard(
         "two readings of one instant are one",

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.crossval import votes_right
 from train.evaluate import Grid, Labels, Result, evaluate, stratified_folds
 from train.pipeline import Choice
-from train.projection import principal_axes, scale_of
-from train.study.score import best_cell
+from train.stopping import finest
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 """Numbers of components to choose from."""
 NEIGHBOURS = 6
 """Most neighbours to choose from."""
-
-
-def nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order.
-
-    Which of several equal ones is the last of the k is left open.
-    """
-    among = np.sort(np.argpartition(squares, k - 1, axis=1)[:, :k], axis=1)
-    order = np.argsort(np.take_along_axis(squares, among, axis=1), axis=1, kind="stable")
-    return np.take_along_axis(among, order, axis=1)
+CHOICE_FOLDS = 5
+"""Folds in which `Chooser` compares the candidates."""
 
 
 def nested(
@@ -41,67 +31,33 @@ def nested(
         scaling: one of `train.projection.SCALINGS`.
         features: names of the types in X.
     """
-    finest = max(y, key=lambda task: len(set(y[task])))
     grid = Grid(scaling, components=COMPONENTS, neighbours=tuple(range(1, NEIGHBOURS + 1)))
-    table = evaluate(X, y, stratified_folds(y[finest]), [grid], features=features)
+    table = evaluate(X, y, stratified_folds(y[finest(y)]), [grid], features=features)
     return {task: table.nested(task) for task in y}
 
 
 @dataclass(frozen=True)
-class SplitResult:
-    """The outcome of one split into training and test trials, for one task.
+class Chooser:
+    """Chooses every task's projection and neighbours by some of the trials alone.
 
     Attributes:
-        choice: the cell of the highest leave-one-out accuracy among the training trials.
-        right: (test,) whether the vote named the trial's label.
+        X: (n, p) at the full window.
+        y: {task: (n,) labels}.
+        grids: the candidates.
+        features: names of the types in X.
     """
 
-    choice: Choice
-    right: NDArray[np.bool_]
+    X: NDArray[np.float64]
+    y: Labels
+    grids: tuple[Grid, ...]
+    features: tuple[str, ...]
 
-
-def evaluate_split(
-    X: NDArray[np.float64],
-    classes: Mapping[str, NDArray[np.int64]],
-    train: NDArray[np.int64],
-    test: NDArray[np.int64],
-    scaling: str,
-    features: Sequence[str],
-) -> dict[str, SplitResult]:
-    """Choose each task's cell on the training trials alone, and classify the test trials with it.
-
-    Args:
-        X: (n, p).
-        classes: {task: (n,) class indices}.
-        train, test: rows.
-        scaling, features: as for `nested`.
-    """
-    _, gain = scale_of(X[train], scaling, features)
-    mean = X[train].mean(axis=0)
-    columns = np.repeat(gain, X.shape[1] // len(features))
-    scaled = (X[train] - mean) * columns
-    _, axes, _ = principal_axes(scaled)
-    axes = axes[: COMPONENTS[-1]]
-    own, new = scaled @ axes.T, ((X[test] - mean) * columns) @ axes.T
-    inner, outer = np.zeros((len(train), len(train))), np.zeros((len(test), len(train)))
-    np.fill_diagonal(inner, np.inf)
-    k = min(NEIGHBOURS, len(train) - 1)
-    among, seen = [], []
-    for c in range(len(axes)):
-        inner += (own[:, None, c] - own[:, c]) ** 2
-        outer += (new[:, None, c] - own[:, c]) ** 2
-        if c + 1 not in COMPONENTS:
-            continue
-        among.append(nearest(inner, k))
-        seen.append(nearest(outer, k))
-    answers = {}
-    for task, labels in classes.items():
-        here = labels[train]
-        grid = votes_right(np.array(among), here, here).mean(axis=1)
-        c, j = best_cell(grid)
-        right = votes_right(seen[c], here, labels[test])[:, j]
-        answers[task] = SplitResult(Choice(scaling, COMPONENTS[c], j + 1), right)
-    return answers
+    def __call__(self, rows: NDArray[np.int64]) -> dict[str, Choice]:
+        """{task: the candidate that is best in a cross-validation among the rows}."""
+        y = {task: labels[rows] for task, labels in self.y.items()}
+        folds = stratified_folds(y[finest(y)], CHOICE_FOLDS)
+        table = evaluate(self.X[rows], y, folds, self.grids, features=self.features)
+        return {task: table.choices[task][table.chosen(task)] for task in y}
 
 
 @dataclass(frozen=True)

@@ -2,121 +2,219 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
+from tqdm import tqdm
 
-from edge.model.prediction_set import NOVELTY_RATE, PredictionSet
-from train.conformal import FEWEST, SequentialClassifier
-from train.conformal import FOLDS as CALIBRATION_FOLDS
+from edge.model.stopping import NOVELTY_RATE, StoppingRule
+from train.evaluate import Labels, stratified_folds
+from train.pipeline import Choice, ContactClassifier
 from train.simulate.scene_model import Scene
-from train.tradeoff.accuracy import evaluate_split
+from train.stopping import NEVER, THRESHOLDS, SequentialClassifier, answers, finest, stops
 
-ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
+RATES = (0.02, 0.05, 0.1, 0.2)
+BINS = 10
 G = 9.80665
+
+Choose = Callable[[NDArray[np.int64]], Mapping[str, Choice]]
+"""Chooses every task's features, projection and k by some rows of the trials alone."""
 
 
 @dataclass(frozen=True)
-class Early:
-    """Decisions at one asked error, over all trials held out.
+class Certified:
+    """Decisions at one asked error, over the folds in which it was certified.
 
     Attributes:
         asked: the error rate.
-        struck: share of trials whose true label did not survive.
-        wrong: share of trials whose decision was wrong, unsure and unknown ones among them.
-        sure_wrong: share of trials decided for one label, and that wrongly.
-        unsure, unknown: shares of trials.
+        folds: how many of `FOLDS` certified it.
+        wrong: share of decisions that were wrong, `unknown` among them; NaN of no fold.
+        unknown: share of trials called unknown.
+        early: share of trials decided before the full window.
         mean_s: mean time to decision.
     """
 
     asked: float
-    struck: float
+    folds: int
     wrong: float
-    sure_wrong: float
-    unsure: float
     unknown: float
+    early: float
     mean_s: float
 
 
 @dataclass(frozen=True)
 class StoppingComparison:
-    """Early stopping and fixed windows on the same trials.
+    """Deciding when sure and waiting for a fixed window, on the same held-out trials.
 
     Attributes:
         decision_points_s: windows.
-        fixed: (decision_points,) share wrong at each window, with components and k chosen for that
-            window.
-        early: an entry an asked error.
-        trials: held out in turn.
-        hindsight_s: mean of the first window from which on each trial is told as right or wrong
-            as at the full one: what no rule that stops on these answers could undercut.
+        right: (decision points, n) whether each fixed window's decision is right.
+        confidence: (decision points, n) calibrated.
+        labels: (decision points, n) named.
+        certified: an entry an asked error.
+        hindsight_s: mean of the first window from which on each trial is decided as rightly or
+            wrongly as at the full one: what no rule that stops on these answers could undercut.
     """
 
     decision_points_s: tuple[float, ...]
-    fixed: NDArray[np.float64]
-    early: list[Early]
-    trials: int
+    right: NDArray[np.bool_]
+    confidence: NDArray[np.float64]
+    labels: NDArray[np.str_]
+    certified: list[Certified]
     hindsight_s: float
+
+    @property
+    def trials(self) -> int:
+        """Held out in turn."""
+        return int(self.right.shape[1])
+
+    @property
+    def fixed(self) -> NDArray[np.float64]:
+        """(decision points,) share wrong at each fixed window."""
+        return 1.0 - np.asarray(self.right.mean(axis=1))
+
+    def when_sure(self, agree: int = 1) -> list[tuple[float, float, float]]:
+        """(confidence asked for, mean seconds, share wrong) of stopping at each threshold.
+
+        Args:
+            agree: decision points in a row that must be sure of the same label.
+        """
+        seconds = np.array(self.decision_points_s)
+        found = []
+        for threshold in (NEVER, *THRESHOLDS.tolist()):
+            rule = StoppingRule(1.0, 0.0, threshold, agree, len(seconds) - 1)
+            at = stops(self.confidence, self.labels, rule)
+            wrong = 1.0 - float(self.right[at, np.arange(self.trials)].mean())
+            found.append((threshold, float(seconds[at].mean()), wrong))
+        return found
+
+    def reliability(self) -> list[tuple[float, float, int]]:
+        """(mean confidence, share right, decisions) of `BINS` equal ranges of confidence."""
+        confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
+        place = np.minimum((confidence * BINS).astype(int), BINS - 1)
+        return [
+            (float(confidence[own].mean()), float(right[own].mean()), int(own.sum()))
+            for own in (place == i for i in range(BINS))
+            if own.any()
+        ]
+
+    @property
+    def calibration_error(self) -> float:
+        """Expected calibration error: the bins' mean gap of confidence and share right."""
+        bins = self.reliability()
+        total = sum(count for _, _, count in bins)
+        return sum(count * abs(said - was) for said, was, count in bins) / total
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """What one fold held out gives, by task."""
+
+    test: NDArray[np.int64]
+    named: dict[str, NDArray[np.str_]]
+    confidence: dict[str, NDArray[np.float64]]
+    unknown: NDArray[np.bool_]
+    rules: dict[str, dict[float, StoppingRule | None]]
 
 
 def compare_stopping(
     X: NDArray[np.float64],
-    labels: NDArray[np.str_],
+    y: Labels,
     decision_points_s: Sequence[float],
     features: Sequence[str],
-    scaling: str = "IV",
-) -> StoppingComparison:
-    """Five folds are held out in turn; the others choose, train and calibrate.
+    choose: Choose,
+    *,
+    jobs: int = 1,
+) -> dict[str, StoppingComparison]:
+    """{task: comparison}. Folds are held out in turn; the others choose, train and calibrate.
 
     Args:
-        X: (decision_points, n, p).
-        labels: (n,).
+        X: (decision points, n, p).
+        y: {task: (n,) labels}.
         decision_points_s: windows in seconds.
         features: names of the types.
-        scaling: of the features.
+        choose: by the training rows alone.
+        jobs: processes.
     """
-    decision_points, n = X.shape[:2]
-    indices = {"task": np.unique(labels, return_inverse=True)[1]}
-    fold_of = np.random.default_rng(1).permutation(n) % FOLDS
-    right = np.zeros((decision_points, n), dtype=bool)
-    outcomes: dict[float, list[tuple[bool, bool, bool, bool, bool, float]]] = {
-        error: [] for error in ERRORS
-    }
-    with threadpool_limits(1):
-        for fold in range(FOLDS):
-            train, test = np.flatnonzero(fold_of != fold), np.flatnonzero(fold_of == fold)
-            cells = [evaluate_split(x, indices, train, test, scaling, features)["task"] for x in X]
-            right[:, test] = [cell.right for cell in cells]
-            model = SequentialClassifier(
-                {"task": cells[-1].choice}, decision_points_s, features
-            ).fit(X[:, train], {"task": labels[train]})
-            calibration = model.calibrations_["task"]
-            last = model.decision_points_[-1]
-            classes = last.classes_["task"]
-            said = last.predict(X[-1, test])["task"]
-            pvalues = [calibration.pvalues(i, X[i, test]) for i in range(decision_points)]
-            for place, trial in enumerate(test):
-                seen = [p[place] for p in pvalues]
-                favourite = int(np.searchsorted(classes, said[place]))
-                for error in ERRORS:
-                    outcomes[error].append(
-                        _decide(seen, error, classes, labels[trial], favourite, decision_points_s)
-                    )
-    early = []
-    for error, rows in outcomes.items():
-        table = np.array(rows, dtype=np.float64).mean(axis=0)
-        early.append(Early(error, *table.tolist()))
-    return StoppingComparison(
-        tuple(decision_points_s),
-        1.0 - right.mean(axis=1),
-        early,
-        n,
-        hindsight(right, decision_points_s),
+    points, n = X.shape[:2]
+    folds = stratified_folds(y[finest(y)], FOLDS)
+    seconds = np.array(decision_points_s)
+    tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
+    work = (
+        delayed(_held_out)(X, y, test, decision_points_s, tuple(features), choose) for test in tests
     )
+    parts = Parallel(n_jobs=jobs, return_as="generator")(work)
+    found = list(tqdm(parts, total=FOLDS, desc="deciding when sure"))
+    comparisons = {}
+    for task, labels in y.items():
+        named = np.empty((points, n), dtype=labels.dtype)
+        confidence = np.empty((points, n))
+        for part in found:
+            named[:, part.test] = part.named[task]
+            confidence[:, part.test] = part.confidence[task]
+        right = named == labels
+        certified = []
+        for error in ERRORS:
+            rows = []
+            for part in found:
+                rule = part.rules[task][error]
+                if rule is None:
+                    continue
+                at = stops(part.confidence[task], part.named[task], rule)
+                every = np.arange(len(part.test))
+                unknown = part.unknown[at, every]
+                wrong = ~right[:, part.test][at, every] | unknown
+                rows.append(np.stack([wrong, unknown, at < points - 1, seconds[at]]))
+            means = np.hstack(rows).mean(axis=1) if rows else np.full(4, np.nan)
+            certified.append(Certified(error, len(rows), *means.tolist()))
+        comparisons[task] = StoppingComparison(
+            tuple(decision_points_s),
+            right,
+            confidence,
+            named,
+            certified,
+            hindsight(right, decision_points_s),
+        )
+    return comparisons
+
+
+def _held_out(
+    X: NDArray[np.float64],
+    y: Labels,
+    test: NDArray[np.int64],
+    decision_points_s: Sequence[float],
+    features: Sequence[str],
+    choose: Choose,
+) -> _Fold:
+    train = np.setdiff1d(np.arange(X.shape[1]), test)
+    model = SequentialClassifier(choose(train), decision_points_s, features).fit(
+        X[:, train], {task: labels[train] for task, labels in y.items()}
+    )
+    named, confidence = {}, {}
+    unknown = np.zeros((len(X), len(test)), dtype=bool)
+    with threadpool_limits(1):
+        for task in y:
+            named[task], odds, distances = answers(model.decision_points_, task, X[:, test])
+            stopping = model.stopping_[task]
+            slopes, intercepts = np.array(stopping.slopes), np.array(stopping.intercepts)
+            confidence[task] = 1.0 / (1.0 + np.exp(-(slopes[:, None] * odds + intercepts[:, None])))
+            if task == model.novelty_.task:
+                rates = [
+                    [model.novelty_.rate(i, d) for d in row]
+                    for i, row in enumerate(distances.tolist())
+                ]
+                unknown = np.array(rates) <= NOVELTY_RATE
+    rules = {
+        task: {error: stopping.rule(error) for error in ERRORS}
+        for task, stopping in model.stopping_.items()
+    }
+    return _Fold(test, named, confidence, unknown, rules)
 
 
 def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> float:
@@ -131,88 +229,60 @@ class Novelty:
     """Contacts with things that were trained, and with things that were not.
 
     Attributes:
-        novelty_rate: how often a trained thing may be called unknown for lying far from all.
-        known: trials of trained things, and how many of them were called unknown.
-        strange: the same of things left out whole.
+        novelty_rate: share of contacts with trained things that are called unknown.
+        known: trials of trained things.
+        strange: trials of things left out whole, and how many of them are called unknown.
     """
 
     novelty_rate: float
-    known: tuple[int, int]
+    known: int
     strange: tuple[int, int]
 
 
 def novelty(
     X: NDArray[np.float64],
     labels: NDArray[np.str_],
-    decision_points_s: Sequence[float],
+    choice: Choice,
     features: Sequence[str],
-    scaling: str = "IV",
-    error: float = 0.2,
-    rates: Sequence[float] = (NOVELTY_RATE, 0.1, 0.2),
+    rates: Sequence[float] = RATES,
 ) -> list[Novelty]:
-    """A third of the labels is left out whole, in turn; a fifth of the others' trials is held out.
+    """A third of the labels is left out whole, in turn; of the others a fold at a time is known.
 
     Args:
-        X, labels, decision_points_s, features, scaling: as for `compare_stopping`.
-        error: asked for.
-        rates: of false alarms asked for.
+        X: (n, p) at the full window.
+        labels: (n,) of the task with most labels.
+        choice: of that task.
+        features: names of the types.
+        rates: of false alarms.
 
     Returns:
-        An entry a rate; none where too few trials are left to calibrate with.
+        An entry a rate; none where too few labels are left.
     """
-    names, places = np.unique(labels, return_inverse=True)
-    indices = {"task": places}
-    held = np.random.default_rng(2).permutation(len(labels)) % FOLDS == 0
-    counts = {rate: np.zeros((2, 2), dtype=int) for rate in rates}
+    names = np.unique(labels)
+    folds = stratified_folds(labels, FOLDS)
+    known: list[NDArray[np.float64]] = []
+    strange: list[NDArray[np.float64]] = []
     with threadpool_limits(1):
         for third in range(3):
-            strange = np.isin(labels, names[third::3])
-            train = np.flatnonzero(~strange & ~held)
-            if len(np.unique(labels[train])) < 2 or len(train) < FEWEST * CALIBRATION_FOLDS:
-                continue
-            cell = evaluate_split(X[-1], indices, train, train[:0], scaling, features)["task"]
-            model = SequentialClassifier({"task": cell.choice}, decision_points_s, features).fit(
-                X[:, train], {"task": labels[train]}
-            )
-            calibration = model.calibrations_["task"]
-            for row, trials in enumerate((~strange & held, strange)):
-                pvalues = [calibration.pvalues(i, x[trials]) for i, x in enumerate(X)]
-                for rate in rates:
-                    for place in range(int(trials.sum())):
-                        candidates = PredictionSet(calibration.classes, error, rate)
-                        for values in pvalues:
-                            if not candidates.settled:
-                                candidates.narrow(values[place])
-                        counts[rate][row] += (1, candidates.unknown)
+            left_out = np.isin(labels, names[third::3])
+            for fold in range(FOLDS):
+                train = np.flatnonzero(~left_out & (folds != fold))
+                if len(np.unique(labels[train])) < 2 or len(train) <= choice.k:
+                    continue
+                model = ContactClassifier({"task": choice}, features).fit(
+                    X[train], {"task": labels[train]}
+                )
+                for rows, trials in ((known, ~left_out), (strange, left_out)):
+                    asked = X[trials & (folds == fold)]
+                    if len(asked):
+                        rows.append(model.squares("task", asked).min(axis=1))
+    if not known or not strange:
+        return []
+    near, far = np.concatenate(known), np.concatenate(strange)
     return [
-        Novelty(rate, (int(k[0]), int(k[1])), (int(s[0]), int(s[1])))
-        for rate, (k, s) in counts.items()
-        if k[0] and s[0]
+        Novelty(rate, len(near), (len(far), int((far > np.quantile(near, 1.0 - rate)).sum())))
+        for rate in rates
     ]
-
-
-def _decide(
-    pvalues: list[NDArray[np.float64]],
-    error: float,
-    classes: NDArray[np.str_],
-    truth: str,
-    favourite: int,
-    decision_points_s: Sequence[float],
-) -> tuple[bool, bool, bool, bool, bool, float]:
-    """As the board's watcher does; (struck, wrong, sure and wrong, unsure, unknown, seconds)."""
-    candidates = PredictionSet(len(classes), error, NOVELTY_RATE)
-    answer, seconds, settled = "", decision_points_s[-1], False
-    for decision_point, values in enumerate(pvalues):
-        candidates.narrow(values)
-        if candidates.settled and not settled:
-            settled, seconds = True, decision_points_s[decision_point]
-            answer = "" if candidates.unknown else str(classes[candidates.remaining[0]])
-    unknown = settled and not answer
-    if not settled:
-        answer = str(classes[candidates.best(favourite)])
-    survivors = {str(classes[i]) for i in candidates.remaining}
-    wrong = answer != truth
-    return truth not in survivors, wrong, settled and wrong, not settled, unknown, seconds
 
 
 def fixed_time(found: StoppingComparison, wrong: float) -> float | None:
@@ -229,25 +299,6 @@ def fixed_time(found: StoppingComparison, wrong: float) -> float | None:
         found.decision_points_s[after - 1]
         + share * (found.decision_points_s[after] - found.decision_points_s[after - 1])
     )
-
-
-def saved(found: StoppingComparison, early: Early) -> float:
-    """Share of time saved against the shortest fixed window that is as accurate.
-
-    Where none is, the full window stands in: it takes longer and is less accurate, so that the
-    share is a lower bound.
-    """
-    fixed = fixed_time(found, early.wrong)
-    return 1.0 - early.mean_s / (found.decision_points_s[-1] if fixed is None else fixed)
-
-
-def at_full_accuracy(found: StoppingComparison) -> tuple[float, Early] | None:
-    """The most time saved, against the full window, by an asked error no less accurate than it."""
-    able = [one for one in found.early if one.wrong <= found.fixed[-1]]
-    if not able:
-        return None
-    quickest = min(able, key=lambda one: one.mean_s)
-    return 1.0 - quickest.mean_s / found.decision_points_s[-1], quickest
 
 
 def breakaway_times(scene: Scene) -> dict[str, float]:

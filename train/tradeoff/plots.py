@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from train.report.figures import COLOURS, STYLE, png
 from train.tradeoff.accuracy import MeasuredPoint
-from train.tradeoff.early import Early, StoppingComparison
+from train.tradeoff.early import StoppingComparison
 
 
 def operating_points(
@@ -121,23 +121,11 @@ def stopping(found: StoppingComparison, breakaways: Mapping[str, float], task: s
             color=COLOURS[0],
             label="fixed windows",
         )  # fmt: skip
+        curve = found.when_sure()
         axes.plot(
-            [1e3 * e.mean_s for e in found.early], [100 * e.wrong for e in found.early], "-o",
-            ms=5, color=COLOURS[1], label="as soon as it is sure, by asked error",
+            [1e3 * seconds for _, seconds, _ in curve], [100 * wrong for _, _, wrong in curve],
+            "-o", ms=3, color=COLOURS[1], label="as soon as it is sure",
         )  # fmt: skip
-        for one in _apart(
-            found.early, 0.04 * found.decision_points_s[-1], 0.06 * found.fixed.max()
-        ):
-            axes.annotate(
-                f"{100 * one.asked:g} %",
-                (1e3 * one.mean_s, 100 * one.wrong),
-                textcoords="offset points",
-                xytext=(0, -13),
-                ha="center",
-                fontsize=8,
-                color=COLOURS[1],
-                bbox={"facecolor": "white", "alpha": 0.8, "pad": 0.4, "linewidth": 0},
-            )
         axes.axvline(
             1e3 * found.hindsight_s, color=COLOURS[2], lw=1.0, ls="--",
             label="as accurate as the full window, in hindsight",
@@ -149,17 +137,6 @@ def stopping(found: StoppingComparison, breakaways: Mapping[str, float], task: s
         axes.set_title(f"Deciding as soon as it is sure: {task}")
         axes.legend(fontsize=8, loc="lower left", framealpha=1.0)
         return png(figure)
-
-
-def _apart(early: Sequence[Early], seconds: float, wrong: float) -> list[Early]:
-    """Those whose labels do not cover each other, the largest asked errors first."""
-    kept: list[Early] = []
-    for one in sorted(early, key=lambda e: -e.asked):
-        if all(
-            abs(one.mean_s - e.mean_s) > seconds or abs(one.wrong - e.wrong) > wrong for e in kept
-        ):
-            kept.append(one)
-    return kept
 
 
 def _floor(axes: Any, slow: Sequence[tuple[str, float]], full_ms: float) -> None:

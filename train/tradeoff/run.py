@@ -18,12 +18,14 @@ from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
 from edge.touch.layout import SkinLayout
 from train.dataset import DataSet, load_trials
+from train.evaluate import Grid
 from train.report.html import write
 from train.simulate import scene as scenes
+from train.stopping import finest
 from train.study import skins
 from train.tradeoff import board as boards
 from train.tradeoff import early, prices, sections
-from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front
+from train.tradeoff.accuracy import Chooser, MeasuredPoint, nested, pareto_front
 from train.tradeoff.wires import Wire, wires
 
 WINDOWS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
@@ -73,12 +75,12 @@ def tradeoff(
         raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
     points = measured(dataset, board, jobs)
     best = {task: pareto_front([p for p in points if p.task == task]) for task in dataset.tasks}
-    both, finest, strange = _early(dataset, jobs)
+    both, most, strange = _early(dataset, jobs)
     breakaways = {} if scene is None else early.breakaway_times(scene)
     parts = [
         sections.operating_points(points, best, main, board, breakaways, is_paper),
         sections.stopping(both, breakaways, main),
-        *([sections.unknown(finest, strange)] if strange else []),
+        *([sections.unknown(most, strange)] if strange else []),
         *([] if sizes is None else [prices.section(sizes, dataset, main)]),
         sections.arithmetic(board),
     ]
@@ -172,10 +174,12 @@ def _early(
     """Early stopping of every task; the finest task, and things left out whole in it."""
     X = np.stack([dataset.features(window) for window in DECISION_POINTS_S])
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    finest = max(y, key=lambda task: len(set(y[task])))
-    work = (delayed(early.compare_stopping)(X, y[task], DECISION_POINTS_S, FEATURES) for task in y)
-    found = dict(zip(y, Parallel(n_jobs=jobs)(work), strict=True))
-    return found, finest, early.novelty(X, y[finest], DECISION_POINTS_S, FEATURES)
+    grids = (Grid("IV"), Grid("IV", "lda"))
+    choose = Chooser(X[-1], y, grids, FEATURES)
+    found = early.compare_stopping(X, y, DECISION_POINTS_S, FEATURES, choose, jobs=jobs)
+    most = finest(y)
+    choice = choose(np.arange(X.shape[1]))[most]
+    return found, most, early.novelty(X[-1], y[most], choice, FEATURES)
 
 
 def is_paper(point: MeasuredPoint) -> bool:

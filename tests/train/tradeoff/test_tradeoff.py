@@ -15,9 +15,10 @@ from edge.touch.layout import SkinLayout
 from export.__main__ import main as export
 from train.__main__ import main as train
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
+from train.pipeline import Choice
 from train.study.score import Result
 from train.tradeoff import board, early
-from train.tradeoff.accuracy import MeasuredPoint, nearest, nested, pareto_front
+from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
 
@@ -61,11 +62,6 @@ def test_a_slower_wire_brings_every_nth_frame():
     thin = series(9).thinned(4)
     assert thin.t.tolist() == [0.0, 0.04, 0.08]
     assert thin.peak.tolist() == thin.sums[:, 1].tolist() == [0, 4, 8]
-
-
-def test_the_nearest_are_in_order_and_equal_ones_in_theirs():
-    squares = np.array([[4.0, 1.0, 9.0, 1.0, 0.0]])
-    assert nearest(squares, 4).tolist() == [[4, 1, 3, 0]]
 
 
 def test_nested_accuracy_of_labels_by_chance_is_chance():
@@ -190,56 +186,73 @@ def test_export_takes_window_features_and_scaling_of_a_point(recordings, tmp_pat
     assert export([*given, "--front", "0.99", "--fronts", str(tmp_path / "front.json")]) == 2
 
 
-class TestEarly:
-    def found(self, fixed):
-        return early.StoppingComparison((0.2, 0.6, 1.0), np.array(fixed), [], 100, 0.5)
+def comparison(right, seconds=(0.2, 0.6, 1.0)):
+    """Fixed windows with these outcomes; every confidence is a half."""
+    right = np.array(right, dtype=bool)
+    labels = np.where(right, "a", "b")
+    return early.StoppingComparison(
+        seconds, right, np.full(right.shape, 0.5), labels, [], early.hindsight(right, seconds)
+    )
 
+
+def share_right(*shares):
+    """(windows, 100) of which so many are right."""
+    return np.arange(100) < 100 * np.array(shares)[:, None]
+
+
+class TestEarly:
     def test_the_fixed_window_that_is_as_accurate_is_interpolated(self):
-        found = self.found([0.5, 0.3, 0.1])
-        assert early.fixed_time(found, 0.1) == pytest.approx(1.0)
+        found = comparison(share_right(0.5, 0.7, 0.9))
+        assert early.fixed_time(found, 0.1 + 1e-9) == pytest.approx(1.0)
         assert early.fixed_time(found, 0.2) == pytest.approx(0.8)
         assert early.fixed_time(found, 0.9) == pytest.approx(0.2)
         assert early.fixed_time(found, 0.05) is None
 
     def test_a_longer_window_that_is_worse_is_no_excuse(self):
-        assert early.fixed_time(self.found([0.5, 0.1, 0.3]), 0.1) == pytest.approx(0.6)
-
-    def test_time_saved_is_against_that_window(self):
-        one = early.Early(0.1, 0.1, 0.2, 0.1, 0.1, 0.0, mean_s=0.4)
-        assert early.saved(self.found([0.5, 0.3, 0.1]), one) == pytest.approx(0.5)
-
-    def test_what_beats_every_fixed_window_is_set_against_the_full_one(self):
-        one = early.Early(0.1, 0.1, 0.2, 0.1, 0.1, 0.0, mean_s=0.4)
-        assert early.saved(self.found([0.5, 0.3, 0.25]), one) == pytest.approx(0.6)
-
-    def test_the_time_saved_at_the_full_window_s_accuracy_is_of_the_quickest_that_has_it(self):
-        found = self.found([0.5, 0.1, 0.3])
-        assert early.at_full_accuracy(found) is None
-        for wrong, mean_s in ((0.25, 0.9), (0.3, 0.7), (0.31, 0.2)):
-            found.early.append(early.Early(0.1, 0.1, wrong, 0.1, 0.1, 0.0, mean_s))
-        gain, one = early.at_full_accuracy(found)
-        assert (gain, one.wrong) == (pytest.approx(0.3), 0.3)
+        found = comparison(share_right(0.5, 0.9, 0.7))
+        assert early.fixed_time(found, 0.1 + 1e-9) == pytest.approx(0.6)
 
     def test_hindsight_stops_each_trial_once_its_answer_stays_as_it_ends(self):
-        right = np.array([[1, 0, 1, 0], [1, 1, 0, 1], [1, 1, 1, 0]], dtype=bool)
+        found = comparison([[1, 0, 1, 0], [1, 1, 0, 1], [1, 1, 1, 0]])
         # From the first decision point on, the second, the last, and the last.
-        expected = np.mean([0.2, 0.6, 1.0, 1.0])
-        assert early.hindsight(right, (0.2, 0.6, 1.0)) == pytest.approx(expected)
+        assert found.hindsight_s == pytest.approx(np.mean([0.2, 0.6, 1.0, 1.0]))
 
-    def test_what_is_plain_from_the_second_look_on_is_decided_then(self):
-        """Before it the labels are told apart by nothing; an asked error decides there at once."""
+    def test_confidence_that_says_what_comes_true_has_no_calibration_error(self):
+        found = comparison(share_right(0.5, 0.5, 0.5))
+        assert found.calibration_error == pytest.approx(0.0)
+        assert comparison(share_right(0.9, 0.9, 0.9)).calibration_error == pytest.approx(0.4)
+
+    def test_what_is_plain_from_the_second_decision_point_on_is_decided_then(self):
+        """Before it the labels look alike; once they differ no one waits for the full window."""
         rng = np.random.default_rng(6)
         labels = np.repeat(["a", "b"], 60)
         X = rng.normal(size=(3, 120, 12))
-        X[1:, :, 0] += 200.0 * (labels == "a")
-        found = early.compare_stopping(X, labels, (0.2, 0.6, 1.0), ("max_force",), "none")
+        X[1:, :, 0] += 30.0 * (labels == "a")
+
+        def choose(rows):
+            return {"task": Choice("none", 3, 3)}
+
+        found = early.compare_stopping(
+            X, {"task": labels}, (0.2, 0.6, 1.0), ("max_force",), choose
+        )["task"]
         assert found.fixed[0] > 0.3
         assert found.fixed[1:].tolist() == [0.0, 0.0]
         assert 0.2 < found.hindsight_s <= 0.6
-        one = next(e for e in found.early if e.asked == 0.1)
-        assert one.struck <= 0.1 + 1.96 * np.sqrt(0.1 * 0.9 * (1 / 96 + 1 / 120))
-        assert 0.4 < one.mean_s < 0.75
-        assert one.wrong == pytest.approx(one.sure_wrong)
+        one = next(e for e in found.certified if e.asked == 0.1)
+        assert one.folds == early.FOLDS
+        assert one.wrong <= 0.1
+        assert one.mean_s <= 0.61
+
+    def test_things_left_out_far_away_are_unknown_and_those_alike_are_not(self):
+        rng = np.random.default_rng(0)
+        labels = np.repeat(["a", "b", "c", "d", "e", "f"], 20)
+        X = rng.normal(size=(120, 12))
+        choice = Choice("none", 3, 1)
+        alike = early.novelty(X, labels, choice, ("max_force",), (0.1,))[0]
+        assert alike.strange[1] / alike.strange[0] < 0.3
+        X[:, 0] += 100.0 * np.repeat(np.arange(6), 20)
+        apart = early.novelty(X, labels, choice, ("max_force",), (0.1,))[0]
+        assert apart.strange[1] == apart.strange[0]
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load

@@ -1,0 +1,119 @@
+"""Confidence from distances, rules by their certified error, refusals, and the unknown."""
+
+import math
+
+import pytest
+
+from edge.errors import InputError
+from edge.model.stopping import (
+    LARGEST_LOG_ODDS,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    check_rate,
+    log_odds,
+)
+
+
+class TestLogOdds:
+    def test_of_two_labels_they_are_the_ratio_of_the_distances(self):
+        assert log_odds([1.0, 4.0], 0) == pytest.approx(math.log(4.0))
+        assert log_odds([1.0, 4.0], 1) == pytest.approx(-math.log(4.0))
+
+    def test_of_several_the_others_count_together(self):
+        # 1 / d: 1, 1/2 and 1/4; the odds of the first are 1 : 3/4.
+        assert log_odds([1.0, 2.0, 4.0], 0) == pytest.approx(math.log(4 / 3))
+
+    @pytest.mark.parametrize(
+        ("distances", "label", "expected"),
+        [
+            ([0.0, 1.0], 0, LARGEST_LOG_ODDS),
+            ([1.0, 0.0], 0, -LARGEST_LOG_ODDS),
+            ([0.0, 0.0], 0, 0.0),
+            ([1.0], 0, LARGEST_LOG_ODDS),
+            ([1.0, math.inf], 0, LARGEST_LOG_ODDS),
+            ([1e-300, 1e300], 0, LARGEST_LOG_ODDS),
+            ([1e300, 1e-300], 0, -LARGEST_LOG_ODDS),
+            ([5e-324, 5e-324], 1, 0.0),
+        ],
+    )
+    def test_stay_finite_where_distances_are_not_ordinary(self, distances, label, expected):
+        assert log_odds(distances, label) == pytest.approx(expected)
+
+
+def stopping(**changes):
+    rules = (
+        StoppingRule(0.10, 1.2, 2.0, 1, 2),
+        StoppingRule(0.15, 0.8, 0.9, 1, 2),
+        StoppingRule(0.25, 0.4, 0.6, 2, 2),
+    )
+    given = {
+        "slopes": (1.0, 1.0, 2.0),
+        "intercepts": (0.0, 0.0, -1.0),
+        "rules": rules,
+        "trials": 140,
+        "wrong": 7,
+        "risk": 0.1,
+    }
+    return Stopping(**{**given, **changes})
+
+
+def test_the_fastest_rule_that_is_certified_is_taken():
+    assert stopping().rule(0.05) is None
+    assert stopping().rule(0.10).mean_s == 1.2
+    assert stopping().rule(0.2).mean_s == 0.8
+    assert stopping().rule(0.9).mean_s == 0.4
+
+
+def test_confidence_is_the_logistic_function_of_the_evidence():
+    assert stopping().confidence(0, [1.0, 4.0], 0) == pytest.approx(4 / 5)
+    assert stopping().confidence(2, [1.0, 4.0], 0) == pytest.approx(1 / (1 + math.exp(1) / 16))
+
+
+def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
+    text = stopping().refusal(0.08)
+    assert "the smallest error that 140 calibration trials certify is 0.100" in text
+    needed = int(text.split("about ")[1].split()[0])
+    # So many trials with the same share of errors pass the exact binomial test.
+    wrong = math.floor(needed * 7 / 140)
+    tail = sum(math.comb(needed, k) * 0.08**k * 0.92 ** (needed - k) for k in range(wrong + 1))
+    assert 0.005 < tail <= 0.1
+
+
+def test_where_the_full_window_errs_more_often_trials_do_not_help():
+    assert "more trials alone will not do" in stopping(wrong=28).refusal(0.15)
+    assert "needs about" in stopping(wrong=0).refusal(0.01)
+
+
+def test_what_is_stored_is_read_again():
+    assert Stopping.from_dict(stopping().to_dict(), 3) == stopping()
+    novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0, 4.0)))
+    assert Novelty.from_dict(novelty.to_dict(), 2) == novelty
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"slopes": (1.0, 1.0)},
+        {"intercepts": (0.0, 0.0, math.nan)},
+        {"rules": ()},
+        {"rules": (StoppingRule(0.1, 1.0, 0.9, 1, 3),)},
+        {"rules": (StoppingRule(0.0, 1.0, 0.9, 1, 2),)},
+        {"wrong": 141},
+        {"risk": 0.0},
+    ],
+)
+def test_what_contradicts_itself_is_no_stopping(changes):
+    with pytest.raises(ValueError, match="makes no sense"):
+        Stopping.from_dict(stopping(**changes).to_dict(), 3)
+
+
+def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
+    novelty = Novelty("t", (0.2, 0.1, 0.05), ((1.0, 2.0, 3.0),))
+    assert [novelty.rate(0, d) for d in (0.5, 1.0, 1.5, 2.5, 9.0)] == [1.0, 1.0, 0.2, 0.1, 0.05]
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, -0.1, math.nan])
+def test_a_rate_lies_inside_0_to_1(value):
+    with pytest.raises(InputError, match="must be above 0 and below 1"):
+        check_rate(value, "the error rate")

@@ -1,0 +1,162 @@
+"""Learn-then-test: exact limits, walks that stop at the first failure, certificates that hold."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from edge.errors import InputError
+from edge.model.stopping import StoppingRule
+from train.pipeline import Choice
+from train.stopping import (
+    NEVER,
+    RISK,
+    HeldOut,
+    SequentialClassifier,
+    answers,
+    certify,
+    folds_of,
+    logistic,
+    stops,
+    upper_limit,
+)
+
+
+@pytest.mark.parametrize(("wrong", "trials"), [(0, 20), (3, 140), (139, 140), (140, 140)])
+def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
+    limit = upper_limit(wrong, trials, 0.1)
+    assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
+    assert binom.cdf(wrong, trials, limit - 1e-6) > 0.1
+
+
+class TestStops:
+    CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
+    LABELS = np.array([["a", "a", "a"], ["b", "a", "a"], ["b", "a", "a"]])
+
+    def stop(self, **rule):
+        given = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "agree": 1, "last": 2}
+        return stops(self.CONFIDENCE, self.LABELS, StoppingRule(**{**given, **rule})).tolist()
+
+    def test_at_the_first_decision_point_that_is_sure(self):
+        assert self.stop() == [0, 1, 0]
+
+    def test_two_in_a_row_must_name_the_same_label(self):
+        assert self.stop(agree=2) == [2, 2, 2]
+        assert self.stop(agree=2, confidence=0.75) == [2, 2, 2]
+        assert self.stop(agree=2, confidence=0.15) == [2, 1, 2]
+
+    def test_a_fixed_window_waits_for_it_and_no_longer(self):
+        assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
+
+
+def test_a_logistic_regression_finds_the_curve_that_drew_the_outcomes():
+    rng = np.random.default_rng(0)
+    odds = rng.normal(scale=2.0, size=20_000)
+    right = rng.random(len(odds)) < 1 / (1 + np.exp(-(0.5 * odds + 1.0)))
+    slope, intercept = logistic(odds, right)
+    assert slope == pytest.approx(0.5, abs=0.03)
+    assert intercept == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_logistic_regression_of_what_is_always_right_stays_finite():
+    slope, intercept = logistic(np.full(50, 25.0), np.ones(50, dtype=bool))
+    assert 0.0 <= slope < 100.0
+    assert abs(intercept) < 100.0
+
+
+SECONDS = np.array([0.4, 0.8, 1.2])
+
+
+def drawn(n, rng):
+    """Confidences that are the probability of being right, and outcomes drawn with them."""
+    final = rng.beta(8.0, 1.0, n)
+    confidence = np.stack([0.4 + 0.2 * final, 0.2 + 0.7 * final, final])
+    right = rng.random(n) < confidence
+    labels = np.where(right, "a", "b")
+    return confidence, HeldOut(labels, right, confidence, confidence)
+
+
+def test_rules_rise_in_error_and_fall_in_time():
+    confidence, held_out = drawn(400, np.random.default_rng(0))
+    rules = certify(confidence, held_out, ~held_out.right, SECONDS)
+    errors, times = [r.error for r in rules], [r.mean_s for r in rules]
+    assert errors == sorted(errors)
+    assert times == sorted(times, reverse=True)
+    assert times[0] == pytest.approx(1.2)
+
+
+def test_the_first_rule_is_the_full_window_at_the_whole_level():
+    confidence, held_out = drawn(140, np.random.default_rng(1))
+    rules = certify(confidence, held_out, ~held_out.right, SECONDS)
+    wrong = int((~held_out.right[-1]).sum())
+    assert rules[0].error == pytest.approx(upper_limit(wrong, 140, RISK))
+
+
+@pytest.mark.parametrize("error", [0.15, 0.2, 0.3])
+def test_certificates_fail_no_oftener_than_they_say(error):
+    """Of 300 calibrations the share whose rule errs more often than certified; at most a tenth."""
+    rng = np.random.default_rng(2)
+    world_confidence, world = drawn(20_000, rng)
+    failed = 0
+    for _ in range(300):
+        confidence, held_out = drawn(100, rng)
+        able = [
+            rule
+            for rule in certify(confidence, held_out, ~held_out.right, SECONDS)
+            if rule.error <= error
+        ]
+        if able:
+            at = stops(world_confidence, world.labels, able[-1])
+            failed += 1.0 - world.right[at, np.arange(20_000)].mean() > error
+    assert failed <= binom.ppf(0.99, 300, RISK)
+
+
+def touches(n, seed=0):
+    """At the first decision point the labels look alike; from the second on they do not."""
+    rng = np.random.default_rng(seed)
+    labels = rng.choice(["a", "b"], n)
+    X = rng.normal(size=(3, n, 12))
+    X[1:, :, 0] += 30.0 * (labels == "a")
+    return X, labels
+
+
+def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
+    X, labels = touches(120)
+    choices = {"t": Choice("none", 3, 3)}
+    model = SequentialClassifier(choices, SECONDS, ("max_force",)).fit(X, {"t": labels})
+    rule = model.stopping_["t"].rule(0.1)
+    assert rule.mean_s <= 0.81
+    new, truth = touches(300, seed=1)
+    named, _, _ = answers(model.decision_points_, "t", new)
+    assert (named[1:] == truth).all()
+
+
+def test_each_fold_is_answered_by_what_was_chosen_without_it():
+    X, labels = touches(60)
+    folds = folds_of(60, 0)
+    # A projection of no component that tells: the fold it serves is guessed.
+    worse = X.copy()
+    worse[:, :, 0] = 0.0
+    choices = {"t": Choice("none", 3, 3)}
+    bad = {"t": Choice("none", 1, 59 - int((folds == 0).sum()))}
+    count = int(folds.max()) + 1
+    model = SequentialClassifier(choices, SECONDS, ("max_force",)).fit(
+        X, {"t": labels}, folds, [bad, *[choices] * (count - 1)]
+    )
+    right = model.held_out_["t"].right[-1]
+    assert right[folds != 0].all()
+    assert not right[folds == 0].all()
+
+
+def test_a_held_out_trial_is_never_its_own_neighbour():
+    X, labels = touches(60)
+    model = SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS, ("max_force",))
+    model.fit(X, {"t": labels})
+    assert (model.held_out_["t"].distances > 0.0).all()
+    _, _, own = answers(model.decision_points_, "t", X)
+    assert (own == 0.0).all()
+
+
+def test_too_few_trials_are_refused():
+    X, labels = touches(19)
+    with pytest.raises(InputError, match="calibration needs at least 20 trials, not 19"):
+        SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS).fit(X, {"t": labels})
