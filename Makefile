@@ -3,6 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 # Matrices this small only lose by several threads, which also fight with the processes beside.
 export OPENBLAS_NUM_THREADS := 1
 
@@ -31,7 +32,8 @@ help:
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .[dev]
+	$(PIP) "pip>=25.1"
+	$(PIP) -e . --group dev
 	@touch $@
 
 venv: $(READY)
@@ -98,7 +100,7 @@ docs/touch.png: $(READY)
 BENCHVENV := $(VENV)/.bench
 
 $(BENCHVENV): $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .[bench]
+	$(PIP) --group bench
 	@touch $@
 
 bench: $(BENCHVENV)

@@ -1,6 +1,6 @@
 """An MCAP file of ROS 2 or JSON messages: one recording; see train/importers/topics.py.
 
-Needs the extra `ros`: pip install edge-classify[ros]
+Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A bag of ROS 1 (`.bag`) or ROS 2 (its folder): one recording; see train/importers/topics.py.
 
-Needs the extra `ros`: pip install edge-classify[ros]
+Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """
 
 from __future__ import annotations

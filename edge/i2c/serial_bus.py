@@ -1,0 +1,224 @@
+"""A microcontroller on a serial port, with the face of an I2C bus.
+
+The registers of `edge.i2c.block` travel in packets, so that its driver runs unchanged. A request is
+the pointer, a tag and their CRC-16; the answer is the tag and what stands behind the pointer, which
+ends in a CRC-16 of its own. Packets are encoded with COBS (consistent overhead byte stuffing), so
+that a zero byte always means the end of a packet, wherever reading begins.
+"""
+
+from __future__ import annotations
+
+import errno
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from edge.errors import InputError
+from edge.i2c.block import IDENTITY, data_bytes, sealed
+from edge.i2c.bus import BusError, Message, Transfer, bus_error, read, write
+
+BOOT_S = 3.0
+"""Many boards restart when their port is opened; the bootloader of an Arduino takes 2 s."""
+PING_S = 0.1
+LONGEST_PACKET = 16384
+"""More bytes than this without a zero are noise."""
+REMEDIES = {
+    errno.ENOENT: "no such serial port; is the microcontroller plugged in?",
+    errno.EACCES: "may not be opened; add yourself to the group dialout",
+    errno.EBUSY: "another program has the port open; close it",
+    errno.ETIMEDOUT: "no whole answer came in time; check the firmware and the baud rate",
+    errno.ENODEV: "the port has gone; plug the microcontroller in again",
+    errno.EOPNOTSUPP: "a serial port carries the frames of a microcontroller alone (kind block)",
+}
+"""What to do about each error, by errno."""
+
+
+def encode(data: bytes) -> bytes:
+    """A packet: COBS, and a zero at the end.
+
+    >>> encode(bytes([17, 0, 0, 34])).hex(" ")
+    '02 11 01 02 22 00'
+    """
+    out = bytearray()
+    at = 0
+    while at <= len(data):
+        end = data.find(0, at, at + 254)
+        run = data[at : end if end >= 0 else at + 254]
+        out.append(len(run) + 1)
+        out += run
+        # A run of 254 bytes stands for no zero; the packet's end stands for one that is left out.
+        at += len(run) + (len(run) < 254)
+    return bytes(out) + b"\0"
+
+
+def decode(packet: bytes) -> bytes | None:
+    """What a packet (without its final zero) carries, or None where it was cut short.
+
+    >>> decode(bytes([2, 17, 1, 2, 34])).hex(" "), decode(bytes([5, 17]))
+    ('11 00 00 22', None)
+    """
+    out = bytearray()
+    at = 0
+    while at < len(packet):
+        code = packet[at]
+        if code == 0 or at + code > len(packet):
+            return None
+        out += packet[at + 1 : at + code]
+        at += code
+        if code < 255 and at < len(packet):
+            out.append(0)
+    return bytes(out)
+
+
+def serial_bits(messages: Sequence[Message]) -> int:
+    """Bits on the line for a request and its answer: 10 per byte, start and stop bit included.
+
+    >>> serial_bits([write(0, b"\\x10"), read(0, 4 + data_bytes(100, 12))])
+    1630
+    """
+    request, answer = 4, 1 + len(messages[-1].buffer)
+    packets = (n + n // 254 + 2 for n in (request, answer))
+    return 10 * sum(packets)
+
+
+def serial_error(code: int, port: str) -> BusError:
+    """The named error of an errno, with a sentence that names the port."""
+    error = bus_error(code, port)
+    remedy = REMEDIES.get(code, "the transfer broke off; check the cable")
+    named = type(error)(f"{port}: {remedy} ({errno.errorcode.get(code, code)})")
+    named.errno, named.bus, named.address = code, port, None
+    return named
+
+
+class SerialBus:
+    """A serial port with one microcontroller that serves frames.
+
+    >>> bus = SerialBus("/dev/ttyACM0")                         # doctest: +SKIP
+    >>> chip = Block(bus, 0, taxels=100, bits=12)               # doctest: +SKIP
+    """
+
+    def __init__(
+        self, port: str, *, baud: int = 115_200, timeout_s: float = 0.02, boot_s: float = BOOT_S
+    ) -> None:
+        """Open the port, and wait until the microcontroller answers.
+
+        Args:
+            port: such as `/dev/ttyACM0`, `/dev/serial/by-id/...` or `COM3`.
+            baud: bits per second; a port over USB ignores it.
+            timeout_s: how long an answer may take.
+            boot_s: how long to wait for the first answer; it is no error if none comes.
+
+        Raises:
+            InputError: pyserial is not installed.
+            BusError: the port is not there or may not be opened.
+        """
+        self.name, self.baud, self.timeout_s = port, baud, timeout_s
+        self._port: Any = None
+        self._received = bytearray()
+        self._tag = 0
+        self.reopen()
+        ends = self.now() + boot_s
+        ping = self.prepare(write(0, IDENTITY), read(0, 10))
+        while self.now() < ends:
+            try:
+                self._exchange(ping, PING_S)
+                break
+            except BusError as error:
+                if error.errno != errno.ETIMEDOUT:
+                    raise
+
+    now = staticmethod(time.monotonic)
+    sleep = staticmethod(time.sleep)
+
+    def reopen(self) -> None:
+        """Open the port unless it is open, and forget what has come.
+
+        A port that merely did not answer is not closed: opening it restarts many boards.
+
+        Raises:
+            InputError: pyserial is not installed.
+            BusError: the port is not there or may not be opened.
+        """
+        try:
+            import serial
+        except ImportError:
+            raise InputError(
+                f"{self.name}: serial ports need pyserial; run `pip install edge-classify[serial]`"
+            ) from None
+        self._received.clear()
+        try:
+            if self._port is None:
+                self._port = serial.Serial(
+                    self.name, self.baud, timeout=0, write_timeout=self.timeout_s, exclusive=True
+                )
+            self._port.reset_input_buffer()
+        except (OSError, ValueError) as error:
+            self.close()
+            raise serial_error(getattr(error, "errno", None) or errno.ENODEV, self.name) from None
+
+    def prepare(self, *messages: Message) -> Transfer:
+        """Keep the messages."""
+        return Transfer(messages)
+
+    def transfer(self, prepared: Transfer) -> None:
+        """Ask for what stands behind a pointer, and read the answer into the last message.
+
+        Raises:
+            BusError: the port is gone, or no whole answer came in time.
+        """
+        self._exchange(prepared, self.timeout_s)
+
+    def _exchange(self, prepared: Transfer, timeout_s: float) -> None:
+        messages = prepared.messages
+        if len(messages) != 2 or messages[0].read or len(messages[0].buffer) != 1:
+            raise serial_error(errno.EOPNOTSUPP, self.name)
+        if self._port is None:
+            raise serial_error(errno.ENODEV, self.name)
+        into = messages[-1].buffer
+        try:
+            answer = self._ask(int(messages[0].buffer[0]), self.now() + timeout_s)
+        except OSError as error:
+            # The timeout of a write carries no errno, nor do pyserial's errors of a lost port.
+            hung = type(error).__name__ == "SerialTimeoutException"
+            if not hung:
+                self.close()
+            raise serial_error(errno.ETIMEDOUT if hung else errno.ENODEV, self.name) from None
+        if answer is None:
+            raise serial_error(errno.ETIMEDOUT, self.name)
+        if len(answer) != len(into):
+            raise serial_error(errno.EIO, self.name)
+        into[:] = np.frombuffer(answer, dtype=np.uint8)
+
+    def _ask(self, pointer: int, ends: float) -> bytes | None:
+        """What stands behind a pointer, or None where no answer comes by the time `ends`."""
+        self._tag = (self._tag + 1) % 256
+        self._port.write(encode(sealed(bytes([pointer, self._tag]))))
+        while self.now() < ends:
+            packet = self._packet(ends)
+            # The answer to an earlier request, which came too late, bears another tag.
+            if packet is not None and packet[:1] == bytes([self._tag]):
+                return packet[1:]
+        return None
+
+    def _packet(self, ends: float) -> bytes | None:
+        """The next packet that is whole, or None by the time `ends`."""
+        while True:
+            packet, zero, rest = self._received.partition(b"\0")
+            if zero:
+                self._received = rest
+                return decode(bytes(packet))
+            if len(packet) > LONGEST_PACKET:
+                self._received.clear()
+            left = ends - self.now()
+            if left <= 0.0:
+                return None
+            self._port.timeout = left
+            self._received += self._port.read(max(1, self._port.in_waiting))
+
+    def close(self) -> None:
+        """Let the port go; twice is fine."""
+        if self._port is not None:
+            port, self._port = self._port, None
+            port.close()
