@@ -8,6 +8,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 BOARD = {"numpy", "onnxruntime", "smbus2", "edge"}
+OPTIONAL = {"serial": "edge/i2c/serial_bus.py", "argcomplete": "edge/cli.py"}
+"""Of the wheel's extras, and the one module that may ask for each."""
 FORBIDDEN = {"pickle", "joblib.dump", "marshal", "shelve"}
 
 
@@ -28,7 +30,18 @@ def modules(package: str) -> list[Path]:
 @pytest.mark.parametrize("path", modules("edge"), ids=lambda p: str(p.relative_to(ROOT)))
 def test_the_board_needs_numpy_onnxruntime_and_smbus2_alone(path):
     roots = {name.split(".")[0] for name in imported(path)}
-    assert roots - BOARD <= set(sys.stdlib_module_names)
+    here = {name for name, at in OPTIONAL.items() if path == ROOT / at}
+    assert roots - BOARD - here <= set(sys.stdlib_module_names)
+
+
+@pytest.mark.parametrize("name", OPTIONAL)
+def test_an_optional_dependency_is_imported_only_where_it_is_used(name):
+    """Within a function, so that the module works without it."""
+    tree = ast.parse((ROOT / OPTIONAL[name]).read_text())
+    loaded = [n for n in ast.walk(tree) if isinstance(n, ast.Import) and n.names[0].name == name]
+    inside = [n for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)]
+    assert loaded
+    assert all(node in inside for node in loaded)
 
 
 def test_train_never_reaches_export():

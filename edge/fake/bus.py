@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -41,6 +41,7 @@ class FakeBus:
         timeout_s: float = 0.02,
         faults: Sequence[Fault] = NO_FAULTS,
         seed: int = 0,
+        count: Callable[[Sequence[Message]], int] = wire_bits,
     ) -> None:
         """Lay the bus.
 
@@ -53,6 +54,7 @@ class FakeBus:
             timeout_s: what a hung transfer costs where timed.
             faults: see `edge.fake.faults`.
             seed: of the faults' random stream.
+            count: bits on the wire of a call's messages.
         """
         self.name = name
         self.chips = dict(chips or {})
@@ -65,6 +67,7 @@ class FakeBus:
         self.threads: set[int] = set()
         """Threads that have used it: a bus belongs to one at a time."""
         self._held: dict[tuple[Route, int], bytes] = {}
+        self._count = count
         self._open = True
 
     def inject(self, faults: Sequence[Fault], seed: int = 0) -> None:
@@ -126,7 +129,7 @@ class FakeBus:
             self._spend(11)
             self._stop()
             raise bus_error(errno.EREMOTEIO, self.name, address)
-        self._spend(wire_bits(messages))
+        self._spend(self._count(messages))
         t = self.now()
         for message in messages:
             self._carry(message, chips, t, fault, route)

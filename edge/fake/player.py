@@ -15,6 +15,8 @@ from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA
 from edge.fake.clock import TIME_ROUNDING_S, VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
 from edge.i2c import ad7147, block
+from edge.i2c.bus import wire_bits
+from edge.i2c.serial_bus import serial_bits
 from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.file import UNUSED, BusSpec, ChipSpec, SkinFile, TaxelCalibration
@@ -137,6 +139,7 @@ def fake_buses(
             timeout_s=file.reading.timeout_s,
             faults=faults,
             seed=seed,
+            count=serial_bits if spec.serial else wire_bits,
         )
         felt = _Felt(spec, scene, rest.baseline.ravel())
         for c, chip in enumerate(spec.chips):

@@ -1,16 +1,12 @@
 """A microcontroller that serves whole frames: sequence number, taxels, CRC-16.
 
-Its protocol, for whoever writes the firmware. Registers are behind an 8-bit pointer:
-
-| pointer | bytes | what |
+| pointer | bytes | register |
 |---|---|---|
-| 0x00 | 10 | identity: `TAXL`, version 1, bits a taxel (8, 12 or 16), taxels (16 bits), CRC-16 |
+| 0x00 | 10 | identity: `TAXL`, version 1, bits per taxel (8, 12 or 16), taxels (16 bits), CRC-16 |
 | 0x10 | 2 + data + 2 | frame: sequence number (16 bits), taxels, CRC-16 |
 
-All numbers are big-endian; 12-bit taxels are packed two in three bytes, high bits first. The CRC
-is CRC-16/CCITT-FALSE (polynomial 0x1021, from 0xFFFF) over all bytes before it. The sequence
-number counts the frames sampled and wraps at 65536; while a frame is being read it must not
-change.
+docs/block-protocol.md describes the protocol for whoever writes the firmware, and
+examples/firmware/ has one.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from edge.errors import InputError
-from edge.i2c.block import IDENTITY, data_bytes, sealed
+from edge.i2c.block import IDENTITY, sealed
 from edge.i2c.bus import BusError, Message, Transfer, bus_error, read, write
 
 BOOT_S = 3.0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from edge.config import ConfigTable, parse_toml, shown
 from edge.errors import InputError
 from edge.files import read_text
+from edge.skin.kinds import Usual, usual
 from edge.touch.layout import SkinLayout
 
 UNUSED = -1
@@ -52,11 +53,19 @@ class ChipSpec:
 
 @dataclass(frozen=True)
 class BusSpec:
-    """One adapter and its chips, in the order in which they are read."""
+    """One adapter and its chips, in the order in which they are read.
+
+    Attributes:
+        device: such as `/dev/i2c-1`, or a serial port.
+        chips: on it; one on a serial port.
+        clock_hz: of the I2C bus, or the serial port's bits per second.
+        serial: whether it is a serial port.
+    """
 
     device: str
     chips: tuple[ChipSpec, ...]
     clock_hz: int = 400_000
+    serial: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,8 +178,13 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     for key in (f.name for f in fields(SkinLayout)):
         skin.has(key)
     skin.done()
-    layout = SkinLayout.from_dict(skin.raw, where=where)
-    signal, sign = _signal(top.table("signal", {}), layout)
+    unsaid = usual(top.raw)
+    given = dict(skin.raw)
+    if "threshold_counts" not in given and unsaid.threshold_counts:
+        given["threshold_counts"] = unsaid.threshold_counts
+        given.setdefault("onset_counts", unsaid.onset_counts)
+    layout = SkinLayout.from_dict(given, where=where)
+    signal, sign = _signal(top.table("signal", {}), layout, unsaid)
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
     calibration = None
@@ -180,8 +194,11 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
 
-def _signal(table: ConfigTable, layout: SkinLayout) -> tuple[Signal, int]:
-    sign = table.whole("sign", 1, (1, -1))
+def _signal(
+    table: ConfigTable, layout: SkinLayout, unsaid: Usual
+) -> tuple[Signal, int | None]:
+    """The signal, and the sign of all chips that have none of their own, where it is given."""
+    sign = table.whole("sign", 1, (1, -1)) if table.has("sign") else None
     dead = table.get("dead", [])
     if not isinstance(dead, list):
         raise table.fail("dead", "a list of [row, col]")
@@ -194,9 +211,9 @@ def _signal(table: ConfigTable, layout: SkinLayout) -> tuple[Signal, int]:
             )
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
-        dead_band_counts=table.whole("dead_band_counts", 0, range(65536)),
-        drift_counts_per_s=table.number("drift_counts_per_s", 20.0, 0.0, 65535.0),
-        drift_limit_counts=table.whole("drift_limit_counts", 2000, range(65536)),
+        dead_band_counts=table.whole("dead_band_counts", unsaid.dead_band_counts, range(65536)),
+        drift_counts_per_s=table.number("drift_counts_per_s", unsaid.drift_counts_per_s, 0.0, 65535.0),
+        drift_limit_counts=table.whole("drift_limit_counts", unsaid.drift_limit_counts, range(65536)),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
         dead=tuple(pairs),
     )

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
-from edge.i2c.bus import Bus, BusError, LinuxBus
+from edge.i2c.bus import Bus, LinuxBus
 from edge.skin.baseline import Baseline
 from edge.skin.buffers import Buffers, ChipGroup, buffers
 from edge.skin.bus_reader import NEVER, BusReader, Slot, State
 from edge.skin.calibration import dead_band
-from edge.skin.file import UNUSED, SkinFile, load
+from edge.skin.file import UNUSED, BusSpec, SkinFile, load
 from edge.skin.read_scheduler import MARGIN, ReadScheduler
 from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
 from edge.touch.frame import Frame
@@ -163,8 +163,8 @@ class Skin:
         buses: list[Bus] = []
         try:
             for spec in file.buses:
-                buses.append(LinuxBus(spec.device, timeout_s=file.reading.timeout_s))
-        except BusError:
+                buses.append(_open(spec, file.reading.timeout_s))
+        except EdgeError:
             for bus in buses:
                 bus.close()
             raise
@@ -403,3 +403,11 @@ class Skin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _open(spec: BusSpec, timeout_s: float) -> Bus:
+    if spec.serial:
+        from edge.i2c.serial_bus import SerialBus  # few skins have one
+
+        return SerialBus(spec.device, baud=spec.clock_hz, timeout_s=timeout_s)
+    return LinuxBus(spec.device, timeout_s=timeout_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from edge.config import ConfigTable, shown
@@ -9,23 +10,24 @@ from edge.errors import InputError
 from edge.i2c import ad7147, block, mpr121, tca9548a
 from edge.i2c.bus import device_path
 from edge.skin.file import UNUSED, BusSpec, ChipSpec
+from edge.skin.kinds import KINDS, usual_of
 from edge.touch.layout import SkinLayout
 
-KINDS = ("ad7147", "mpr121", "block")
 FASTEST_MUX_HZ = 400_000
+SERIAL_PORT = re.compile(r"(/dev/(tty|serial/|cu\.).*|COM\d+)")
 ADDRESSES = range(0x08, 0x78)
 """7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
 SHARED = ("kind", "mux", "block", "bits", "decimation")
 """Keys that a bus may give for all its chips."""
 
 
-def read_buses(tables: Sequence[ConfigTable], layout: SkinLayout, sign: int) -> tuple[BusSpec, ...]:
+def read_buses(tables: Sequence[ConfigTable], layout: SkinLayout, sign: int | None) -> tuple[BusSpec, ...]:
     """The buses of a skin.
 
     Args:
         tables: one for each bus.
         layout: the skin's.
-        sign: of a chip that has none of its own.
+        sign: of a chip that has none of its own; its kind's where None.
 
     Raises:
         InputError: a value makes no sense, or two chips claim one address or one taxel.
@@ -35,26 +37,64 @@ def read_buses(tables: Sequence[ConfigTable], layout: SkinLayout, sign: int) -> 
     return buses
 
 
-def _bus(table: ConfigTable, layout: SkinLayout, sign: int) -> BusSpec:
+def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
+    serial = table.has("serial")
+    device, clock_hz = _port(table) if serial else _adapter(table)
+    if table.has("kind"):
+        _kind(table)
+    shared = {key: table.raw[key] for key in SHARED if table.has(key)}
+    chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
+    table.done()
+    if serial and len(chips) > 1:
+        raise InputError(f"{table.called('chips')} has {len(chips)}; a serial port has one")
+    specs = [
+        _chip(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix), layout, sign, serial)
+        for chip in chips
+    ]
+    return BusSpec(device, tuple(specs), clock_hz, serial)
+
+
+def _port(table: ConfigTable) -> tuple[str, int]:
+    """A serial port and its bits per second."""
+    port = table.text("serial")
+    if not port or "\0" in port:
+        raise table.fail("serial", 'the path of a serial port, such as "/dev/ttyACM0"')
+    if table.has("device"):
+        raise InputError(f"{table.called('device')} is an I2C bus; give it or serial, not both")
+    return port, table.whole("baud", 115_200, range(1_200, 20_000_001))
+
+
+def _adapter(table: ConfigTable) -> tuple[str, int]:
+    """An I2C bus and its clock in Hz."""
     device = table.get("device", None)
     number = type(device) is int and 0 <= device < 1 << 20
     if not number and not (isinstance(device, str) and device and "\0" not in device):
         raise table.fail("device", 'the number of a bus or its path, like 1 or "/dev/i2c-1"')
-    clock_hz = table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
-    shared = {key: table.raw[key] for key in SHARED if table.has(key)}
-    chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
-    table.done()
-    specs = [
-        _chip(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix), layout, sign)
-        for chip in chips
-    ]
-    return BusSpec(device_path(device), tuple(specs), clock_hz)
+    if isinstance(device, str) and SERIAL_PORT.fullmatch(device):
+        raise InputError(
+            f"{table.called('device')} {device} is a serial port, not an I2C bus; write serial = "
+            f'"{device}" instead, with kind = "block"'
+        )
+    return device_path(device), table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
 
 
-def _chip(table: ConfigTable, layout: SkinLayout, sign: int) -> ChipSpec:
-    kind = table.choice("kind", KINDS)
-    addresses = {"ad7147": ad7147.ADDRESSES, "mpr121": mpr121.ADDRESSES}.get(kind, ADDRESSES)
-    address = table.whole("address", allowed=addresses, form="#04x")
+def _kind(table: ConfigTable) -> str:
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        kinds = ", ".join(f"{name} ({what})" for name, what in KINDS.items())
+        raise table.fail("kind", f"one of {kinds}")
+    return kind
+
+
+def _chip(table: ConfigTable, layout: SkinLayout, sign: int | None, serial: bool) -> ChipSpec:
+    kind = _kind(table)
+    if serial and kind != "block":
+        raise InputError(f"{table.called('kind')} is {kind}; a serial port carries block alone")
+    if serial:
+        address = table.whole("address", 0, (0,))
+    else:
+        addresses = {"ad7147": ad7147.ADDRESSES, "mpr121": mpr121.ADDRESSES}.get(kind, ADDRESSES)
+        address = table.whole("address", allowed=addresses, form="#04x")
     mux = channel = None
     if table.has("mux"):
         mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")
@@ -75,7 +115,7 @@ def _chip(table: ConfigTable, layout: SkinLayout, sign: int) -> ChipSpec:
             f"{table.called('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
             f"{block.MOST_TAXELS}"
         )
-    own = table.whole("sign", sign, (1, -1))
+    own = table.whole("sign", usual_of(kind, bits).sign if sign is None else sign, (1, -1))
     table.done()
     return ChipSpec(kind, address, taxels, mux, channel, own, decimation, bits)
 

@@ -54,6 +54,7 @@ class Registers {
       }
     }
     seal(out, kFrame - 2);
+    __asm__ __volatile__("" ::: "memory");  // the frame is whole before it is the one to read
     front_ = 1 - front_;
   }
 

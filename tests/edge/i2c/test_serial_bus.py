@@ -1,0 +1,239 @@
+"""Frames over a serial port, whatever happens to it; the port is one end of a pseudo-terminal."""
+
+import os
+import pty
+import threading
+import time
+import tty
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from edge.i2c import block
+from edge.i2c.block import Block
+from edge.i2c.bus import (
+    BusFault,
+    BusGone,
+    BusMissing,
+    BusRefused,
+    BusTimeout,
+    fetch,
+    read,
+    send,
+    write,
+)
+from edge.i2c.serial_bus import SerialBus, decode, encode, serial_bits
+from edge.skin import file as skinfile
+from edge.skin.skin import Skin
+
+TAXELS = 6
+
+
+@given(st.binary(max_size=1200))
+def test_a_packet_has_no_zero_but_at_its_end_and_is_read_back(data):
+    packet = encode(data)
+    assert packet.index(0) == len(packet) - 1
+    assert len(packet) <= len(data) + len(data) // 254 + 2
+    assert decode(packet[:-1]) == data
+
+
+@pytest.mark.parametrize("n", [253, 254, 255, 508, 509])
+def test_runs_of_254_bytes_without_a_zero(n):
+    for data in (b"\1" * n, b"\1" * n + b"\0", b"\0" + b"\1" * n):
+        assert decode(encode(data)[:-1]) == data
+
+
+def test_the_standards_own_examples():
+    """S. Cheshire and M. Baker, IEEE/ACM Trans. Networking 7 (1999), table of examples."""
+    for data, packet in (
+        ("", "01"),
+        ("00", "0101"),
+        ("0000", "010101"),
+        ("112200 33", "0311220233"),
+        ("11223344", "0511223344"),
+        ("11000000", "0211010101"),
+    ):
+        assert encode(bytes.fromhex(data)).hex() == packet + "00"
+
+
+class Board:
+    """A microcontroller at the other end of a pseudo-terminal."""
+
+    def __init__(self):
+        self.change = lambda answer, number: answer
+        """What becomes of an answer (its packet's bytes) on the way."""
+        self.asked = 0
+        self.plug()
+
+    def plug(self):
+        self.master, slave = pty.openpty()
+        tty.setraw(slave)
+        self.port = os.ttyname(slave)
+        self.slave = slave
+        threading.Thread(target=self._serve, args=(self.master,), daemon=True).start()
+
+    def unplug(self):
+        os.close(self.slave)
+        os.close(self.master)
+
+    def _serve(self, master):
+        received = b""
+        try:
+            while True:
+                received += os.read(master, 256)
+                while b"\0" in received:
+                    packet, _, received = received.partition(b"\0")
+                    request = decode(packet)
+                    if len(request) != 4 or block.crc16(request) != 0:
+                        continue
+                    self.asked += 1
+                    values = np.full(TAXELS, self.asked, dtype=np.uint16)
+                    register = {
+                        0x00: block.sealed(block.MAGIC + bytes([16]) + TAXELS.to_bytes(2, "big")),
+                        0x10: block.sealed(b"\0\0" + block.pack(values, 16)),
+                    }[request[0]]
+                    os.write(master, self.change(encode(request[1:2] + register), self.asked))
+        except OSError:
+            pass
+
+
+@pytest.fixture
+def board():
+    board = Board()
+    yield board
+    with suppress(OSError):
+        board.unplug()
+
+
+@pytest.fixture
+def bus(board):
+    bus = SerialBus(board.port, timeout_s=0.3)
+    yield bus
+    bus.close()
+
+
+def frame(chip):
+    chip.bus.transfer(chip.frame)
+    taxels, whole = chip.parse(chip.frame.buffer[None])
+    return taxels[0].tolist(), bool(whole.all())
+
+
+def test_each_request_is_answered_by_its_own_frame(board, bus):
+    chip = Block(bus, 0, taxels=TAXELS)
+    assert [frame(chip) for _ in range(3)] == [([n] * TAXELS, True) for n in (3, 4, 5)]
+    assert chip.healthy()
+
+
+def test_a_wrong_crc_marks_the_frame_as_not_whole(board, bus):
+    chip = Block(bus, 0, taxels=TAXELS)
+    board.change = lambda answer, _: answer[:5] + bytes([answer[5] ^ 0x10]) + answer[6:]
+    assert not frame(chip)[1]
+    board.change = lambda answer, _: answer
+    assert frame(chip)[1]
+
+
+@pytest.mark.parametrize("cut", [lambda a: b"", lambda a: a[: len(a) // 2]])
+def test_half_an_answer_is_a_timeout_and_the_next_is_whole(board, bus, cut):
+    chip = Block(bus, 0, taxels=TAXELS)
+    board.change = lambda answer, _: cut(answer)
+    with pytest.raises(BusTimeout, match="no whole answer came in time"):
+        chip.bus.transfer(chip.frame)
+    board.change = lambda answer, _: answer
+    bus.reopen()
+    assert frame(chip)[1]
+
+
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(board, bus):
+    chip = Block(bus, 0, taxels=TAXELS)
+    late = []
+
+    def hold(answer, number):
+        late.append(answer)
+        return b"" if len(late) == 1 else late[0] + answer
+
+    board.change = hold
+    with pytest.raises(BusTimeout):
+        chip.bus.transfer(chip.frame)
+    assert frame(chip) == ([board.asked] * TAXELS, True)
+
+
+def test_an_answer_of_another_length_is_a_fault(board, bus):
+    with pytest.raises(BusFault, match="the transfer broke off"):
+        fetch(bus, 0, block.FRAME, 9)
+
+
+def test_a_microcontroller_that_restarts_when_it_is_opened_is_waited_for(board):
+    board.change = lambda answer, number: answer if number > 2 else b""
+    bus = SerialBus(board.port, timeout_s=0.3, boot_s=5.0)
+    assert frame(Block(bus, 0, taxels=TAXELS))[1]
+    bus.close()
+
+
+def test_an_unplugged_port_is_gone_until_it_is_plugged_in_again(board, bus):
+    chip = Block(bus, 0, taxels=TAXELS)
+    board.unplug()
+    with pytest.raises(BusGone, match="plug the microcontroller in again"):
+        chip.bus.transfer(chip.frame)
+    with pytest.raises(BusMissing):
+        bus.reopen()
+    board.plug()
+    bus.name = board.port
+    bus.reopen()
+    assert frame(chip)[1]
+
+
+def test_a_port_carries_only_what_a_microcontroller_serves(bus):
+    for prepared in (
+        bus.prepare(read(0, 4)),
+        bus.prepare(write(0, b"\0\0"), read(0, 4)),
+        bus.prepare(write(0, b"\0")),
+    ):
+        with pytest.raises(BusRefused, match="kind block"):
+            bus.transfer(prepared)
+    with pytest.raises(BusRefused):
+        send(bus, 0, b"\0\1")
+
+
+def test_a_port_that_is_missing_is_one_sentence(tmp_path):
+    with pytest.raises(BusMissing, match=r"no-port: no such serial port; is the micro"):
+        SerialBus(str(tmp_path / "no-port"))
+
+
+def test_without_pyserial_the_sentence_says_what_to_install(board, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "serial", None)
+    with pytest.raises(InputError, match=r"pip install edge-classify\[serial\]"):
+        SerialBus(board.port)
+
+
+def test_bits_on_the_line_are_those_of_the_packets():
+    exchange = (write(0, block.FRAME), read(0, 154))
+    packets = len(encode(b"\1" * 4)) + len(encode(b"\1" * 155))
+    assert serial_bits(exchange) == 10 * packets
+
+
+def test_a_skin_over_a_serial_port_survives_being_unplugged(board, tmp_path):
+    """Frames without valid taxels while it is away; whole ones when it is back."""
+    link = tmp_path / "port"
+    link.symlink_to(board.port)
+    path = tmp_path / "skin.toml"
+    path.write_text(
+        "[skin]\nrows = 2\ncols = 3\n[read]\ntimeout_s = 0.3\n"
+        f'[[bus]]\nserial = "{link}"\nkind = "block"\n'
+        "chips = [{ first = [0, 0], block = [2, 3] }]"
+    )
+    assert skinfile.load(path).buses[0].serial
+    with Skin.open(path, calibrated=False) as skin:
+        assert skin.read().valid.all()
+        board.unplug()
+        assert not skin.read().valid.any()
+        board.plug()
+        link.unlink()
+        link.symlink_to(board.port)
+        ends = time.monotonic() + 5.0
+        while not skin.read().valid.all():
+            assert time.monotonic() < ends
+            time.sleep(0.01)

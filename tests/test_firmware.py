@@ -1,0 +1,146 @@
+"""examples/firmware/: the protocol that a microcontroller runs, read by our own driver."""
+
+import os
+import pty
+import shutil
+import subprocess
+import tty
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.fake.bus import FakeBus
+from edge.i2c.block import Block
+from edge.i2c.chip import WrongChip
+from edge.i2c.serial_bus import SerialBus
+from edge.skin import file as skinfile
+from edge.skin.skin import Skin
+
+ROOT = Path(__file__).parents[1]
+MATRIX = ROOT / "examples" / "firmware" / "matrix"
+TAXELS = 100
+
+pytestmark = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory):
+    """Builds the firmware's protocol for this machine, for so many bits a taxel."""
+    folder = tmp_path_factory.mktemp("firmware")
+
+    def build(bits):
+        program = folder / f"host{bits}"
+        if not program.exists():
+            command = ["g++", "-std=c++11", "-O1", "-Wall", "-Wextra", "-Werror", f"-DWIDTH={bits}"]
+            source = str(Path(__file__).with_name("firmware_host.cpp"))
+            subprocess.run([*command, f"-I{MATRIX}", "-o", str(program), source], check=True)
+        return program
+
+    return build
+
+
+def values(bits, n):
+    """The n-th sample of the host program."""
+    return (np.arange(TAXELS) * 41 + n) % (1 << bits)
+
+
+class Registers:
+    """A chip on the fake bus that answers with the firmware's own bytes."""
+
+    def __init__(self, registers):
+        self.registers, self.pointer = registers, None
+
+    def write(self, data, t):
+        self.pointer = data[0]
+
+    def read(self, n, t):
+        return self.registers[self.pointer][:n]
+
+    def stop(self):
+        pass
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_its_registers_are_what_the_driver_reads_over_i2c(host, bits):
+    dump = subprocess.run([host(bits), "dump"], capture_output=True, text=True, check=True)
+    lines = [bytes.fromhex(line) for line in dump.stdout.split("\n")[:-1]]
+    for n in range(3):
+        identity, frame, unknown = lines[3 * n : 3 * n + 3]
+        bus = FakeBus(chips={0x28: Registers({0x00: identity, 0x10: frame})})
+        chip = Block(bus, 0x28, taxels=TAXELS, bits=bits)
+        assert chip.healthy()
+        bus.transfer(chip.frame)
+        assert chip.frame.buffer[:2].tobytes() == n.to_bytes(2, "big")
+        taxels, whole = chip.parse(chip.frame.buffer[None])
+        assert whole.all()
+        assert taxels[0].tolist() == ([0] * TAXELS if n == 0 else values(bits, n - 1).tolist())
+        assert unknown == b""
+
+
+@pytest.fixture
+def plugged(host):
+    """A pseudo-terminal with the firmware at its other end; gives the port's path."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    program = subprocess.Popen([host(12)], stdin=master, stdout=master)
+    yield os.ttyname(slave), program
+    program.kill()
+    program.wait()
+    os.close(master)
+    os.close(slave)
+
+
+def test_its_frames_come_over_a_serial_port(plugged):
+    bus = SerialBus(plugged[0], timeout_s=2.0)
+    chip = Block(bus, 0, taxels=TAXELS, bits=12)
+    seen = []
+    for _ in range(5):
+        bus.transfer(chip.frame)
+        taxels, whole = chip.parse(chip.frame.buffer[None])
+        assert whole.all()
+        seen.append(taxels[0].tolist())
+    # Two requests came before: the one at opening, and the driver's for the identity.
+    assert seen == [values(12, n).tolist() for n in range(2, 7)]
+    bus.close()
+
+
+def test_noise_on_the_line_costs_one_answer_at_most(plugged):
+    """What comes between two requests ends with the next zero."""
+    bus = SerialBus(plugged[0], timeout_s=2.0)
+    chip = Block(bus, 0, taxels=TAXELS, bits=12)
+    for noise in (b"\x05", b"\0\0", b"\xff" * 300, b"\x04\x10\x01\x01\0", b"\x03\x10\0"):
+        bus._port.write(noise + b"\0")
+        bus.transfer(chip.frame)
+        assert chip.parse(chip.frame.buffer[None])[1].all()
+    bus.close()
+
+
+def test_another_shape_than_the_skin_file_says_is_named(plugged):
+    bus = SerialBus(plugged[0], timeout_s=2.0)
+    with pytest.raises(WrongChip, match="serves 100 taxels of 12 bits, not 100 of 16"):
+        Block(bus, 0, taxels=TAXELS, bits=16)
+    bus.close()
+
+
+def test_the_example_skin_reads_the_example_firmware(plugged, tmp_path):
+    text = skinfile.shipped("matrix").read_text()
+    path = tmp_path / "skin.toml"
+    slow = text.replace("/dev/ttyACM0", plugged[0]).replace("timeout_s = 0.02", "timeout_s = 2.0")
+    path.write_text(slow)
+    with Skin.open(path, calibrated=False) as skin:
+        frames = [skin.read() for _ in range(3)]
+        raw, valid = skin.raw()
+    assert all(frame.valid.all() for frame in frames)
+    assert valid.all()
+    assert raw.ravel().tolist() == values(12, int(raw[0, 0])).tolist()
+
+
+def test_the_sketch_says_what_the_example_skin_says():
+    sketch = (MATRIX / "matrix.ino").read_text()
+    (bus,) = skinfile.load(skinfile.shipped("matrix")).buses
+    (chip,) = bus.chips
+    assert "kRows = 10, kCols = 10, kAddress = 0x28" in sketch
+    assert "taxels::Registers<kRows * kCols, 12>" in sketch
+    assert (len(chip.taxels), chip.bits) == (100, 12)
+    assert f"Serial.begin({bus.clock_hz});" in sketch
