@@ -92,7 +92,7 @@ def plugged(host):
 
 
 def test_its_frames_come_over_a_serial_port(plugged):
-    bus = SerialBus(plugged[0], timeout_s=2.0)
+    bus = SerialBus(plugged[0], timeout_s=5.0)
     chip = Block(bus, 0, taxels=TAXELS, bits=12)
     seen = []
     for _ in range(5):
@@ -107,7 +107,7 @@ def test_its_frames_come_over_a_serial_port(plugged):
 
 def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     """What comes between two requests ends with the next zero."""
-    bus = SerialBus(plugged[0], timeout_s=2.0)
+    bus = SerialBus(plugged[0], timeout_s=5.0)
     chip = Block(bus, 0, taxels=TAXELS, bits=12)
     for noise in (b"\x05", b"\0\0", b"\xff" * 300, b"\x04\x10\x01\x01\0", b"\x03\x10\0"):
         bus._port.write(noise + b"\0")
@@ -117,7 +117,7 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
 
 
 def test_another_shape_than_the_skin_file_says_is_named(plugged):
-    bus = SerialBus(plugged[0], timeout_s=2.0)
+    bus = SerialBus(plugged[0], timeout_s=5.0)
     with pytest.raises(WrongChip, match="serves 100 taxels of 12 bits, not 100 of 16"):
         Block(bus, 0, taxels=TAXELS, bits=16)
     bus.close()
@@ -126,7 +126,7 @@ def test_another_shape_than_the_skin_file_says_is_named(plugged):
 def test_the_example_skin_reads_the_example_firmware(plugged, tmp_path):
     text = skinfile.shipped("matrix").read_text()
     path = tmp_path / "skin.toml"
-    slow = text.replace("/dev/ttyACM0", plugged[0]).replace("timeout_s = 0.02", "timeout_s = 2.0")
+    slow = text.replace("/dev/ttyACM0", plugged[0]).replace("timeout_s = 0.02", "timeout_s = 5.0")
     path.write_text(slow)
     with Skin.open(path, calibrated=False) as skin:
         frames = [skin.read() for _ in range(3)]
