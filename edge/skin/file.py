@@ -194,9 +194,7 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
 
-def _signal(
-    table: ConfigTable, layout: SkinLayout, unsaid: Usual
-) -> tuple[Signal, int | None]:
+def _signal(table: ConfigTable, layout: SkinLayout, unsaid: Usual) -> tuple[Signal, int | None]:
     """The signal, and the sign of all chips that have none of their own, where it is given."""
     sign = table.whole("sign", 1, (1, -1)) if table.has("sign") else None
     dead = table.get("dead", [])
@@ -212,8 +210,12 @@ def _signal(
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
         dead_band_counts=table.whole("dead_band_counts", unsaid.dead_band_counts, range(65536)),
-        drift_counts_per_s=table.number("drift_counts_per_s", unsaid.drift_counts_per_s, 0.0, 65535.0),
-        drift_limit_counts=table.whole("drift_limit_counts", unsaid.drift_limit_counts, range(65536)),
+        drift_counts_per_s=table.number(
+            "drift_counts_per_s", unsaid.drift_counts_per_s, 0.0, 65535.0
+        ),
+        drift_limit_counts=table.whole(
+            "drift_limit_counts", unsaid.drift_limit_counts, range(65536)
+        ),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
         dead=tuple(pairs),
     )

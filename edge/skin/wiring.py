@@ -21,7 +21,9 @@ SHARED = ("kind", "mux", "block", "bits", "decimation")
 """Keys that a bus may give for all its chips."""
 
 
-def read_buses(tables: Sequence[ConfigTable], layout: SkinLayout, sign: int | None) -> tuple[BusSpec, ...]:
+def read_buses(
+    tables: Sequence[ConfigTable], layout: SkinLayout, sign: int | None
+) -> tuple[BusSpec, ...]:
     """The buses of a skin.
 
     Args:

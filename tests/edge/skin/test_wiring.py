@@ -52,7 +52,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
             "device = 1\nclock_hz = 1000000",
             "is 1000000; a TCA9548A carries at most 400000",
         ),
-        ('kind = "ad7147"', 'kind = "adxl"', "bus 0 chip 0: kind must be one of ad7147"),
+        ('kind = "ad7147"', 'kind = "adxl"', "bus 0: kind must be one of ad7147"),
         ("mux = 0x70", "mux = 0x60", "bus 0 chip 0: mux must be 0x70 to 0x77, not 96"),
         ("mux = 0x70", "", "bus 0 chip 0: channel needs mux"),
         ("channel = 0, address = 0x2D", "channel = 8, address = 0x2D", "channel must be a whole"),
@@ -76,3 +76,51 @@ def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, said):
     assert str(caught.value).startswith("my/skin.toml: ")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value).removeprefix("my/skin.toml: not TOML")
+
+
+SERIAL = """[skin]
+rows = 2
+cols = 3
+[[bus]]
+serial = "/dev/ttyACM0"
+kind = "block"
+chips = [{ first = [0, 0], block = [2, 3] }]
+"""
+
+
+def test_a_microcontroller_may_stand_on_a_serial_port():
+    (bus,) = skinfile.parse(SERIAL).buses
+    assert (bus.device, bus.serial, bus.clock_hz) == ("/dev/ttyACM0", True, 115_200)
+    assert (bus.chips[0].kind, bus.chips[0].address) == ("block", 0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("serial =", "device =", 'is a serial port, not an I2C bus; write serial = "/dev/ttyACM0"'),
+        ('serial = "/dev/ttyACM0"', 'device = "COM3"', "COM3 is a serial port"),
+        ("[[bus]]", "[[bus]]\ndevice = 1", "give it or serial, not both"),
+        ('"block"', '"mpr121"', "kind is mpr121; a serial port carries block alone"),
+        (
+            '"block"',
+            '"microcontroller"',
+            "(a microcontroller that serves frames), not 'micro",
+        ),
+        (
+            "chips = [",
+            "chips = [{ first = [0, 0], block = [1, 1] }, ",
+            "has 2; a serial port has one",
+        ),
+        ("[{ first", "[{ address = 8, first", "address must be 0"),
+    ],
+)
+def test_what_a_serial_port_cannot_carry_is_one_sentence(old, new, said):
+    with pytest.raises(InputError) as error:
+        skinfile.parse(SERIAL.replace(old, new))
+    assert said in str(error.value)
+
+
+def test_a_kind_that_is_unknown_is_named_before_chips_that_are_missing():
+    text = SERIAL.replace('"block"', '"microcontroller"').split("chips")[0]
+    with pytest.raises(InputError, match="kind must be one of"):
+        skinfile.parse(text)
