@@ -92,9 +92,10 @@ def _chip(table: ConfigTable, layout: SkinLayout, sign: int | None, serial: bool
     kind = _kind(table)
     if serial and kind != "block":
         raise InputError(f"{table.called('kind')} is {kind}; a serial port carries block alone")
-    if serial:
-        address = table.whole("address", 0, (0,))
-    else:
+    address = 0
+    if serial and table.has("address"):
+        raise InputError(f"{table.called('address')} has no meaning on a serial port; leave it out")
+    if not serial:
         addresses = {"ad7147": ad7147.ADDRESSES, "mpr121": mpr121.ADDRESSES}.get(kind, ADDRESSES)
         address = table.whole("address", allowed=addresses, form="#04x")
     mux = channel = None

@@ -111,7 +111,7 @@ def test_a_microcontroller_may_stand_on_a_serial_port():
             "chips = [{ first = [0, 0], block = [1, 1] }, ",
             "has 2; a serial port has one",
         ),
-        ("[{ first", "[{ address = 8, first", "address must be 0"),
+        ("[{ first", "[{ address = 8, first", "address has no meaning on a serial port"),
     ],
 )
 def test_what_a_serial_port_cannot_carry_is_one_sentence(old, new, said):
