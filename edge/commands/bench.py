@@ -77,6 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     print(
+        f"model      {board['model']['bytes'] / 1e6:>9.3f} MB\n"
         f"memory     {board['memory_mb']:>9.1f} MB\ncold start {board['cold_start_ms']:>9.1f} ms "
         f"(median of {COLD_STARTS})",
         file=sys.stderr,
@@ -155,7 +156,7 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
 
     `region`: finding the largest region of a frame. `track`: the same, the arm's pose, and what
     the features measure. `features`: from a contact's series to its vector. `decision`: ONNX
-    Runtime and the answers of all tasks. `frame`: everything that a frame in a contact costs.
+    Runtime and the answers of all tasks. `answer`: features and decision together. `frame`: everything that a frame in a contact costs.
     `last`: everything that the frame costs at which a decision is due.
     """
     info = model.info
@@ -231,6 +232,14 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
             )
         ),
         "decision": summary(timed(lambda i: model.decide(vector), rounds)),
+        "answer": summary(
+            timed(
+                lambda i: model.decide(
+                    feature_vector(series, info.window_s, info.samples, info.features)
+                ),
+                rounds,
+            )
+        ),
         "frame": summary(pushed(lambda: Classifier(model), lambda times: times[1:-2])),
         "last": summary(last),
     }

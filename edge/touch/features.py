@@ -163,6 +163,7 @@ class _Course:
     def __init__(self, series: FeatureSeries, window_s: float) -> None:
         self._series, self._window_s = series, window_s
         self._zones: dict[str, _Zone] = {}
+        self._wide: dict[tuple[bool, int], NDArray[np.float64]] = {}
         scale = series.counts_per_newton or 1.0
         self._force_floor = (series.threshold_counts + 1) / scale
         self._length_floor = MOTION_FLOOR * series.pitch
@@ -175,13 +176,14 @@ class _Course:
         times, step = self._times(samples)
         values = np.array([self._measured(feature) for feature in group])
         known = np.isfinite(values)
-        if known.all():
+        whole = known.all(axis=1)
+        if whole.all():
             sampled = _resample(times, series.t, values)
         else:
             sampled = np.zeros((len(group), samples))
-            for out, row, seen in zip(sampled, values, known, strict=True):
-                if seen.any():
-                    out[:] = _resample(times, series.t[seen], row[seen])
+            sampled[whole] = _resample(times, series.t, values[whole])
+            for i in np.flatnonzero(~whole & known.any(axis=1)):
+                sampled[i] = _resample(times, series.t[known[i]], values[i, known[i]])
         floors = np.array([[self._floor(feature)] for feature in group])
         return sampled, floors, step, False
 
@@ -191,21 +193,20 @@ class _Course:
         """A feature of many values a frame, likewise; its rows have one largest value."""
         series = self._series
         times, step = self._times(samples if feature.single else min(samples, WIDE_SAMPLES))
-        if feature.of_joints:
-            joints = series.joints
-            if joints is None:
-                raise InputError(f"{feature.name} was not measured; it is made of joint angles")
-            seen = np.isfinite(joints).all(axis=1)
-            sampled = np.zeros((joints.shape[1], len(times)))
-            if seen.any():
-                sampled = _resample(times, series.t[seen], joints[seen].T)
-                if feature.quantity == "joint_change":
-                    sampled -= _resample(np.zeros(1), series.t[seen], joints[seen].T)
-        else:
-            if series.taxels is None:
+        key = feature.of_joints, len(times)
+        if key not in self._wide:
+            rows = series.joints if feature.of_joints else series.taxels
+            if rows is None:
                 raise _not_measured(feature)
-            scale = series.counts_per_newton or 1.0
-            sampled = _resample(times, series.t, series.taxels.T / scale)
+            seen = np.isfinite(rows).all(axis=1)
+            self._wide[key] = np.zeros((rows.shape[1], len(times)))
+            if seen.any():
+                self._wide[key] = _resample(times, series.t[seen], rows[seen].T)
+        sampled = self._wide[key]
+        if feature.quantity == "joint_change":
+            sampled = sampled - sampled[:, :1]
+        elif not feature.of_joints:
+            sampled = sampled / (series.counts_per_newton or 1.0)
         return sampled, np.full((len(sampled), 1), self._floor(feature)), step, True
 
     def _times(self, samples: int) -> tuple[NDArray[np.float64], float]:

@@ -42,7 +42,7 @@ class Measurer:
         self.cells = Cells(layout) if any(f.quantity == "taxel_force" for f in types) else None
         self.joints = joints if any(f.of_joints for f in types) else 0
         self.regions = any(f.quantity == "regions" for f in types)
-        self._plan: list[tuple[str, slice, bool, bool]] = []
+        self._plan: list[tuple[str, slice, bool, bool, bool]] = []
         half = layout.cols // 2
         parts = {"left": slice(0, half), "right": slice(half, layout.cols)}
         for zone in ZONES:
@@ -50,8 +50,10 @@ class Measurer:
             weighted = any(f.weighted for f in here) or (zone == "contact" and self.force_motion)
             # The contact's own peak and area are measured with the region.
             extent = zone != "contact" and any(f.extent for f in here)
-            if weighted or extent:
-                self._plan.append((zone, parts.get(zone, slice(None)), extent, weighted))
+            summed = weighted or any(f.summed for f in here)
+            if summed or extent:
+                part = parts.get(zone, slice(None))
+                self._plan.append((zone, part, extent, summed, weighted))
         self.zones = tuple(zone for zone, *_ in self._plan)
         self.width = WIDTH * len(self._plan) + self.regions
         self.columns = {
@@ -87,7 +89,7 @@ class Measurer:
         whole = counts * active.mask if self._whole else counts
         others = active.regions() if self._others else []
         row: list[int] = []
-        for zone, part, extent, weighted in self._plan:
+        for zone, part, extent, summed, weighted in self._plan:
             if zone == "contact":
                 held = counts * contact.mask
                 row += (contact.peak, contact.area)
@@ -104,7 +106,10 @@ class Measurer:
                     row += (int(held.max(initial=0)), int(np.count_nonzero(held)))
                 else:
                     row += (0, 0)
-            row += self._moments(held, part) if weighted else NOTHING[2:]
+            if weighted:
+                row += self._moments(held, part)
+            else:
+                row += (int(held.sum()) if summed else 0, *NOTHING[3:])
         if self.regions:
             row.append(len(others))
         return row

@@ -128,10 +128,15 @@ class Feature:
         return self.quantity in ("max_force", "area", "pressure")
 
     @property
+    def summed(self) -> bool:
+        """It calls for the sum of forces of its zone."""
+        return self.weighted or self.quantity in ("force", "pressure", "stiffness")
+
+    @property
     def weighted(self) -> bool:
-        """It calls for sums over the taxels of its zone."""
-        plain = self.quantity in ("max_force", "area")
-        return (self.quantity in QUANTITIES and not plain) or self.quantity == "stiffness"
+        """It calls for sums weighted by force over the taxels of its zone."""
+        plain = ("max_force", "area", "force", "pressure")
+        return self.quantity in QUANTITIES and self.quantity not in plain
 
 
 def names() -> list[str]:
