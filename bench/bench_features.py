@@ -1,4 +1,4 @@
-"""What each set of features costs: microseconds a frame in contact, and of the vector at the end."""
+"""What each set of features costs: a frame in contact, and the vector at the end."""
 
 import pytest
 

@@ -156,8 +156,9 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
 
     `region`: finding the largest region of a frame. `track`: the same, the arm's pose, and what
     the features measure. `features`: from a contact's series to its vector. `decision`: ONNX
-    Runtime and the answers of all tasks. `answer`: features and decision together. `frame`: everything that a frame in a contact costs.
-    `last`: everything that the frame costs at which a decision is due.
+    Runtime and the answers of all tasks. `answer`: features and decision together. `frame`:
+    everything that a frame in a contact costs. `last`: everything that the frame costs at which a
+    decision is due.
     """
     info = model.info
     frames = touch(model, info.window_s)

@@ -22,7 +22,8 @@ def board(exported, tmp_path_factory):
 
 
 def test_every_stage_has_a_median_and_a_99th_percentile(board):
-    assert list(board["stages"]) == ["region", "track", "features", "decision", "frame", "last"]
+    stages = ["region", "track", "features", "decision", "answer", "frame", "last"]
+    assert list(board["stages"]) == stages
     for stage in board["stages"].values():
         assert 0.0 < stage["median_us"] <= stage["p99_us"]
         assert stage["n"] >= 20
