@@ -9,17 +9,22 @@ from __future__ import annotations
 
 import argparse
 import errno
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from joblib import Parallel, delayed
+from tqdm import tqdm
 
+from bench.read_scheduler import one_bus
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
-from edge.fake.player import fake_skin
+from edge.fake.player import calibrated, fake_buses, fake_skin
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.loop import Schedule
+from edge.skin.skin import Skin
 from edge.touch.frame import Frame
 
 PERIOD_S = 0.01
@@ -214,33 +219,132 @@ def block_skin(cody: SkinFile) -> SkinFile:
     return replace(cody, buses=buses)
 
 
-def positions(code: int, file: SkinFile, *, every: int = 1) -> Outcome:
-    """One fault at each position of a frame in turn: the worst of all runs."""
-    probe = fake_skin(file, Pattern(file))
+FRAMES_BACK = 10
+"""Frames after a fault's end within which every taxel must be valid again."""
+KINDS: dict[str, Fault] = {
+    **{
+        errno.errorcode[code]: Fault(code=code)
+        for code in (*CODES, errno.EINVAL, errno.EBUSY, errno.EACCES)
+    },
+    "a reset": Fault("reset"),
+    "a frame that breaks off": Fault("break"),
+    "a wrong mux channel": Fault("misroute"),
+}
+"""One fault of each kind that the protocol can tell."""
+
+
+def skins() -> dict[str, SkinFile]:
+    """The skins that are shipped or stand as examples, and one bus for all of Cody's chips."""
+    cody, pad = (skinfile.load(skinfile.shipped(name)) for name in ("cody", "mpr121"))
+    single = one_bus(cody)
+    single = replace(single, reading=replace(single.reading, rate_hz=40.0))
+    return {"cody": cody, "mpr121": pad, "one bus at 40 Hz": single, "block": block_skin(cody)}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One fault at each position in turn: the worst of all runs.
+
+    Attributes:
+        name: kind of fault, where, and on which skin.
+        tried: positions.
+        wrong: taxel values that were called valid and were not what the chip felt.
+        missing: most taxels of one frame that were not valid.
+        frames: most frames, that of the fault included, until every taxel was valid again.
+        escaped: an exception that got out of the skin, or "".
+    """
+
+    name: str
+    tried: int
+    wrong: int
+    missing: int
+    frames: int
+    escaped: str
+
+
+def sweep(
+    skin_name: str,
+    file: SkinFile,
+    kind: str,
+    *,
+    set_up: bool = False,
+    every: int = 1,
+    offset: int = 0,
+) -> Sweep:
+    """Play a fault at each transaction of four frames, or of the skin's set-up, on every bus.
+
+    Four frames hold every kind of transaction, the check of a chip's settings too.
+    """
+    feels, period = Pattern(file), 1.0 / file.reading.rate_hz
+    tried = wrong = missing = slowest = 0
+    escaped = ""
+
+    def play(begin: Callable[[], Skin], inject: Callable[[Skin], None]) -> None:
+        nonlocal tried, wrong, missing, slowest, escaped
+        tried += 1
+        try:
+            skin = begin()
+            with skin:
+                inject(skin)
+                start = skin.clock.now()
+                bad = began = 0
+                for i in range(4 + 2 * FRAMES_BACK):
+                    skin.clock.sleep_until(start + (i + 1) * period)
+                    frame = skin.read()
+                    wrong += feels.wrong(frame)
+                    missing = max(missing, int((~frame.valid).sum()))
+                    if not any(reader.bus.script.met for reader in skin.readers):
+                        began = i + 1
+                    if not frame.valid.all():
+                        bad = i + 1
+                slowest = max(slowest, bad - began)
+        except Exception as error:
+            escaped = f"{type(error).__name__}: {error}"
+
+    def started(faults: Sequence[Fault]) -> Skin:
+        clock = VirtualClock()
+        buses = fake_buses(calibrated(file), feels, clock, timed=True, faults=faults)
+        skin = Skin(calibrated(file), buses, clock=clock)
+        skin.start()
+        clock.sleep_until(clock.now())
+        return skin
+
+    probe = started([])
     with probe:
-        before = [reader.bus.transactions for reader in probe.readers]
-        for _ in range(4):
+        before = [r.bus.transactions for r in probe.readers]
+        for _ in range(0 if set_up else 4):
             probe.read()
-        counts = [r.bus.transactions - b for r, b in zip(probe.readers, before, strict=True)]
-    runs = []
-    # Four frames hold every kind of transaction, the settings' check too.
-    for b, count in enumerate(counts):
-        device = file.buses[b].device
-        for position in range(0, count, every):
-            fault = Fault(code=code, at=[position], bus=device)
-            runs.append(run("", file, [fault], end_s=0.05, seconds=0.3))
-    tried = sum(len(range(0, count, every)) for count in counts)
-    return Outcome(
-        f"{errno.errorcode[code]} at each of {tried} positions",
-        sum(r.met for r in runs),
-        sum(r.wrong for r in runs),
-        max(r.missing for r in runs),
-        0,
-        max(r.late_s for r in runs),
-        max(r.missed for r in runs),
-        max(r.recovery_s if not np.isnan(r.recovery_s) else np.inf for r in runs),
-        next((r.escaped for r in runs if r.escaped), ""),
-    )
+        after = [r.bus.transactions for r in probe.readers]
+    for bus, first, last in zip(file.buses, before, after, strict=True):
+        for position in range(offset, first if set_up else last - first, every):
+            fault = replace(KINDS[kind], at=[position], bus=bus.device)
+            if set_up:
+                play(lambda fault=fault: started([fault]), lambda skin: None)
+            else:
+                play(lambda: started([]), lambda skin, fault=fault: _inject(skin, fault))
+    where = "set-up" if set_up else "frame"
+    return Sweep(f"{kind}, {where}, {skin_name}", tried, wrong, missing, slowest, escaped)
+
+
+def _inject(skin: Skin, fault: Fault) -> None:
+    assert fault.at is not None
+    for reader in skin.readers:
+        reader.bus.inject([fault], seed=min(fault.at))
+
+
+def sweeps_table(sweeps: Sequence[Sweep]) -> str:
+    """Markdown."""
+    lines = [
+        "| one fault of a kind, at each position | positions | wrong values called valid "
+        "| taxels missing, worst frame | frames until all are back | escaped |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {s.name} | {s.tried} | {s.wrong} | {s.missing} | {s.frames} "
+        f"| {s.escaped or 'nothing'} |"
+        for s in sweeps
+    ]
+    return "\n".join(lines)
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -276,10 +380,19 @@ def main() -> None:
         run(name, file, faults, seed=arguments.seed, **more)
         for name, file, faults, more in scripts()
     ]
-    cody = skinfile.load(skinfile.shipped("cody"))
-    rows += [positions(code, cody, every=arguments.every) for code in CODES]
     print(table(rows))
     print(UNKNOWABLE)
+    jobs = [
+        delayed(sweep)(name, file, kind, set_up=set_up, every=arguments.every)
+        for name, file in skins().items()
+        for kind in KINDS
+        for set_up in (False, True)
+    ]
+    sweeps = Parallel(n_jobs=-1)(tqdm(jobs, desc="positions", unit=" sweeps"))
+    print(sweeps_table(sweeps))
+    failed = [s.name for s in sweeps if s.wrong or s.escaped or s.frames > FRAMES_BACK]
+    if failed:
+        sys.exit(f"not as promised: {'; '.join(failed)}")
 
 
 if __name__ == "__main__":

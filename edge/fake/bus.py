@@ -170,7 +170,8 @@ class FakeBus:
     ) -> None:
         if not message.read:
             data = message.buffer.tobytes()
-            if fault is not None and fault.kind == "misroute" and len(data) == 1:
+            to_mux = any(isinstance(chip, FakeTCA9548A) for chip in chips)
+            if fault is not None and fault.kind == "misroute" and to_mux:
                 data = bytes([data[0] << 1 & 0xFF or 1])
             for chip in chips:
                 chip.write(data, t)
@@ -183,6 +184,8 @@ class FakeBus:
         if fault is not None and fault.kind == "flip":
             bit = self.script.random.randrange(8 * len(out))
             out[bit // 8] ^= 1 << bit % 8
+        if fault is not None and fault.kind == "break":
+            out[self.script.random.randrange(len(out)) :] = 0xFF
         if route is None:
             message.buffer[:] = out
             return

@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["error", "flip", "misroute", "reset", "hold"]
+Kind = Literal["error", "flip", "misroute", "reset", "hold", "break"]
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,8 @@ class Fault:
     Attributes:
         kind: `error` fails it with `code`; `flip` turns one bit of what is read; `misroute`
             makes a write to a mux select another channel; `reset` resets the chip before it;
-            `hold` makes the chip serve what it served before.
+            `hold` makes the chip serve what it served before; `break` lets go of the wire at a
+            random byte of what is read, from which on all bits are 1.
         code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
             bus from being opened again while the fault lasts.
         at: numbers of transactions on the bus, counted from 0 when the script starts.

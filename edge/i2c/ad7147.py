@@ -25,12 +25,17 @@ REFRESH_S = {64: 0.009216, 128: 0.018432, 256: 0.036864}
 
 
 def stage_bank(stage: int) -> tuple[int, ...]:
-    """The eight registers of a stage: its input to the converter's positive side, no offsets."""
+    """The registers of a stage that decide what it converts: its input goes to the converter's
+    positive side, without offset.
+
+    The bank's other five set the limits of the chip's own touch detection, which nothing here
+    reads. Without them, twelve chips that browned out are back in 80 ms instead of 150.
+    """
     if stage < 7:
         connection = (0xFFFF ^ (1 << 2 * stage), 0x1FFF)
     else:
         connection = (0xFFFF, 0x1FFF ^ (1 << 2 * (stage - 7)))
-    return (*connection, 0, 0, 0, 0, 0, 0)
+    return (*connection, 0)
 
 
 def settings_table(decimation: int = 64) -> tuple[tuple[int, tuple[int, ...]], ...]:
@@ -53,7 +58,8 @@ def parse(data: NDArray[np.uint8]) -> Parsed:
     """12 big-endian words a chip.
 
     A word of 0 is marked as not whole: it is what a chip without its settings serves, and no
-    stage that converts reads it. All twelve at 0xFFFF is a bus that nobody drives.
+    stage that converts reads it. So is 0xFFFF at the end of a frame, with the word before it
+    where that ends in 0xFF: it is what a bus reads that nobody drives any more.
 
     Args:
         data: (n, 24) bytes.
@@ -63,8 +69,10 @@ def parse(data: NDArray[np.uint8]) -> Parsed:
     """
     values = data.view(">u2").astype(np.uint16)
     whole = values != 0
-    if int(values.max(initial=0)) == 0xFFFF:
-        whole &= (values != 0xFFFF).any(axis=1, keepdims=True)
+    broken = np.flatnonzero(values[:, -1] == 0xFFFF)
+    for row in broken.tolist():
+        driven = np.flatnonzero(data[row] != 0xFF)
+        whole[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
     return values, whole
 
 
@@ -117,6 +125,9 @@ class AD7147:
     def settings(self) -> Iterator[None]:
         """Write each row of the table, then read each back; a step a transaction.
 
+        What a reset clears for certain is read back last: a chip that loses its settings at any
+        moment before does not pass.
+
         Raises:
             WrongChip: a register does not hold what was written.
             BusError: a transaction failed.
@@ -124,7 +135,7 @@ class AD7147:
         for register, values in self._table:
             send(self.bus, self.address, words((register, *values)))
             yield
-        for register, values in self._table:
+        for register, values in sorted(self._table, key=lambda row: row[0] == PWR_CONTROL):
             got = fetch(self.bus, self.address, words((register,)), 2 * len(values))
             if got != words(values):
                 raise wrong_chip(

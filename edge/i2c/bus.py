@@ -102,7 +102,7 @@ class Response:
 _NACK = Response(BusNack, 3, mend="does not answer; check its power, wiring and address")
 _GONE = Response(BusGone, reopen=True, mend="the adapter has gone; plug it in again")
 _REFUSED = Response(
-    BusRefused, passing=False, mend="the adapter refuses a transaction of this shape"
+    BusRefused, 1, passing=False, mend="the adapter refuses a transaction of this shape"
 )
 _DENIED = Response(
     BusDenied, passing=False, mend="may not be opened; add yourself to the group i2c, or use sudo"
@@ -319,12 +319,15 @@ class LinuxBus:
         """Send it; the interpreter lock is free while it is on the wire.
 
         Raises:
-            BusError: it failed.
+            BusError: it failed, or the kernel completed fewer messages than it was given.
         """
         try:
-            ioctl(self._fd, I2C_RDWR, prepared.handle)
+            done = ioctl(self._fd, I2C_RDWR, prepared.handle)
         except (OSError, ValueError) as error:
             self._fail(error, prepared)
+        if done != len(prepared.messages):
+            # The kernel stopped half way without an error: the buffer holds an older reading.
+            raise bus_error(errno.EIO, self.name, prepared.messages[0].address)
 
     def _fail(self, error: OSError | ValueError, prepared: Transfer) -> NoReturn:
         # A closed bus has the file descriptor -1, which ioctl answers with ValueError.

@@ -39,6 +39,9 @@ class Chip(Protocol):
     def settings(self) -> Iterator[None]:
         """Write the settings and read them back, one transaction a step.
 
+        The last step reads what a reset changes, so that a chip that loses its settings on the
+        way does not pass.
+
         Raises:
             BusError: a transaction failed, or what was read back differs.
         """

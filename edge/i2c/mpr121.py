@@ -114,7 +114,9 @@ class MPR121:
             yield
         send(self.bus, self.address, [ECR, RUNNING])
         yield
-        self._hold(ECR, (RUNNING,), "does not start")
+        # A reset at any moment before shows here: it changes both registers.
+        if not self.healthy():
+            raise wrong_chip(self.bus, self.address, "loses its settings; check its power")
 
     def _hold(self, register: int, values: tuple[int, ...], otherwise: str) -> None:
         if fetch(self.bus, self.address, bytes([register]), len(values)) != bytes(values):

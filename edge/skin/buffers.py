@@ -37,6 +37,8 @@ class ChipGroup:
         """Readings in a row that gave the same bytes."""
         self.noisy = np.zeros(len(slots), dtype=np.bool_)
         self.any_noisy = False
+        self.doubtful = False
+        """A chip's bytes were not whole in the last frame."""
         self.limit = limit
         if slots[0].spec.kind == "block":
             # A frame's sequence number changes whatever its taxels do.

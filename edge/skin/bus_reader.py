@@ -41,8 +41,18 @@ the one before."""
 GONE_PAUSE_S = 0.05
 """Between two tries to open a bus whose adapter has gone."""
 RETRIES_PER_FRAME = 12
-STEPS_PER_FRAME = 24
-"""Most transactions a frame spends on bringing chips back."""
+STEPS_PER_FRAME = 128
+"""Most transactions a frame spends on bringing chips back; on a real wire its time ends them."""
+CHECKS_BEFORE_SET_UP = 4
+"""A chip whose settings are in place, but whose taxels have not become valid for 15 frames (one,
+two, four and eight between checks), is set up again: a conversion takes at most four at 100 Hz."""
+RESCUE_FRAMES, RESCUE_PAUSE = 10, 100
+"""How many frames may go to chips that have lost their settings alone, and how many pass before
+that is tried again."""
+RESCUE_SHARE = 1.07
+"""Nothing is read in such a frame, so that less of it need be kept for what cannot be foreseen."""
+LONGEST_DOUBT = 64
+"""Most frames between two checks of a chip whose taxels stay invalid."""
 
 
 NEVER = -1.0e9
@@ -73,12 +83,22 @@ class Slot:
     def __init__(self, spec: ChipSpec, row: NDArray[np.uint8]) -> None:
         self.spec, self.row = spec, row
         self.chip: Chip | None = None
+        self.set_up = False
+        """Its settings were written, read back, and not seen to be lost since."""
+        self.read_twice = spec.kind == "ad7147"
+        """A last byte of 0xFF may be a transfer that broke off: nothing else tells."""
         self.state = State.DOWN
         self.error: BusError | None = None
         self.at = NEVER
         self.good = False
         self.suspect = False
-        """Its bytes look like those of a chip that has lost its settings: check it first."""
+        """It may have lost its settings: it is checked before it is read again."""
+        self.damaged = False
+        """Its bytes were not whole when it was last read."""
+        self.found_healthy = 0
+        """Checks in a row that found its settings in place although its bytes were not whole."""
+        self.check_from = 0
+        """Frame before which whole settings are not doubted again."""
         self.recoveries = 0
         self.failures = 0
         self.retry_at = -math.inf
@@ -177,18 +197,24 @@ class BusReader:
         self.retries = RETRIES_PER_FRAME
         self._timeouts = 0
         self._all_running = False
+        self._starting = False
+        self._doubts = False
+        """A chip may be suspect."""
+        self._rescued_from = -RESCUE_PAUSE - 1
 
     def start(self) -> None:
-        """Identify and set up every chip; those that fail are left down.
+        """Identify and set up every chip; those that fail twice are left down.
 
         Raises:
             BusRefused: the adapter does not carry the transactions that drivers use.
         """
-        for slot in self.slots:
+        self._starting = True
+        for slot in self.slots * 2:
             slot.revival = None
             self.retries, self._timeouts = RETRIES_PER_FRAME, 0
             while not slot.running and self._step(slot):
                 pass
+        self._starting = False
 
     def read(self, slots: Sequence[Slot], deadline: float = math.inf) -> None:
         """Read these chips once; `good` and `at` of each say how it went.
@@ -197,8 +223,6 @@ class BusReader:
             slots: of this bus, in the order in which to read them.
             deadline: on the bus's clock; chips are not brought back after it.
 
-        Raises:
-            BusRefused: a transaction has a shape that the adapter does not carry.
         """
         self._frames += 1
         self.retries, self._timeouts = RETRIES_PER_FRAME, 0
@@ -207,12 +231,18 @@ class BusReader:
         now = self.bus.now
         if now() < self._resting_until or (self._gone and not self._return()):
             return
+        if self._doubts:
+            self._check_suspects(deadline, damaged=True)
+        if self._rescue(deadline):
+            return
         read_any = False
         for slot in slots:
             if slot.state is not State.RUNNING:
                 continue
             try:
                 slot.send(slot.frame)  # type: ignore[arg-type]
+                if slot.read_twice and slot.row[-1] == 0xFF:
+                    slot.send(slot.frame)  # type: ignore[arg-type]
             except BusError as error:
                 self._fail(slot, error)
                 if self._gone or self._timeouts > 1:
@@ -223,7 +253,9 @@ class BusReader:
         if self._gone or self._timeouts > 1:
             self._give_up(read_any)
             return
-        if self._frames % self._recheck == 0:
+        if self._doubts:
+            self._check_suspects(deadline, damaged=False)
+        elif self._frames % self._recheck == 0:
             self._check_next()
         # After the reading, so that what is broken takes no time from what is whole.
         if not self._all_running:
@@ -233,10 +265,12 @@ class BusReader:
         """Take a chip down, and say when to try it again.
 
         Raises:
-            BusRefused: the error is one; it is the program's, and no chip's.
+            BusRefused: the adapter refuses a transaction at the start, twice: it always will.
         """
-        if isinstance(error, BusRefused):
+        if isinstance(error, BusRefused) and self._starting and slot.failures:
             raise error
+        if slot.state is State.RUNNING:
+            self.doubt_all()
         slot.good = False
         slot.state, slot.error, slot.revival = State.DOWN, error, None
         self._all_running = False
@@ -275,6 +309,43 @@ class BusReader:
         self._all_running = False
         return True
 
+    def doubt_all(self) -> None:
+        """What took one chip's power or its bus may have taken its neighbours' settings."""
+        for slot in self.slots:
+            self._doubt(slot)
+
+    def judge(self, slot: Slot, whole: bool) -> None:
+        """Hear what the bytes of a chip that was read were like: whole, or damaged."""
+        if whole:
+            slot.found_healthy = slot.check_from = 0
+        elif self._frames >= slot.check_from:
+            slot.damaged = True
+            self._doubt(slot)
+
+    def _doubt(self, slot: Slot) -> None:
+        if slot.state is State.RUNNING:
+            slot.suspect = self._doubts = True
+
+    def _check_suspects(self, deadline: float, *, damaged: bool) -> None:
+        """Check the chips that are doubted, until the frame has no more time for it.
+
+        Those with damaged bytes come before the reading, which they would spoil again; the rest
+        after it, so that a doubt costs no reading.
+        """
+        for slot in self.slots:
+            if not slot.suspect or slot.damaged != damaged or slot.state is not State.RUNNING:
+                continue
+            if self._timeouts or self._gone or self.bus.now() >= deadline:
+                return
+            slot.suspect = slot.damaged = False
+            self.check(slot)
+            if damaged and slot.state is State.RUNNING:
+                slot.check_from = self._frames + min(1 << slot.found_healthy, LONGEST_DOUBT)
+                slot.found_healthy += 1
+                if slot.found_healthy >= CHECKS_BEFORE_SET_UP:
+                    self._set_up_again(slot)
+        self._doubts = any(slot.suspect for slot in self.slots)
+
     def _give_up(self, read_any: bool) -> None:
         """Leave the bus for this frame; where nothing on it answers, for a while."""
         now = self.bus.now()
@@ -289,6 +360,21 @@ class BusReader:
             self._resting_until = now + pause
         else:
             self._rests = 0
+
+    def _rescue(self, deadline: float) -> bool:
+        """Where half of the chips or more have lost their settings, the frame is for these alone.
+
+        A bus that is nearly full would need twice the time to set all its chips up if it went on
+        reading those that are back; in the end as many readings are lost either way.
+        """
+        lost = sum(slot.state is State.STARTING for slot in self.slots)
+        if 2 * lost >= len(self.slots) > 1 and self._frames > self._rescued_from + RESCUE_PAUSE:
+            self._rescued_from = self._frames
+        if lost == 0 or self._frames >= self._rescued_from + RESCUE_FRAMES:
+            return False
+        now = self.bus.now()
+        self._revive(now + (deadline - now) * RESCUE_SHARE)
+        return any(slot.state is State.STARTING for slot in self.slots)
 
     def _revive(self, deadline: float) -> None:
         """Bring chips back, as far as the frame has time, and by one step where it has none."""
@@ -318,16 +404,21 @@ class BusReader:
         except StopIteration:
             slot.recoveries += slot.error is not None
             slot.state, slot.revival, slot.error = State.RUNNING, None, None
-            slot.failures, slot.suspect = 0, False
+            slot.failures, slot.suspect, slot.set_up = 0, False, True
         except BusError as error:
             self._fail(slot, error)
             return False
         return True
 
     def _revival(self, slot: Slot) -> Iterator[None]:
-        """Steps from down to running; a chip that kept its settings is back at once."""
-        if slot.chip is not None and slot.chip.healthy():
+        """Steps from down to running.
+
+        A chip that was set up and kept its settings is back at once. One whose set-up was broken
+        off is not believed: the register that `healthy` reads may be the only one it has.
+        """
+        if slot.set_up and slot.chip is not None and slot.chip.healthy():
             return
+        slot.set_up = False
         slot.chip = chip = self._make(slot.spec, slot.row)
         slot.send, slot.frame = chip.bus.transfer, chip.frame
         yield
@@ -349,30 +440,26 @@ class BusReader:
         return Block(bus, spec.address, taxels=len(spec.taxels), bits=spec.bits, into=row)
 
     def _check_next(self) -> None:
-        """Read one running chip's settings again; a suspect one goes first."""
+        """Read the settings of one running chip again, each in its turn."""
         running = [slot for slot in self.slots if slot.state is State.RUNNING]
-        if not running:
-            return
-        self._turn += 1
-        suspects = [slot for slot in running if slot.suspect]
-        slot = suspects[0] if suspects and self._turn % 2 else running[self._turn % len(running)]
-        slot.suspect = False
-        self.check(slot)
+        if running:
+            self._turn += 1
+            self.check(running[self._turn % len(running)])
 
     def check(self, slot: Slot) -> None:
         """Read a running chip's settings; where they are gone, what it serves is not good."""
         if slot.chip is None or slot.state is not State.RUNNING:
             return
         try:
-            if slot.chip.healthy():
-                return
-            slot.state, slot.revival = State.STARTING, self._restart(slot)
-            slot.good, self._all_running = False, False
+            if not slot.chip.healthy():
+                self._set_up_again(slot)
+                self.doubt_all()
         except BusError as error:
             # The check itself failed: the chip is checked again before it is read.
             self._fail(slot, error)
 
-    def _restart(self, slot: Slot) -> Iterator[None]:
+    def _set_up_again(self, slot: Slot) -> None:
         assert slot.chip is not None
         slot.recoveries += 1
-        yield from slot.chip.settings()
+        slot.good = slot.set_up = self._all_running = False
+        slot.state, slot.revival = State.STARTING, slot.chip.settings()

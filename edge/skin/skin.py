@@ -123,6 +123,7 @@ class Skin:
             for bus, spec, rows in zip(buses, file.buses, groups.by_bus, strict=True)
         ]
         self._slots = [slot for reader in self.readers for slot in reader.slots]
+        self._owners = [reader for reader in self.readers for _ in reader.slots]
         self._every: list[list[Slot]] = [reader.slots for reader in self.readers]
         self._wire(groups)
         self._file_signal()
@@ -188,6 +189,8 @@ class Skin:
         # The last stage and the last chip stand for a taxel that no chip serves.
         self._raw = np.zeros(total + 1, dtype=np.uint16)
         self._whole = np.zeros(total + 1, dtype=np.bool_)
+        self._unserved = np.ones(total + 1, dtype=np.bool_)
+        """Stages that are no taxel, or a dead one: whatever they read, their chip is fine."""
         self._stage_of = np.full(n, total, dtype=np.intp)
         self._chip_of = np.full(n, len(self._slots), dtype=np.intp)
         self._sign = np.ones(n, dtype=np.int32)
@@ -206,6 +209,7 @@ class Skin:
         for row, col in self.file.signal.dead:
             self._served[row * self.layout.cols + col] = False
         self._all_served = bool(self._served.all())
+        self._unserved[self._stage_of[self._served]] = False
 
     def _file_signal(self) -> None:
         """Baseline, dead band and stuck chips from the file."""
@@ -278,9 +282,6 @@ class Skin:
         Returns:
             A frame whose `times` say when each taxel was read; a taxel that could not be read,
             is dead, or was last read more than `oldest_s` ago is not `valid` and reads 0.
-
-        Raises:
-            BusRefused: an adapter does not carry the portable transaction.
         """
         clock = self.clock
         clock.sleep_until(clock.now())  # buses that go by a virtual clock start together
@@ -350,10 +351,14 @@ class Skin:
     def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
         """Judge chips by what they serve: damaged words, or bytes that never change."""
         for group in self._groups:
-            if not self._whole[group.stages].all():
-                bad = ~self._whole[group.stages].reshape(group.shape).all(axis=1)
-                for i in np.flatnonzero(bad).tolist():
-                    group.slots[i].suspect = group.slots[i].good
+            all_whole = bool(self._whole[group.stages].all())
+            if not all_whole or group.doubtful:
+                whole = self._whole[group.stages] | self._unserved[group.stages]
+                by_chip = np.all(whole.reshape(group.shape), axis=1)
+                for i, slot, fine in zip(group.chips, group.slots, by_chip, strict=True):
+                    if slot.good:
+                        self._owners[i].judge(slot, bool(fine))
+                group.doubtful = not all_whole
             if not group.any_noisy:
                 continue
             same = (group.rows == group.before).all(axis=1)
@@ -362,7 +367,7 @@ class Skin:
             group.unchanged *= same & group.noisy
             if int(group.unchanged.max()) >= group.limit:
                 for i in np.flatnonzero(group.unchanged >= group.limit).tolist():
-                    group.slots[i].suspect = True
+                    self._owners[group.chips[i]].judge(group.slots[i], False)
                     good[group.chips[i]] = False
 
     def _follow(

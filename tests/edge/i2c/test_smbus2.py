@@ -65,6 +65,24 @@ def test_one_mute_chip_costs_its_twelve_taxels(library):
     assert done.stdout == "372 0\n"
 
 
+def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
+    """Its buffer still holds what was read before: old values must not pass for new ones."""
+    done = python(
+        library,
+        """
+        import os
+        from edge.i2c.bus import BusFault, LinuxBus, fetch
+        bus = LinuxBus(1)
+        try:
+            fetch(bus, 0x70, b"\\0", 1)
+        except BusFault as error:
+            print(error)
+        """,
+        I2CDEV_SHORT="0x70",
+    )
+    assert done.stdout.startswith("/dev/i2c-1, address 0x70: the transfer broke off"), done.stderr
+
+
 def test_a_bus_that_is_not_there_is_one_sentence(library):
     code = "from edge.i2c.bus import LinuxBus; LinuxBus(77)"
     done = python(library, code)

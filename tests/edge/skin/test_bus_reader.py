@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.faults import Fault, positions, run, scripts
+from bench.faults import FRAMES_BACK, KINDS, Fault, Pattern, run, scripts, skins, sweep
 from edge.classifier import Classifier
 from edge.commands.run import chip_event
 from edge.events import Decided
@@ -54,16 +54,84 @@ def test_a_hung_chip_costs_its_timeout_and_is_then_tried_less_and_less():
     assert outcome.missed <= 2 * outcome.met
 
 
-@pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.EIO, errno.EAGAIN])
-def test_a_passing_error_anywhere_in_a_frame_is_made_good_within_it(code):
-    outcome = positions(code, skinfile.load(skinfile.shipped("cody")), every=31)
-    assert (outcome.wrong, outcome.missing, outcome.missed, outcome.escaped) == (0, 0, 0, "")
+SKINS = skins()
+EVERY = {
+    "frame": {"cody": 97, "one bus at 40 Hz": 97},
+    "set-up": {"cody": 401, "one bus at 40 Hz": 401},
+}
+"""Here only one position in so many, another for each kind; `python -m bench.faults` tries all."""
 
 
-@pytest.mark.parametrize(("code", "most"), [(errno.ETIMEDOUT, 12), (errno.ENODEV, 144)])
-def test_an_error_that_lasts_costs_one_chip_or_one_bus(code, most):
-    outcome = positions(code, skinfile.load(skinfile.shipped("cody")), every=47)
-    assert (outcome.wrong, outcome.missing, outcome.escaped) == (0, most, "")
+@pytest.mark.parametrize("name", SKINS)
+@pytest.mark.parametrize("where", ["frame", "set-up"])
+def test_one_fault_anywhere_gives_no_wrong_value_and_is_over_in_ten_frames(name, where):
+    for k, kind in enumerate(KINDS):
+        every = EVERY[where].get(name, 23)
+        at = {"set_up": where == "set-up", "every": every, "offset": 31 * k % every}
+        found = sweep(name, SKINS[name], kind, **at)
+        assert (found.wrong, found.escaped) == (0, ""), found
+        assert found.frames <= FRAMES_BACK, found
+
+
+@pytest.mark.parametrize("position", [17, 18, 40])
+def test_an_error_during_set_up_leaves_no_taxel_dead(position):
+    """One register tells that a chip is set up: it must not be believed after half of a set-up."""
+    file, feels = SKINS["cody"], Pattern(SKINS["cody"])
+    with fake_skin(file, feels, timed=True) as skin:
+        for bus in (reader.bus for reader in skin.readers):
+            for chip in bus.chips[0x70].channels[0].values():
+                chip.reset()
+            bus.inject([Fault(code=errno.ETIMEDOUT, at=[17 + position])])
+        frames = list(Loop(skin, lasts_s=0.4).frames())
+        assert skin.readers[0].bus.script.met == 1
+    assert frames[-1].valid.all()
+    assert sum(feels.wrong(frame) for frame in frames) == 0
+
+
+@pytest.mark.parametrize("name", SKINS)
+def test_after_a_brown_out_all_chips_are_back_within_ten_frames(name):
+    file = SKINS[name]
+    with fake_skin(file, Pattern(file), timed=True) as skin:
+        start, back = skin.clock.now(), 0
+        for k in range(25):
+            skin.clock.sleep_until(start + k / file.reading.rate_hz)
+            if k == 3:
+                for reader in skin.readers:
+                    for chip in reader.bus.chips.values():
+                        for behind in [chip, *getattr(chip, "channels", [])]:
+                            for one in behind.values() if isinstance(behind, dict) else [behind]:
+                                one.reset()
+            back = k if not skin.read().valid.all() else back
+    assert back - 3 < FRAMES_BACK
+
+
+def test_a_chip_that_converts_nothing_though_its_settings_read_well_is_set_up_again():
+    file = SKINS["cody"]
+    with fake_skin(file, Pattern(file)) as skin:
+        chip = skin.readers[0].bus.chips[0x70].channels[1][0x2D]
+        chip._registers[0x80] ^= 1  # a register that the check of its settings does not read
+        chip._converts = None
+        states = [skin.read() and skin.readers[0].slots[5].recoveries for _ in range(40)]
+        assert skin.read().valid.all()
+    assert states[-1] == 1
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_the_failure_of_one_chip_lets_its_neighbours_be_checked_at_once(fails):
+    """What took its power may have taken theirs, and their values may look plausible."""
+    file = replace(SKINS["cody"], reading=replace(SKINS["cody"].reading, recheck_frames=100_000))
+    asked = set()
+    with fake_skin(file, Pattern(file), timed=True) as skin:
+        reader = skin.readers[0]
+        if fails:
+            lost = Fault(code=errno.EBUSY, address=0x2C, channel=0, during=(1.0, 1.015))
+            reader.bus.inject([lost])
+        for i, slot in enumerate(reader.slots):
+            slot.chip.healthy = lambda i=i: asked.add(i) or True
+        for k in range(12):
+            skin.clock.sleep_until(1.0 + k / 100)
+            skin.read()
+    assert (asked >= set(range(1, 12))) is fails
 
 
 def test_without_reading_back_a_wrong_channel_gives_wrong_values():

@@ -135,7 +135,8 @@ def test_features_and_decisions_agree_with_full_reading(recordings, exported):
     model = Model(exported / "model.onnx")
     near = compare(trials, region=True, rate_hz=100.0, model=model)
     assert near.missed == 0
-    assert np.abs(near.onset_ms).max() < 20.0
+    # While nothing touches, all chips are read once in three frames.
+    assert np.abs(near.onset_ms).max() < 30.0
     # Force and motion within 2 % of their range; area is a stair whose steps may come 10 ms off.
     assert near.errors[:, [0, 2]].max() < 0.02
     assert np.median(near.errors[:, 1]) < 0.06
