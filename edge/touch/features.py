@@ -22,8 +22,6 @@ from edge.touch.measures import Feature
 FEATURES = measures.PAPER
 SAMPLES = 40
 WINDOW_S = 1.2
-WIDE_SAMPLES = 10
-"""Times at which a feature of many values a frame, a cell's or a joint's, enters the vector."""
 MOTION_FLOOR = 0.1
 """Motion below it, in distances between taxels, is that of a centroid over noise."""
 
@@ -33,8 +31,8 @@ def widths(
 ) -> tuple[int, ...]:
     """How many values of a vector each feature takes, in their order.
 
-    A course takes `samples`, but that of each cell or joint `WIDE_SAMPLES` at most; what is one
-    number for the window takes 1, of each cell or joint.
+    A course takes `samples`, or as many as its name says, of each cell or joint; what is one
+    number for the window takes 1 of each.
 
     Args:
         names: of the features.
@@ -54,8 +52,7 @@ def widths(
     for name in names:
         feature = measures.feature(name)
         rows = joints if feature.of_joints else cells if feature.wide else 1
-        times = min(samples, WIDE_SAMPLES) if feature.wide else samples
-        out.append(rows if feature.single else rows * times)
+        out.append(rows if feature.single else rows * (feature.samples or samples))
     return tuple(out)
 
 
@@ -75,12 +72,12 @@ def feature_vector(
     >>> edge.feature_vector(series, window_s=1.2).shape
     (120,)
 
-    A course is taken at `samples` times, uniform in the window, those of each cell or joint at
-    `WIDE_SAMPLES` (fewer where there are fewer samples), one cell or joint after another; see
-    `widths`. Between frames by linear interpolation, so that jitter and dropped frames do not
-    shift the samples. After the last frame its values hold; a contact that has ended is at zero
-    there. What cannot be known in a frame (where nothing lies; how far it moved, without the
-    arm's pose) is interpolated between the frames that know it, and 0 where none does.
+    A course is taken at `samples` times, or as many as its name says, uniform in the window; of
+    cells or joints one after another; see `widths`. Between frames by linear interpolation, so that
+    jitter and dropped frames do not shift the samples. After the last frame its values hold; a
+    contact that has ended is at zero there. What cannot be known in a frame (where nothing lies;
+    how far it moved, without the arm's pose) is interpolated between the frames that know it, and 0
+    where none does.
 
     Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus
     a floor, so that it stays finite where nothing is: the least force of a taxel in contact, one
@@ -109,18 +106,18 @@ def feature_vector(
     wanted = measures.features(tuple(features))
     course = _Course(series, window_s)
     blocks = []
-    for (wide, transforms, summary), alike in groupby(wanted, key=_kind):
-        group = tuple(alike)
+    for (wide, own, transforms, summary), alike in groupby(wanted, key=_kind):
+        group, times = tuple(alike), own or samples
         if wide:
-            blocks += [_finish(*course.wide(f, samples), transforms, summary) for f in group]
+            blocks += [_finish(*course.wide(f, times), transforms, summary) for f in group]
         else:
-            blocks.append(_finish(*course.narrow(group, samples), transforms, summary))
+            blocks.append(_finish(*course.narrow(group, times), transforms, summary))
     return np.concatenate(blocks)
 
 
-def _kind(feature: Feature) -> tuple[bool, tuple[str, ...], str]:
+def _kind(feature: Feature) -> tuple[bool, int, tuple[str, ...], str]:
     """Features that are worked out in one go."""
-    return feature.wide, feature.transforms, feature.summary
+    return feature.wide, feature.samples, feature.transforms, feature.summary
 
 
 def _finish(
@@ -192,7 +189,7 @@ class _Course:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, bool]:
         """A feature of many values a frame, likewise; its rows have one largest value."""
         series = self._series
-        times, step = self._times(samples if feature.single else min(samples, WIDE_SAMPLES))
+        times, step = self._times(samples)
         key = feature.of_joints, len(times)
         if key not in self._wide:
             rows = series.joints if feature.of_joints else series.taxels

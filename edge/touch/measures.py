@@ -3,8 +3,9 @@
 A feature's name is a zone and a quantity, `skin_force` or `left_width`; the paper's three keep
 their own names. Transforms go before it (`log_`, `sqrt_`, `relative_`; the one next to the name
 is applied first) and a summary of its course after it (`_rate`, `_mean`, `_deviation`,
-`_roughness`): `sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`. A frame is
-measured only where a feature asked for calls for it.
+`_roughness`): `sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`. With `@10`
+at its end it is taken at ten times of the window, whatever the model's number of samples. A frame
+is measured only where a feature asked for calls for it.
 
 Zones: `contact` is the region that is followed, `second` the largest region besides it, `skin`
 all active taxels, `left` and `right` those in the first and second half of the columns (the two
@@ -62,7 +63,10 @@ square root with the value's sign, and the value over its largest magnitude with
 SUMMARIES = ("rate", "mean", "deviation", "roughness")
 """Of its course: the change a second; and one number for the window: mean, standard deviation,
 mean step from sample to sample."""
-_NAME = re.compile(rf"((?:(?:{'|'.join(TRANSFORMS)})_)*)(.+?)(?:_({'|'.join(SUMMARIES)}))?")
+_NAME = re.compile(
+    rf"((?:(?:{'|'.join(TRANSFORMS)})_)*)(.+?)(?:_({'|'.join(SUMMARIES)}))?(?:@(\d+))?"
+)
+MOST_SAMPLES = 10_000
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class Feature:
         quantity: one of `QUANTITIES`, or of those of `ALONE`.
         transforms: of its value, the first to be applied first.
         summary: one of `SUMMARIES`, or empty: its course.
+        samples: times at which it is taken; 0: as many as the model's.
     """
 
     name: str
@@ -82,6 +87,7 @@ class Feature:
     quantity: str
     transforms: tuple[str, ...] = ()
     summary: str = ""
+    samples: int = 0
 
     def unit(self, layout: SkinLayout) -> str:
         """Of its values on a skin."""
@@ -154,7 +160,7 @@ def feature(name: str) -> Feature:
         InputError: there is no such feature; the sentence offers the nearest names.
     """
     parts = _NAME.fullmatch(name)
-    prefix, base, summary = parts.groups("") if parts else ("", name, "")
+    prefix, base, summary, times = parts.groups("") if parts else ("", name, "", "")
     transforms = tuple(reversed(prefix.split("_")[:-1]))
     zone, _, quantity = base.partition("_")
     if base in ALONE:
@@ -170,7 +176,9 @@ def feature(name: str) -> Feature:
         raise InputError(
             f"the feature {name!r} may be negative and has no logarithm; take sqrt_{base}"
         )
-    return Feature(name, zone, quantity, transforms, summary)
+    if times and not 2 <= int(times) <= MOST_SAMPLES:
+        raise InputError(f"the feature {name!r} must be taken at 2 to {MOST_SAMPLES} times")
+    return Feature(name, zone, quantity, transforms, summary, int(times or 0))
 
 
 def features(wanted: Sequence[str]) -> tuple[Feature, ...]:

@@ -10,18 +10,19 @@
 | `force_motion`, its `_rate` | metre, metre/s | its sums of counts times row, column; the pose |
 | `log_stiffness` | log(newton/metre) | the skin's sum of counts over force-weighted motion |
 
-Logarithms make of a product a sum: what differs from thing to thing by a factor is a shift.
+Logarithms make of a product a sum: what differs from thing to thing by a factor is a shift. Five
+times are enough for courses this smooth; more of them fit the things that were met.
 """
 
 FEATURES = (
-    "log_max_force",
-    "log_skin_force",
-    "log_contact_area",
-    "log_contact_pressure",
-    "log_stiffness",
-    "force_motion",
-    "force_motion_rate",
-    "relative_skin_force",
-    "relative_contact_area",
-    "relative_skin_force_rate",
+    "log_max_force@5",
+    "log_skin_force@5",
+    "log_contact_area@5",
+    "log_contact_pressure@5",
+    "log_stiffness@5",
+    "force_motion@5",
+    "force_motion_rate@5",
+    "relative_skin_force@5",
+    "relative_contact_area@5",
+    "relative_skin_force_rate@5",
 )

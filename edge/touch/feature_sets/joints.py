@@ -11,5 +11,5 @@ gripper the thing's size, and an arm where the thing stood: where each thing sto
 its own, they tell the thing for a reason that holds in that room alone.
 """
 
-FEATURES = ("joint_change", "joint_change_rate")
-POSTURE = ("joint_angle",)
+FEATURES = ("joint_change@10", "joint_change_rate@10")
+POSTURE = ("joint_angle@10",)

@@ -15,7 +15,7 @@ Forces spread over decades and their square roots lie evenly, as those of counts
 from edge.touch.measures import QUANTITIES
 
 FEATURES = tuple(
-    f"sqrt_{zone}_{quantity}"
+    f"sqrt_{zone}_{quantity}@20"
     for zone in ("left", "right", "skin")
     for quantity in QUANTITIES
     if quantity != "pressure"

@@ -10,7 +10,7 @@
 """
 
 FEATURES = (
-    "taxel_force",
+    "taxel_force@10",
     "taxel_force_mean",
     "taxel_force_deviation",
     "taxel_force_roughness",

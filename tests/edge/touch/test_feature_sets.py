@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.touch.feature_sets import SETS, contact, expand, joints, moments, paper, taxels
-from edge.touch.features import FEATURES, WIDE_SAMPLES, feature_vector, widths
+from edge.touch.features import FEATURES, feature_vector, widths
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import TRANSFORMS, feature, names
@@ -67,7 +67,11 @@ def test_sets_and_features_expand_to_features_in_their_order_each_once():
         "contact_motion",
         "regions",
     )
-    assert expand(["joints", "posture"]) == ("joint_change", "joint_change_rate", "joint_angle")
+    assert expand(["posture", "joints"]) == (
+        "joint_angle@10",
+        "joint_change@10",
+        "joint_change_rate@10",
+    )
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -83,9 +87,18 @@ def test_a_vector_has_the_widths_that_are_told(name, samples):
 
 
 def test_widths_are_those_of_courses_cells_joints_and_single_numbers():
-    wanted = ["max_force", "max_force_mean", "taxel_force", "sqrt_taxel_force_deviation"]
-    assert widths(wanted, 40, SKIN) == (40, 1, 23 * WIDE_SAMPLES, 23)
-    assert widths(["joint_change", "joint_angle_mean", "taxel_force"], 4, SKIN, 7) == (28, 7, 92)
+    wanted = ["max_force", "max_force_mean", "taxel_force@10", "sqrt_taxel_force_deviation"]
+    assert widths(wanted, 40, SKIN) == (40, 1, 230, 23)
+    wanted = ["joint_change", "joint_angle_mean@9", "taxel_force", "max_force_rate@3"]
+    assert widths(wanted, 4, SKIN, 7) == (28, 7, 92, 3)
+
+
+def test_a_name_says_its_own_number_of_times():
+    few = vector_of(touch(PEAKS), "max_force@3", "max_force", "taxel_force_mean@2", samples=5)
+    assert few[:3].tolist() == [1.0, 2.0, 4.0]
+    assert few[3:8].tolist() == [p / 100 for p in PEAKS]
+    assert few[8 + 6] == (1.0 + 4.0) / 2
+    assert vector_of(touch(PEAKS), "max_force_rate@3").tolist() == [2.0, 3.0, 4.0]
 
 
 def test_transforms_are_those_of_the_samples_the_one_next_to_the_name_first():

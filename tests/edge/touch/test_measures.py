@@ -329,7 +329,7 @@ def test_units_are_those_of_the_skin():
         "log_stiffness": "log(newton/metre)",
         "sqrt_relative_taxel_force_rate": "sqrt(1)/s",
         "log_skin_force_mean": "log(newton)",
-        "joint_change_rate": "radian/s",
+        "joint_change_rate@10": "radian/s",
     }
     assert {name: feature(name).unit(metric) for name in units} == units
     assert feature("skin_force").unit(replace(metric, counts_per_newton=None)) == "count"
@@ -343,6 +343,8 @@ def test_units_are_those_of_the_skin():
         (["max_force_rate_rate"], "no feature"),
         ([""], "no feature ''"),
         (["log_"], "no feature 'log_'"),
+        (["max_force@1"], "must be taken at 2 to 10000 times"),
+        (["max_force@x"], "no feature 'max_force@x'"),
         (["log_sqrt_log_max_force"], "applies one transform twice"),
         (["sqrt_log_joint_change"], "may be negative and has no logarithm; take sqrt_joint_change"),
         (["log_skin_slant_mean"], "may be negative"),
