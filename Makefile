@@ -26,7 +26,7 @@ help:
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
-	@echo "make mutants  removes each guard in turn and checks that a test fails"
+	@echo "make mutants  removes each guard in turn, and makes 200 random changes: do tests fail?"
 	@echo "make fuzz     reads 5,000 hostile files of each kind: every one must end in an answer or a sentence"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
 
@@ -178,6 +178,7 @@ hard-cases-versions: $(READY) $(OTHER)/.ready
 
 mutants: $(READY)
 	$(BIN)/python -m tests.mutation.guards
+	$(BIN)/python -m tests.mutation.sample
 
 fuzz: $(READY)
 	$(BIN)/python -m tests.fuzz --out $(OUT)/fuzz $(FUZZ)

@@ -1,0 +1,186 @@
+"""`python -m tests.mutation.sample`: small random changes of edge/; a test must notice 90 %.
+
+200 places are drawn by a seed, 50 of each kind: comparisons, arithmetic, constants and
+conditions. A change is made on a copy of the tree, and the tests that run through its line are
+asked, the fastest first. What survives is printed with its line; `EQUIVALENT` says of those that
+change nothing why they do not, and they count as neither.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from tests.mutation import runner, shapes
+from tests.mutation.equivalent import EQUIVALENT
+
+ASKED = ("tests/edge", "tests/golden", "tests/hard_cases", "tests/test_examples.py")
+"""Tests whose way through edge/ is measured."""
+APART = ("tests/edge/commands", "tests/edge/runtime", "tests/test_demo_data.py")
+"""Tests that run edge/ in processes of their own, where no one measures: asked at the end."""
+MOST_TESTS = 400
+SHARE = 0.9
+
+COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
+}  # fmt: skip
+COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Mod: ast.Mult,
+    ast.FloorDiv: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.BitXor: ast.BitAnd,
+    ast.LShift: ast.RShift, ast.RShift: ast.LShift, ast.Pow: ast.Mult,
+}  # fmt: skip
+KINDS = ("comparison", "arithmetic", "constant", "condition")
+
+
+@dataclass(frozen=True)
+class Change:
+    """One small change.
+
+    Attributes:
+        kind: one of `KINDS`.
+        file: where.
+        line: its line.
+        old: the source of the node.
+        new: what it becomes.
+        text: the whole file with it.
+    """
+
+    kind: str
+    file: str
+    line: int
+    old: str
+    new: str
+    node: ast.AST
+    other: ast.AST
+
+    @property
+    def name(self) -> str:
+        """File, line and change, for people."""
+        return f"{self.file}:{self.line}: {self.old}  ->  {self.new}"
+
+
+def others(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """(kind, what the node becomes) of each small change of it."""
+    new = copy.deepcopy(node)
+    if isinstance(new, ast.Compare):
+        new.ops[0] = COMPARED[type(new.ops[0])]()
+        yield "comparison", new
+    elif isinstance(new, ast.BinOp | ast.AugAssign) and type(new.op) in COMPUTED:
+        new.op = COMPUTED[type(new.op)]()
+        yield "arithmetic", new
+    elif isinstance(new, ast.UnaryOp) and isinstance(new.op, ast.USub):
+        yield "arithmetic", new.operand
+    elif isinstance(new, ast.UnaryOp) and isinstance(new.op, ast.Not):
+        yield "condition", new.operand
+    elif isinstance(new, ast.Constant) and type(new.value) in (bool, int, float):
+        value = new.value
+        new.value = (not value) if isinstance(value, bool) else value + 1
+        yield "constant", new
+    elif isinstance(new, ast.BoolOp):
+        new.op = ast.Or() if isinstance(new.op, ast.And) else ast.And()
+        yield "condition", new
+    elif isinstance(new, ast.If | ast.IfExp | ast.While):
+        new.test = ast.UnaryOp(ast.Not(), new.test)
+        yield "condition", new
+
+
+def annotations(tree: ast.AST) -> set[int]:
+    """Nodes within annotations, which nothing computes with."""
+    inside: set[int] = set()
+    for node in ast.walk(tree):
+        for part in ("annotation", "returns"):
+            annotation = getattr(node, part, None)
+            if isinstance(annotation, ast.AST):
+                inside |= {id(n) for n in ast.walk(annotation)}
+    return inside
+
+
+def changes(root: Path = shapes.ROOT) -> list[Change]:
+    """All small changes of edge/, in the order of the files."""
+    found: list[Change] = []
+    for path in sorted((root / "edge").rglob("*.py")):
+        file = path.relative_to(root).as_posix()
+        tree = ast.parse(path.read_text())
+        apart = annotations(tree)
+        for node in ast.walk(tree):
+            if id(node) in apart:
+                continue
+            for kind, other in others(node):
+                shown = [ast.unparse(n).splitlines()[0][:90] for n in (node, other)]
+                line = getattr(node, "lineno", 0)
+                found.append(Change(kind, file, line, *shown, node, other))
+    return found
+
+
+def drawn(count: int, seed: int) -> list[Change]:
+    """As many of each kind, the same for the same tree and seed."""
+    every, out = changes(), []
+    for kind in KINDS:
+        of_kind = [change for change in every if change.kind == kind]
+        draw = Random(f"{kind} {seed}")
+        out += draw.sample(of_kind, min(count // len(KINDS), len(of_kind)))
+    return out
+
+
+def reach() -> dict[str, dict[str, list[str]]]:
+    """{file: {line: the tests that run through it, the fastest first}}."""
+    with tempfile.NamedTemporaryFile(suffix=".json") as kept:
+        words = ["-q", "-p", "tests.mutation.reach", "-p", "no:xdist", *ASKED]
+        environment = {**os.environ, "REACH_FILE": kept.name, "PYTHONPATH": str(shapes.ROOT)}
+        subprocess.run(
+            [sys.executable, "-m", "pytest", *words], cwd=shapes.ROOT, env=environment, check=True
+        )
+        found: dict[str, dict[str, list[str]]] = json.loads(Path(kept.name).read_text())
+        return found
+
+
+def job(change: Change, reached: dict[str, dict[str, list[str]]]) -> runner.Job:
+    """The change and those who are asked: the tests of its line, its mirror, those apart."""
+    tests = reached.get(change.file, {}).get(str(change.line), [])[:MOST_TESTS]
+    stages: list[tuple[str, ...]] = [tuple(tests)] if tests else []
+    mirror, package = runner.mirror(change.file), Path("tests", change.file).parent
+    if not tests and (shapes.ROOT / mirror).exists():
+        stages.append((mirror,))
+    if not tests and package.name != "edge" and (shapes.ROOT / package).is_dir():
+        stages.append((package.as_posix(),))
+    text = shapes.swapped(change.file, change.node, change.other)
+    return runner.Job(change.name, change.file, text, (*stages, APART))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print a line a change; 1 where fewer than 90 % are noticed."""
+    parser = argparse.ArgumentParser(prog="mutation.sample", description=__doc__)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=2012)
+    parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("--only", default="", help="changes whose line holds this text")
+    arguments = parser.parse_args(argv)
+    chosen = [c for c in drawn(arguments.count, arguments.seed) if arguments.only in c.name]
+    reached = reach()
+    alive, same = 0, 0
+    work = [job(change, reached) for change in chosen]
+    for one, noticed, took in runner.run(work, arguments.jobs):
+        file, _, what = one.name.split(":", 2)
+        reason = EQUIVALENT.get((file, what.strip()), "")
+        same += not noticed and bool(reason)
+        alive += not noticed and not reason
+        verdict = "killed  " if noticed else "SAME    " if reason else "SURVIVED"
+        print(f"{verdict} {one.name}\n         {noticed or reason} [{took:.0f} s]", flush=True)
+    judged = len(work) - same
+    print(f"{judged - alive} of {judged} changes are noticed; {same} more change nothing")
+    return 1 if judged - alive < SHARE * judged else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
