@@ -161,6 +161,7 @@ HARD := $(OUT)/hard-cases
 # With what another ONNX Runtime answers, and an aarch64 where `make board-test` has run.
 hard-cases: hard-cases-versions
 	$(BIN)/python -m tests.hard_cases --out $(HARD)
+	$(BIN)/python -m tests.hard_cases.adversarial
 
 # Golden files of hard cases, then asked again with another ONNX Runtime.
 OTHER_RUNTIME ?= 1.22.1

@@ -38,7 +38,7 @@ def features(n: int, seed: int = 0) -> Array:
     return X
 
 
-def describe(fitted: ContactClassifier) -> ModelInfo:
+def describe(fitted: ContactClassifier, samples: int = 40) -> ModelInfo:
     """Metadata for a model that was fitted on vectors alone."""
     return ModelInfo(
         tasks={
@@ -54,7 +54,7 @@ def describe(fitted: ContactClassifier) -> ModelInfo:
         layout=SkinLayout(16, 24, True),
         tracking=TrackSettings(),
         window_s=1.2,
-        samples=40,
+        samples=samples,
         features=FEATURES,
         units=dict.fromkeys(FEATURES, ""),
         motion_frame="skin",
