@@ -144,7 +144,7 @@ def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(case, make_to
 
 
 def test_a_missing_file_and_a_folder_are_named(tmp_path):
-    with pytest.raises(InputError, match="nothing.npz: no such file"):
+    with pytest.raises(InputError, match="nothing.npz: cannot be read: No such file"):
         load(tmp_path / "nothing.npz")
     with pytest.raises(InputError, match="is a folder"):
         load(tmp_path)

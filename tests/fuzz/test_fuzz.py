@@ -11,8 +11,6 @@ from tests.fuzz.readers import READERS, hostile
 
 CORPUS = Path(__file__).parent / "corpus"
 KEPT = sorted(CORPUS.glob("*"))
-PENDING = {"recording", "golden", "sdh2", "arm", "scene", "csv_frames"}
-"""Readers that get the guard of `edge.files` next."""
 BY_NAME = {reader.name: reader for reader in READERS}
 
 
@@ -25,9 +23,7 @@ def test_the_valid_files_are_accepted(reader, tmp_path):
         reader.read(path)
 
 
-@pytest.mark.parametrize(
-    "reader", [r for r in READERS if r.name not in PENDING], ids=lambda reader: reader.name
-)
+@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
 def test_hostile_files_end_in_an_answer_or_a_sentence(reader, tmp_path):
     path = tmp_path / f"input{reader.suffix}"
     reader.more(path)

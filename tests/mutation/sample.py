@@ -24,7 +24,7 @@ from random import Random
 from tests.mutation import runner, shapes
 from tests.mutation.equivalent import EQUIVALENT
 
-ASKED = ("tests/edge", "tests/golden", "tests/hard_cases", "tests/test_examples.py")
+ASKED = ("tests/edge", "tests/golden", "tests/hard_cases")
 """Tests whose way through edge/ is measured."""
 APART = ("tests/edge/commands", "tests/edge/runtime", "tests/test_demo_data.py")
 """Tests that run edge/ in processes of their own, where no one measures: asked at the end."""
@@ -138,8 +138,9 @@ def reach() -> dict[str, dict[str, list[str]]]:
     with tempfile.NamedTemporaryFile(suffix=".json") as kept:
         words = ["-q", "-p", "tests.mutation.reach", "-p", "no:xdist", *ASKED]
         environment = {**os.environ, "REACH_FILE": kept.name, "PYTHONPATH": str(shapes.ROOT)}
+        # A test that fails where its lines are measured still says which lines those are.
         subprocess.run(
-            [sys.executable, "-m", "pytest", *words], cwd=shapes.ROOT, env=environment, check=True
+            [sys.executable, "-m", "pytest", *words], cwd=shapes.ROOT, env=environment, check=False
         )
         found: dict[str, dict[str, list[str]]] = json.loads(Path(kept.name).read_text())
         return found

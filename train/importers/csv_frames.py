@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from edge.config import read_json
 from edge.errors import InputError
+from edge.files import parsing, read_bytes
 from edge.recording import Recording
 from edge.touch.arm import Chain
 
@@ -69,8 +70,9 @@ def _skin(path: Path) -> dict[str, Any]:
 def _labels(path: Path) -> dict[str, dict[str, str]]:
     if not path.is_file():
         return {}
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
+    text = read_bytes(path)
+    with parsing(str(path), "a table of labels"):
+        reader = csv.DictReader(text.decode().splitlines())
         if "trial" not in (reader.fieldnames or ()):
             raise InputError(f"{path}: has no column `trial`")
         return {

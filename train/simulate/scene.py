@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from edge.errors import InputError
+from edge.files import parsing, read_bytes
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.simulate import schema
@@ -52,13 +52,9 @@ def load(
             effect is named that the scene cannot support.
     """
     name = os.fspath(path)
-    try:
-        with open(name, "rb") as file:
-            table = tomllib.load(file)
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{name}: not TOML: {error}") from None
+    text = read_bytes(name)
+    with parsing(name, "TOML"):
+        table = tomllib.loads(text.decode())
     if seed is not None:
         table["seed"] = seed
     if count is not None and isinstance(table.setdefault("trials", {}), dict):

@@ -224,7 +224,7 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         (["--loop"], "--loop and --real-time need --fake"),
         (["--real-time", "--skin", "PAD"], "--loop and --real-time need --fake"),
         ([], "give --skin skin.toml, or --fake REC.npz to use no hardware"),
-        (["--fake", "no.npz"], "no.npz: no such file"),
+        (["--fake", "no.npz"], "no.npz: cannot be read: No such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),
         (["--fake", "REC", "--joints", "tcp:5"], "--joints: give stdin or udp:[HOST:]PORT"),
         (["--fake", "REC", "--joints", "udp:x"], "joints udp:x: give udp:PORT"),

@@ -53,7 +53,7 @@ def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_pa
     said = err.splitlines()
     assert len(said) == 3
     assert "short.npz: not a readable .npz file" in said[0]
-    assert "missing.npz: no such file" in said[1]
+    assert "missing.npz: cannot be read: No such file" in said[1]
     assert "skin.npz: has no joint angles" in said[2]
 
 
