@@ -138,8 +138,8 @@ GUARDS = (
     Guard(
         "the graph measures distances directly",
         f"{GRAPH}:_nearest",
-        'squares = build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)',
-        'squares = build.node("ReduceSumSquare", [build.node("Cast", [build.node("Cast", [gaps], '
+        'build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)',
+        'build.node("ReduceSumSquare", [build.node("Cast", [build.node("Cast", [gaps], '
         "to=TensorProto.FLOAT)], to=TensorProto.DOUBLE), build.ints(1)], keepdims=0)",
         "distances or near-duplicate",
     ),
@@ -172,8 +172,8 @@ GUARDS = (
     Guard(
         "no shortlist of nearly all rows",
         f"{GRAPH}:_convert",
-        "len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0])",
-        "len(rows[0]) >= SHORTLIST_ROWS",
+        "2 * (k + SHORTLIST) <= len(rows[0])",
+        "True",
     ),
     Guard(
         "a distance that is no number votes for nothing",
