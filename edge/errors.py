@@ -28,5 +28,5 @@ class InputError(EdgeError, ValueError):
     ...     edge.load("touch.npz")
     ... except edge.InputError as error:
     ...     print(error)
-    touch.npz: no such file
+    touch.npz: cannot be read: No such file or directory
     """

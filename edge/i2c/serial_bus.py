@@ -75,6 +75,7 @@ def decode(packet: bytes) -> bytes | None:
 def serial_bits(messages: Sequence[Message]) -> int:
     """Bits on the line for a request and its answer: 10 per byte, start and stop bit included.
 
+    >>> from edge.i2c.block import data_bytes
     >>> serial_bits([write(0, b"\\x10"), read(0, 4 + data_bytes(100, 12))])
     1630
     """

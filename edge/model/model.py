@@ -22,7 +22,7 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 
 METADATA_KEY = "edge-classify"
-FORMAT = 2
+FORMAT = 3
 LARGEST_BYTES = 1 << 30
 
 
@@ -137,7 +137,6 @@ class ModelInfo:
                 layout=SkinLayout.from_dict(meta.get("skin"), where=where),
                 tracking=TrackSettings(
                     tracking.whole("debounce", allowed=range(1, 1001)),
-                    tracking.whole("release", allowed=range(1, 1001)),
                     tracking.whole("connectivity", allowed=(4, 8)),
                 ),
                 window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),

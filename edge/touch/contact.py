@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout
+from edge.touch.layout import RELEASE_S, SkinLayout
 from edge.touch.measurer import COLS, FORCE, ROWS, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
@@ -31,7 +31,9 @@ class FeatureSeries:
             is kept without contact; NaN where the arm's pose was not known; 0 where it was not
             asked for.
         counts_per_newton: scale of `peak`, or None.
-        ended: the contact ended with the last frame: force and area are zero from there on.
+        ended: the contact ended with the last frame.
+        release_s: a contact is over once it has not been felt for so long; until then it has
+            only lifted off.
         zones: {zone: (n, 8)} what was measured there, see `edge.touch.measures`.
         regions: (n,) regions of the frame, or None.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
@@ -49,6 +51,7 @@ class FeatureSeries:
     motion: NDArray[np.float64]
     counts_per_newton: float | None = None
     ended: bool = False
+    release_s: float = RELEASE_S
     zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     regions: NDArray[np.int64] | None = None
     force_motion: NDArray[np.float64] | None = None
@@ -60,28 +63,30 @@ class FeatureSeries:
 
     def thinned(self, every: int) -> FeatureSeries:
         """Every n-th frame, as a slower wire would deliver them."""
+        return self._frames(slice(None, None, every))
 
-        def some(rows: NDArray[Any] | None) -> Any:
-            return None if rows is None else rows[::every]
+    def felt(self, window_s: float) -> FeatureSeries:
+        """The frames that tell of the contact, up to the first one at the window's end.
 
-        return replace(
-            self,
-            zones={zone: rows[::every] for zone, rows in self.zones.items()},
-            **{
-                name: some(getattr(self, name))
-                for name in (
-                    "t",
-                    "peak",
-                    "area",
-                    "sums",
-                    "motion",
-                    "regions",
-                    "force_motion",
-                    "taxels",
-                    "joints",
-                )
-            },
-        )
+        A board decides with that frame, so what comes later may not count. Frames in which the
+        contact has lifted off tell nothing of it, as it may go on: they are left out, unless it
+        has been away for `release_s`. Then it was over when it lifted off, which they tell.
+        """
+        n = min(int(self.t.searchsorted(window_s)) + 1, self.t.size)
+        felt = self.area[:n] > 0
+        if felt.all():
+            return self if n == self.t.size else self._frames(slice(n))
+        last = n - 1 - int(felt[::-1].argmax())
+        if released(self.t[last], self.t[n - 1], self.release_s):
+            felt[last + 1 :] = True
+        return self._frames(np.flatnonzero(felt))
+
+    def _frames(self, pick: slice | NDArray[np.intp]) -> FeatureSeries:
+        changes: dict[str, Any] = {
+            name: rows[pick] for name in PER_FRAME if (rows := getattr(self, name)) is not None
+        }
+        changes["zones"] = {zone: rows[pick] for zone, rows in self.zones.items()}
+        return replace(self, **changes)
 
     @property
     def integers(self) -> NDArray[np.int64]:
@@ -106,6 +111,20 @@ class FeatureSeries:
         return self.motion
 
 
+PER_FRAME = (
+    "t",
+    "peak",
+    "area",
+    "sums",
+    "motion",
+    "regions",
+    "force_motion",
+    "taxels",
+    "joints",
+)
+"""What a series has one row a frame of, besides its zones."""
+CLOCK_ROUNDING_S = 1e-6
+"""Less than a frame lasts, and more than is lost by a clock that counts 1e9 seconds."""
 ROWS_AT_FIRST = 256
 """Frames that a contact has room for before its table grows: over two seconds at 100 Hz."""
 PLAIN = 4
@@ -117,6 +136,7 @@ class Contact:
 
     Attributes:
         onset_s: when it began, on the frames' clock.
+        age_s: time of the last frame taken in, seconds from onset.
         layout: the skin.
         chain: the arm that its motion is measured with; None where it is measured on the skin.
         ended: no more frames will come.
@@ -129,7 +149,7 @@ class Contact:
     def __init__(
         self, onset_s: float, layout: SkinLayout, measurer: Measurer, chain: Chain | None = None
     ) -> None:
-        self.onset_s = onset_s
+        self.onset_s, self.age_s = onset_s, 0.0
         self.layout, self.chain = layout, chain
         self.ended = self.missing_taxels = self.missing_pose = False
         self.region: Region | None = None
@@ -147,20 +167,20 @@ class Contact:
             ],
         )
         self._n = 0
-        self._age = 0.0
         self._starts: dict[str, NDArray[np.float64]] = {}
 
-    @property
-    def last_s(self) -> float:
-        """Time of the last frame taken in, seconds."""
-        return self.onset_s + self._age
+    def add(self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float) -> None:
+        """Take in a frame.
 
-    def add(self, frame: Frame, active: ActiveTaxels, region: Region | None) -> None:
-        """Take in a frame; `region` is None where nothing of the contact is above the threshold."""
-        age = max(region_time(frame, region) - self.onset_s, 0.0)
-        if self._n and age <= self._age:
+        Args:
+            frame: of the skin.
+            active: its active taxels.
+            region: the contact's; None where nothing of it is above the threshold.
+            age_s: when the region was read, seconds from onset, at least 0.
+        """
+        if self._n and age_s <= self.age_s:
             # Two readings of one instant: the later one counts.
-            age = self._age
+            age_s = self.age_s
             self._forget_last()
         if self._n == len(self._rows):
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
@@ -176,9 +196,9 @@ class Contact:
         peak, area = (0, 0) if region is None else (region.peak, region.area)
         taxels = () if called.cells is None else called.cells.read(frame)
         joints = self._joints_of(frame) if called.joints else ()
-        self._rows[self._n] = (age, *motions, (peak, area, *sums, *more), taxels, joints)
+        self._rows[self._n] = (age_s, *motions, (peak, area, *sums, *more), taxels, joints)
         self._n += 1
-        self._age = age
+        self.age_s = age_s
 
     def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
         if frame.joints is None:
@@ -269,6 +289,7 @@ class Contact:
             motion=rows["motion"],
             counts_per_newton=self.layout.counts_per_newton,
             ended=self.ended,
+            release_s=self.layout.release_s,
             zones={zone: more[:, columns] for zone, columns in called.columns.items()},
             regions=more[:, -1] if called.regions else None,
             force_motion=rows["force_motion"] if called.force_motion else None,
@@ -278,6 +299,11 @@ class Contact:
             threshold_counts=self.layout.threshold_counts,
             pitch=self.layout.pitch[0],
         )
+
+
+def released(touched_s: float, now_s: float, release_s: float) -> bool:
+    """Whether a contact last felt at one time is over at another."""
+    return now_s - touched_s >= release_s - CLOCK_ROUNDING_S
 
 
 def region_time(frame: Frame, region: Region | None) -> float:

@@ -73,11 +73,13 @@ def feature_vector(
     (120,)
 
     A course is taken at `samples` times, or as many as its name says, uniform in the window; of
-    cells or joints one after another; see `widths`. Between frames by linear interpolation, so that
-    jitter and dropped frames do not shift the samples. After the last frame its values hold; a
-    contact that has ended is at zero there. What cannot be known in a frame (where nothing lies;
-    how far it moved, without the arm's pose) is interpolated between the frames that know it, and 0
-    where none does.
+    cells or joints one after another; see `widths`. Between frames by linear interpolation, so
+    that jitter and dropped frames do not shift the samples. What cannot be known in a frame
+    (where nothing lies; how far it moved, without the arm's pose; anything, while the contact has
+    lifted off for less than `release_s`) is interpolated between the frames that know it, held
+    after the last of them, and 0 where none does. Force and area of a contact that has ended are
+    0 from its lift-off on. Frames after the first one at the window's end do not count: on the
+    board, they have yet to come.
 
     Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus
     a floor, so that it stays finite where nothing is: the least force of a taxel in contact, one
@@ -101,9 +103,10 @@ def feature_vector(
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
     if samples < 2:
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
+    wanted = measures.features(tuple(features))
+    series = series.felt(window_s)
     if series.t.size == 0:
         raise InputError("the contact has no frame")
-    wanted = measures.features(tuple(features))
     course = _Course(series, window_s)
     blocks = []
     for (wide, own, transforms, summary), alike in groupby(wanted, key=_kind):

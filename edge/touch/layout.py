@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from edge.config import ConfigTable
 from edge.errors import InputError
 
+RELEASE_S = 0.3
+"""Seconds: an arm that bounces off a rigid thing comes back sooner, a second tap later."""
+LONGEST_RELEASE_S = 60.0
+
 
 @dataclass(frozen=True)
 class SkinLayout:
@@ -42,10 +46,17 @@ class SkinLayout:
     """A contact begins when its region's peak is above this; `threshold_counts` where None."""
     dead: tuple[int, ...] = ()
     """Flat indices (row * cols + col) of taxels that are known never to be read."""
+    release_s: float = RELEASE_S
+    """A contact ends when nothing of it has been above the threshold for so long."""
 
     def __post_init__(self) -> None:
         if not (1 <= self.rows <= 1024 and 1 <= self.cols <= 1024):
             raise InputError(f"skin: {self.rows} x {self.cols} taxels; each must be 1 to 1024")
+        if not 0.0 < self.release_s <= LONGEST_RELEASE_S:
+            raise InputError(
+                f"skin: release_s must be above 0 and at most {LONGEST_RELEASE_S:g} seconds, "
+                f"not {self.release_s!r}"
+            )
         if self.column_angles_deg is not None and len(self.column_angles_deg) != self.cols:
             raise InputError(
                 f"skin: column_angles_deg has {len(self.column_angles_deg)} values "
@@ -149,7 +160,7 @@ class SkinLayout:
             if table.has(name):
                 known[name] = table.whole(name, allowed=range(65536))
         known["wraps"] = table.flag("wraps", False)
-        for name in ("radius_m", "counts_per_newton"):
+        for name in ("radius_m", "counts_per_newton", "release_s"):
             if table.has(name):
                 known[name] = table.number(name, low=0.0, open_low=True)
         if table.has("row0_z_m"):
@@ -168,7 +179,7 @@ class SkinLayout:
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
-    """The device's geometry and scale with the model's thresholds, brought to its counts.
+    """The device's geometry and scale with the model's rules for a contact, in its counts.
 
     The taxels known to be dead are the model's: what else the device lacks is missing.
 
@@ -189,6 +200,7 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
         ratio = device.counts_per_newton / model.counts_per_newton
     return replace(
         device,
+        release_s=model.release_s,
         threshold_counts=min(round(model.threshold_counts * ratio), 65535),
         onset_counts=min(round(model.onset * ratio), 65535),
         dead=model.dead,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from edge.touch.contact import Contact, FeatureSeries, region_time
+from edge.touch.contact import Contact, FeatureSeries, region_time, released
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measurer import Measurer
@@ -22,20 +22,20 @@ loop."""
 
 @dataclass(frozen=True)
 class TrackSettings:
-    """How a contact begins, is followed and ends; training and the board use the same."""
+    """How a contact begins and is followed; training and the board use the same.
+
+    The skin's layout says from which counts on, and after how long without any it ends.
+    """
 
     debounce: int = 2
     """Frames in a row whose peak is above the skin's onset count before a contact is believed;
     its onset is the first of them."""
-    release: int = 5
-    """Frames in a row without a taxel above the skin's threshold that end a contact."""
     connectivity: int = 4
 
     def __post_init__(self) -> None:
-        for name in ("debounce", "release"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1000:
-                raise InputError(f"{name} must be a whole number of 1 to 1000, not {value!r}")
+        value = self.debounce
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1000:
+            raise InputError(f"debounce must be a whole number of 1 to 1000, not {value!r}")
         if self.connectivity not in (4, 8):
             raise InputError(f"connectivity must be 4 or 8, not {self.connectivity!r}")
 
@@ -44,19 +44,20 @@ class RegionTrack:
     """One region's way from its onset over contact to its end.
 
     A contact begins with the first of `debounce` frames in a row whose region has a peak above
-    the skin's onset count, and ends when `release` frames in a row have no taxel of it above
-    the threshold: two thresholds, so that a force that hovers at one of them is one contact.
+    the skin's onset count, and ends when no taxel of it has been above the threshold for the
+    skin's `release_s`. Two thresholds make one contact of a force that hovers at one of them, and
+    the time makes one contact of an arm that bounces off a rigid thing and comes back.
 
     Attributes:
         contact: what is followed, believed yet or not; None before it and after its end.
     """
 
-    def __init__(self, settings: TrackSettings, onset_counts: int, horizon_s: float) -> None:
-        self._settings = settings
-        self._onset_counts, self._horizon_s = onset_counts, horizon_s
+    def __init__(self, settings: TrackSettings, layout: SkinLayout, horizon_s: float) -> None:
+        self._settings, self._layout, self._horizon_s = settings, layout, horizon_s
         self.contact: Contact | None = None
         self._confirmed = False
         self._run = 0
+        self._touched_s = 0.0
 
     @property
     def region(self) -> Region | None:
@@ -65,7 +66,7 @@ class RegionTrack:
 
     def awaits(self, region: Region | None) -> bool:
         """Whether this region would begin a contact here."""
-        return self.contact is None and region is not None and region.peak > self._onset_counts
+        return self.contact is None and region is not None and region.peak > self._layout.onset
 
     def begin(self, contact: Contact) -> None:
         """Follow a contact from the frame that is pushed next."""
@@ -76,20 +77,23 @@ class RegionTrack:
         contact = self.contact
         if contact is None:
             return None
+        age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
         if not self._confirmed:
-            if region is None or region.peak <= self._onset_counts:
+            if region is None or region.peak <= self._layout.onset:
                 self.contact = None
                 return None
-            contact.add(frame, active, region)
+            contact.add(frame, active, region, age_s)
+            self._touched_s = age_s
             self._run += 1
             if self._run < self._settings.debounce:
                 return None
-            self._confirmed, self._run = True, 0
+            self._confirmed = True
             return contact
-        if contact.last_s - contact.onset_s < self._horizon_s:
-            contact.add(frame, active, region)
-        self._run = 0 if region is not None else self._run + 1
-        if self._run >= self._settings.release:
+        if contact.age_s < self._horizon_s:
+            contact.add(frame, active, region, age_s)
+        if region is not None:
+            self._touched_s = age_s
+        elif released(self._touched_s, age_s, self._layout.release_s):
             contact.ended = True
             self.contact = None
         return contact
@@ -218,7 +222,7 @@ class ContactTracker:
         return pairs
 
     def _track(self) -> RegionTrack:
-        return RegionTrack(self._settings, self.layout.onset, self.horizon_s)
+        return RegionTrack(self._settings, self.layout, self.horizon_s)
 
     def _contact(self, frame: Frame, region: Region) -> Contact:
         on_skin = self._motion_on_skin and frame.joints is None

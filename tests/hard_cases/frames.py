@@ -189,7 +189,7 @@ def split_error(dead: int, length: int) -> float:
 
 def contact_error(lead: int, length: int, settings: int) -> float:
     """Onset, end and length of a contact against what the frames say."""
-    peaks = [0] * lead + [100] * length + [0] * 8
+    peaks = [0] * lead + [100] * length + [0] * 40
     tracker = ContactTracker(FOREARM, TrackSettings(debounce=settings))
     found = []
     for i, peak in enumerate(peaks):
@@ -200,7 +200,7 @@ def contact_error(lead: int, length: int, settings: int) -> float:
         return float(len(found))
     (contact,) = found
     series = contact.series()
-    area = [1] * length + [0] * 5
+    area = [1] * length + [0] * 30
     return float(
         contact.onset_s != 0.01 * lead
         or not contact.ended

@@ -203,10 +203,10 @@ def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     shape = tuple(CODY_SKIN)
     read.known(table, "skin", (*shape, *schema.SKIN))
     layout: dict[str, Any] = {**CODY_SKIN, **{k: table[k] for k in shape if k in table}}
-    for name in ("counts_per_newton", "threshold_counts", "onset_counts"):
+    for name in ("counts_per_newton", "threshold_counts", "onset_counts", "release_s"):
         limits = schema.SKIN[name]
         number = read.number(table.get(name, limits.default), f"skin.{name}", limits)
-        if name != "counts_per_newton":
+        if name in ("threshold_counts", "onset_counts"):
             if number != int(number):
                 raise read.fail(f"skin.{name}", f"must be a whole number, not {table[name]!r}")
             layout[name] = int(number)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from edge.touch.layout import RELEASE_S
+
 INF = math.inf
 
 
@@ -55,6 +57,7 @@ SKIN = {
     "counts_per_newton": Field(0.0, 1e6, 1000.0, "counts", open_low=True),
     "threshold_counts": Field(0, 65535, 100, "a taxel above it is in contact"),
     "onset_counts": Field(0, 65535, 200, "a contact begins when its peak is above it"),
+    "release_s": Field(0.0, 60.0, RELEASE_S, "a contact ends after so long without", open_low=True),
     "taxel_n_m": Field(0.0, 1e18, 10_000.0, "stiffness of a taxel", open_low=True),
 }
 SPREAD = {

@@ -18,7 +18,7 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import MAX_CONTACTS, ContactTracker
 
-FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20)
+FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release_s=0.05)
 
 
 def follow(tracks, pictures, t=0.0):

@@ -20,7 +20,14 @@ from edge.touch.measures import TRANSFORMS, feature, names
 from edge.touch.track import ContactTracker
 
 SKIN = SkinLayout(
-    4, 6, threshold_counts=9, onset_counts=9, counts_per_newton=100.0, pitch_m=0.02, dead=(5,)
+    4,
+    6,
+    threshold_counts=9,
+    onset_counts=9,
+    counts_per_newton=100.0,
+    pitch_m=0.02,
+    dead=(5,),
+    release_s=0.25,
 )
 
 

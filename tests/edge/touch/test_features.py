@@ -25,15 +25,56 @@ def series(t, peak, area=None, motion=None, scale=None, ended=False):
     )
 
 
+def test_a_short_lift_off_is_bridged():
+    """What an arm does that bounces off a rigid thing tells nothing of the thing."""
+    t = np.arange(130) / 100
+    held = feature_vector(series(t, [100] * 130, [4] * 130, 0.1 * t), 1.2)
+    for first, length in [(10, 1), (50, 20), (30, 29), (110, 20)]:
+        away = np.arange(first, first + length)
+        area, peak = np.full(130, 4), np.full(130, 100)
+        area[away] = peak[away] = 0
+        motion = 0.1 * t
+        motion[away] = motion[first - 1]
+        seen = feature_vector(series(t, peak, area, motion), 1.2)
+        assert seen[:80].tolist() == held[:80].tolist()
+        if first + length < 120:
+            assert seen == pytest.approx(held, abs=1e-15)
+
+
+def test_a_contact_that_is_over_was_over_when_it_lifted_off():
+    t = np.arange(130) / 100
+    peak, area = np.full(130, 100), np.full(130, 4)
+    peak[60:] = area[60:] = 0
+    vector = feature_vector(series(t, peak, area), 1.2)
+    assert set(vector[:20]) == {100.0}
+    assert set(vector[20:40]) == {0.0}
+    assert set(vector[40:60]) == {4.0}
+    assert set(vector[60:80]) == {0.0}
+
+
+@given(seed=st.integers(0, 1000), window_s=st.floats(0.05, 1.2))
+def test_nothing_after_the_window_changes_its_features(seed, window_s):
+    """A board decides before it knows whether a contact that has lifted off comes back."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(130) / 100
+    area = np.repeat(rng.integers(0, 3, 13), 10)
+    area[0] = 1
+    peak = 100 * np.minimum(area, 1)
+    n = int(np.searchsorted(t, window_s)) + 1
+    whole = feature_vector(series(t, peak, area, t), window_s)
+    so_far = feature_vector(series(t[:n], peak[:n], area[:n], t[:n]), window_s)
+    assert whole.tolist() == so_far.tolist()
+
+
 def test_forty_samples_of_each_feature_from_onset_to_the_end_of_the_window():
     t = np.linspace(0, 2, 201)
-    vector = feature_vector(series(t, 1000 * t, 10 * t, 0.1 * t, scale=500.0), 1.2)
+    vector = feature_vector(series(t, 1000 * t, 10 * t + 1, 0.1 * t, scale=500.0), 1.2)
     times = np.linspace(0, 1.2, 40)
     assert vector.shape == (120,)
     assert vector.dtype == np.float64
     force = np.floor(1000 * t) / 500.0
     assert vector[:40] == pytest.approx(np.interp(times, t, force), abs=1e-15)
-    assert vector[40:80] == pytest.approx(np.interp(times, t, np.floor(10 * t)), abs=1e-13)
+    assert vector[40:80] == pytest.approx(np.interp(times, t, np.floor(10 * t + 1)), abs=1e-13)
     assert vector[80:] == pytest.approx(0.1 * times, abs=1e-16)
 
 

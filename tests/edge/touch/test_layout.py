@@ -49,7 +49,7 @@ def test_units_say_what_is_known():
 
 def test_metadata_round_trip():
     layout = SkinLayout(
-        16, 24, True, (0.0108, 0.01205), 0.046, 0.18, tuple(ANGLES), 1000.0, 100, 150, (3, 7)
+        16, 24, True, (0.0108, 0.01205), 0.046, 0.18, tuple(ANGLES), 1000.0, 100, 150, (3, 7), 0.25
     )
     assert SkinLayout.from_dict(layout.to_dict()) == layout
     assert not layout.alive[0, 3]
@@ -69,6 +69,8 @@ def test_metadata_round_trip():
         ({"pitch_m": float("nan")}, "above 0, not nan"),
         ({"radius_m": 0.05}, "needs pitch_m"),
         ({"counts_per_newton": 0}, "above 0"),
+        ({"release_s": 0.0}, "release_s must be a number above 0"),
+        ({"release_s": 61.0}, "at most 60 seconds"),
         ({"threshold_counts": -1}, "0 to 65535"),
         ({"threshold_counts": 50, "onset_counts": 40}, "below"),
         ({"column_angles_deg": [0.0]}, "1 values"),

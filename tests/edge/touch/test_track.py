@@ -14,18 +14,18 @@ from edge.touch.track import ContactTracker, TrackSettings, first_contact
 FLAT = SkinLayout(4, 6, threshold_counts=10, onset_counts=20, pitch_m=0.01)
 
 
-def frames(peaks, layout=FLAT, at=(1, 1), dt=0.01):
+def frames(peaks, layout=FLAT, at=(1, 1), dt=0.01, start=0.0):
     for i, peak in enumerate(peaks):
         counts = np.zeros(layout.shape, dtype=np.uint16)
         counts[at] = peak
-        yield Frame(t=i * dt, counts=counts)
+        yield Frame(t=start + i * dt, counts=counts)
 
 
-def follow(peaks, settings=None, **keywords):
+def follow(peaks, settings=None, *, layout=FLAT, dt=0.01, start=0.0, **keywords):
     """The contacts of a stream, each as (onset_s, peaks, ended)."""
-    tracker = ContactTracker(FLAT, settings, **keywords)
+    tracker = ContactTracker(layout, settings, **keywords)
     contacts = []
-    for frame in frames(peaks):
+    for frame in frames(peaks, layout, dt=dt, start=start):
         (contact,) = tracker.push(frame) or [None]
         if contact is not None and contact not in contacts:
             contacts.append(contact)
@@ -51,13 +51,25 @@ def test_a_contact_begins_above_the_upper_threshold_and_lasts_to_the_lower():
     assert follow(hovering) == [(0.0, hovering, False)]
 
 
-def test_a_contact_ends_after_a_run_without_any_taxel():
-    settings = TrackSettings(release=3)
+def test_a_contact_ends_after_a_time_without_any_taxel():
+    """A taxel at the threshold (10 counts here) is not in contact."""
     peaks = [25, 25, 0, 0, 25, 10, 0, 0, 30, 30]
-    assert follow(peaks, settings) == [
+    assert follow(peaks, layout=replace(FLAT, release_s=0.03)) == [
         (0.0, [25, 25, 0, 0, 25, 0, 0, 0], True),
         (0.08, [30, 30], False),
     ]
+
+
+@pytest.mark.parametrize(
+    ("away_s", "contacts"), [(0.05, 1), (0.2, 1), (0.29, 1), (0.3, 2), (0.35, 2), (0.5, 2)]
+)
+@pytest.mark.parametrize("dt", [0.01, 0.005, 0.0025])
+@pytest.mark.parametrize("start", [0.0, 0.07, 123.456, 1.7e9])
+def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(away_s, contacts, dt, start):
+    """At any rate and on any clock: the end is a time, not a number of frames."""
+    away = round(away_s / dt)
+    tap = [30] * round(0.1 / dt)
+    assert len(follow([*tap, *[0] * away, *tap], dt=dt, start=start)) == contacts
 
 
 def test_nothing_is_kept_beyond_the_horizon():
@@ -87,7 +99,7 @@ def test_motion_counts_from_the_reading_that_counts():
 
 
 def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
-    tracker = ContactTracker(FLAT, TrackSettings(release=2))
+    tracker = ContactTracker(replace(FLAT, release_s=0.02))
     zones = [(1, 1), (1, 2), (2, 4), None, None]
     for i, place in enumerate(zones):
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
@@ -170,7 +182,7 @@ def test_times_that_are_not_finite_are_refused(t):
         ContactTracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
 
 
-@pytest.mark.parametrize("settings", [{"debounce": 0}, {"release": 1.5}, {"connectivity": 5}])
+@pytest.mark.parametrize("settings", [{"debounce": 0}, {"debounce": 1.5}, {"connectivity": 5}])
 def test_settings_that_make_no_sense_are_named(settings):
     with pytest.raises(InputError, match=next(iter(settings))):
         TrackSettings(**settings)
