@@ -184,7 +184,9 @@ class _Course:
             sampled[whole] = _resample(times, series.t, values[whole])
             for i in np.flatnonzero(~whole & known.any(axis=1)):
                 sampled[i] = _resample(times, series.t[known[i]], values[i, known[i]])
-        floors = np.array([[self._floor(feature)] for feature in group])
+        # Features of a group have their transforms in common.
+        logs = "log" in group[0].transforms
+        floors = np.array([[self._floor(feature) if logs else 0.0] for feature in group])
         return sampled, floors, step, False
 
     def wide(
@@ -281,7 +283,10 @@ class _Zone:
         centre, there = self._centroid(COLS), self._force > 0
         if self._turn is not None:
             # A contact that crosses the seam goes on, it does not jump to the other end.
-            centre[there] = np.unwrap(centre[there] % self._turn, period=self._turn)
+            seen = centre[there] % self._turn
+            if 2.0 * np.abs(seen[1:] - seen[:-1]).max(initial=0.0) >= self._turn:
+                seen = np.unwrap(seen, period=self._turn)
+            centre[there] = seen
         return centre
 
     def spread_along(self) -> NDArray[np.float64]:

@@ -14,8 +14,9 @@ class FeatureSet:
 
     Attributes:
         features: their names, see `edge.touch.measures`.
-        price_us: what following a contact costs with them, microseconds a frame on the machine
-            that `bench/README.md` names; the order of the sets by it holds elsewhere too.
+        price_us: what they add to following a contact, microseconds a frame of Cody's skin on
+            one core of a workstation (`make bench`, `following`); a board takes longer, by much
+            the same factor for all.
     """
 
     features: tuple[str, ...]
@@ -23,13 +24,13 @@ class FeatureSet:
 
 
 SETS = {
-    "paper": FeatureSet(paper.FEATURES, 0.0),
-    "contact": FeatureSet(contact.FEATURES, 0.0),
-    "moments": FeatureSet(moments.FEATURES, 0.0),
-    "taxels": FeatureSet(taxels.FEATURES, 0.0),
-    "sqrt_taxels": FeatureSet(taxels.SQRT, 0.0),
-    "joints": FeatureSet(joints.FEATURES, 0.0),
-    "posture": FeatureSet(joints.POSTURE, 0.0),
+    "paper": FeatureSet(paper.FEATURES, 33.0),
+    "contact": FeatureSet(contact.FEATURES, 72.0),
+    "moments": FeatureSet(moments.FEATURES, 45.0),
+    "taxels": FeatureSet(taxels.FEATURES, 7.0),
+    "sqrt_taxels": FeatureSet(taxels.SQRT, 7.0),
+    "joints": FeatureSet(joints.FEATURES, 1.0),
+    "posture": FeatureSet(joints.POSTURE, 1.0),
 }
 
 
