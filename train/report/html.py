@@ -1,4 +1,4 @@
-"""The report: one HTML file that needs no other, with every table as CSV and plot as PNG."""
+"""The report as one HTML file, with every table as CSV and every plot as PNG beside it."""
 
 from __future__ import annotations
 
@@ -6,28 +6,41 @@ import base64
 import csv
 import html
 import io
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from edge.files import write_whole
-from train.report.tables import Section, Table
+from train.report.tables import Figure, Section, Table
 
 STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1b2430; margin: 0 auto; max-width: 62rem;
-  padding: 1.5rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.6rem;
-  border-bottom: 1px solid #cfd6df; } h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
-p { max-width: 46rem; } nav li { line-height: 1.4; }
+:root { color-scheme: light dark; --ink: #1b2430; --paper: #fff; --line: #d5dbe3; --soft: #eef2f6;
+  --link: #1f5fa8; --miss: #fdf0ec; }
+@media (prefers-color-scheme: dark) { :root { --ink: #dde3ea; --paper: #14191f; --line: #39434f;
+  --soft: #222a33; --link: #8ab8f0; --miss: #3a2620; }
+  img { filter: invert(.92) hue-rotate(180deg); } }
+* { box-sizing: border-box; }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper);
+  margin: 0 auto; max-width: 68rem; padding: 1.2rem; overflow-wrap: break-word; }
+h1 { font-size: 1.6rem; line-height: 1.2; } a { color: var(--link); }
+h2 { font-size: 1.25rem; margin-top: 2.6rem; border-bottom: 1px solid var(--line); }
+h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; } summary { cursor: pointer; }
+p, dl { max-width: 46rem; } nav li { line-height: 1.5; } dt { font-weight: 600; }
+dd { margin: 0 0 .6rem 1.2rem; } code { font-size: .93em; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
-.scroll { overflow: auto; max-height: 34rem; }
-th { position: sticky; top: 0; background: #eef2f6; text-align: left; }
-th, td { padding: .18rem .6rem; border-bottom: 1px solid #e3e8ee; white-space: nowrap; }
-td.number { text-align: right; } tr.no td { background: #fdf0ec; }
+table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
+  max-width: 100%; }
+th { background: var(--soft); text-align: left; vertical-align: bottom; }
+th, td { padding: .18rem .55rem; border-bottom: 1px solid var(--line); }
+td.number { text-align: right; white-space: nowrap; } tr.no td { background: var(--miss); }
+@media (max-width: 700px) { body { padding: .8rem; } .more { display: none; }
+  th, td { padding: .18rem .35rem; } }
 """
 
-
+LONGEST = 16
+"""Rows that a table may have before it is folded."""
+CODE = re.compile(r"`([^`]+)`")
 KEYS = 4
 """First columns that are repeated beside timings, to tell the rows apart."""
 
@@ -49,51 +62,72 @@ def _csv(table: Table, places: Sequence[int]) -> str:
     return text.getvalue()
 
 
-def _cell(value: Any) -> str:
-    number = isinstance(value, int | float)
+def _text(text: str) -> str:
+    """Escaped, with what stands between backquotes as code."""
+    return CODE.sub(r"<code>\1</code>", html.escape(text, quote=False))
+
+
+def _cell(value: Any, more: bool) -> str:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
     text = f"{value:.2f}" if isinstance(value, float) else str(value)
-    return f'<td class="number">{text}</td>' if number else f"<td>{html.escape(text)}</td>"
+    kinds = " ".join(["number"] * number + ["more"] * more)
+    return f'<td class="{kinds}">{_text(text)}</td>' if kinds else f"<td>{_text(text)}</td>"
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{html.escape(column)}</th>" for column in table.columns)
+    head = "".join(
+        f"<th{' class=more' if i >= table.narrow else ''}>{_text(column)}</th>"
+        for i, column in enumerate(table.columns[: table.wide])
+    )
     rows = "\n".join(
-        f'<tr class="{"no" if row[-1] == "no" else ""}">{"".join(map(_cell, row))}</tr>'
+        f"<tr{' class=no' if row[-1] == 'no' else ''}>"
+        + "".join(_cell(value, i >= table.narrow) for i, value in enumerate(row[: table.wide]))
+        + "</tr>"
         for row in table.rows
     )
-    return (
-        f"<h3>{html.escape(table.title)}</h3>\n"
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>'
-        f"</div><p>{' '.join(f'<small>{name}</small>' for name in table_csv(table))}</p>"
-    )
+    files = "All columns: " if len(table.columns) > table.wide else ""
+    files += ", ".join(f'<a href="{name}">{name}</a>' for name in table_csv(table))
+    body = f"<table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
+    if len(table.rows) > LONGEST:
+        body = f"<details><summary>{len(table.rows)} rows</summary>\n{body}</details>"
+    return f"<h3>{_text(table.title)}</h3>\n{body}<p><small>{files}</small></p>"
+
+
+def _figure(figure: Figure) -> str:
+    def source(png: bytes) -> str:
+        return f"data:image/png;base64,{base64.b64encode(png).decode()}"
+
+    image = f'<img alt="{html.escape(figure.title)}" src="{source(figure.png)}">'
+    if figure.narrow is not None:
+        media = f'<source media="(max-width: 700px)" srcset="{source(figure.narrow)}">'
+        image = f"<picture>{media}{image}</picture>"
+    return f"<figure>{image}</figure>"
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
-    """The whole report as HTML; images are in it."""
+    """The whole report as HTML; images are in it, and tables link to the CSV files beside it."""
     parts = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>",
-        f"<h1>{html.escape(title)}</h1>",
-        *(f"<p>{html.escape(text)}</p>" for text in lead),
+        f"<h1>{_text(title)}</h1>",
+        *(f"<p>{_text(text)}</p>" for text in lead),
         "<nav><ol>",
         *(
-            f'<li><a href="#s{i}">{html.escape(section.title)}</a></li>'
+            f'<li><a href="#s{i}">{_text(section.title)}</a></li>'
             for i, section in enumerate(sections)
         ),
         "</ol></nav>",
     ]
     for i, section in enumerate(sections):
-        parts.append(f'<h2 id="s{i}">{html.escape(section.title)}</h2>')
-        parts += [f"<p>{html.escape(text)}</p>" for text in section.text]
-        for figure in section.figures:
-            data = base64.b64encode(figure.png).decode()
-            parts.append(
-                f'<figure><img alt="{html.escape(figure.title)}" '
-                f'src="data:image/png;base64,{data}"></figure>'
-            )
-        parts += [_table(table) for table in section.tables]
+        parts.append(f'<h2 id="s{i}">{_text(section.title)}</h2>')
+        parts += [f"<p>{_text(text)}</p>" for text in section.text]
+        parts += map(_figure, section.figures)
+        parts += map(_table, section.tables)
+        if section.terms:
+            terms = (f"<dt>{_text(a)}</dt><dd>{_text(b)}</dd>" for a, b in section.terms.items())
+            parts += ["<dl>", *terms, "</dl>"]
     return "\n".join([*parts, "</body></html>\n"])
 
 

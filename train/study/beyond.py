@@ -1,335 +1,247 @@
-"""Beyond the paper's three features: what each further one buys, and what it costs."""
+"""Beyond the paper's three features: named sets and outside peers on the same folds."""
 
 from __future__ import annotations
 
-import time
+import importlib
+import importlib.util
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
-from edge.recording import Recording
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
-from edge.touch.layout import for_device
-from edge.touch.measures import feature, names
-from edge.touch.track import ContactTracker, first_contact
-from train.evaluate import FOLDS, Labels, Result
-from train.projection import scale_of
+from edge.touch.contact import FeatureSeries
+from edge.touch.feature_sets import SETS, expand
+from edge.touch.features import WINDOW_S, feature_vector
+from train.evaluate import Grid, Labels, Result, evaluate, group_folds, stratified_folds
 from train.report import figures
-from train.report.tables import SCORE, Figure, Section, Table, percent, score
+from train.report.tables import Figure, Section, Table, percent
 from train.study.context import Context
-from train.study.honest import nested
-from train.study.score import collect, grid_search, nested_fold, shuffled_folds
-from train.study.skins import View, vectors
+from train.study.skins import View
 
-CHOSEN = (
-    "skin_force",
-    "right_length",
-    "left_width",
-    "skin_slant",
-    "left_spread_around",
-    "right_slant",
-)
-"""Found on the real grasps by `search` and kept: the ready-made set."""
-FEW = 20
-"""Samples a feature for sets of more types: six then fill as many columns as the paper's three."""
-STEPS = 6
+OURS = (("paper", "pca"), ("paper", "lda"), ("contact", "lda"), ("moments", "lda"))
+"""Sets of features and how they are projected: the paper's way first."""
+SAMPLES = 20
+"""Values of a feature that follows time."""
 SCALING = "IV"
 TREES = 300
-TIMED = 1
-"""Recordings whose frames are timed."""
+TIMES = 10
+"""Of every taxel, for the peers."""
+GROUP_TASK = "object"
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Parts of the trials in the learning curve."""
+CURVE = (("paper", "pca"), ("contact", "lda"))
+
+Peer = Callable[[NDArray[np.float64], NDArray[np.str_], NDArray[np.float64]], NDArray[np.str_]]
+"""Taxels over time (n, times, taxels) and labels of training trials, then new trials; labels."""
 
 
-def quick_score(X: NDArray[np.float64], classes: NDArray[np.int64]) -> float:
-    """Leave-one-out accuracy of 1-NN on 15 components fitted once: good enough to rank sets."""
-    centred = X - X.mean(axis=0)
-    _, vectors_ = np.linalg.eigh(centred.T @ centred)
-    Z = centred @ vectors_[:, -15:]
-    lengths = (Z * Z).sum(axis=1)
-    squares = lengths[:, None] + lengths - 2.0 * Z @ Z.T
-    np.fill_diagonal(squares, np.inf)
-    return float((classes[squares.argmin(axis=1)] == classes).mean())
+def _flat(X: NDArray[np.float64]) -> NDArray[np.float64]:
+    return X.reshape(len(X), -1)
 
 
-def search(
-    X: NDArray[np.float64], y: NDArray[np.str_], types: Sequence[str], steps: int = STEPS
-) -> list[str]:
-    """Features added one at a time, each the one that raises `quick_score` most.
-
-    Args:
-        X: (n, types * samples).
-        y: (n,) labels.
-        types: names of the types of X.
-        steps: features wanted.
-    """
-    _, classes = np.unique(y, return_inverse=True)
-    _, gain = scale_of(X, SCALING, types)
-    blocks = X.reshape(len(X), len(types), -1) * gain[:, None]
-    taken: list[int] = []
-    for _ in range(steps):
-        scores = [
-            -1.0 if i in taken else quick_score(blocks[:, [*taken, i]].reshape(len(X), -1), classes)
-            for i in range(len(types))
-        ]
-        taken.append(int(np.argmax(scores)))
-    return [types[i] for i in taken]
+def _statistics(X: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.hstack([X.mean(axis=1), X.std(axis=1), X.max(axis=1)])
 
 
-def search_and_tell(
-    X: NDArray[np.float64], y: Labels, task: str, test: NDArray[np.int64], types: Sequence[str]
-) -> tuple[dict[str, tuple[NDArray[np.str_], tuple[int, int]]], list[str]]:
-    """What is said of a fold whose features, components and k are chosen on the others."""
-    train = np.setdiff1d(np.arange(len(X)), test)
-    chosen = search(X[train], y[task][train], types)
-    part = columns(X, types, chosen)
-    return nested_fold(part, y, test, SCALING, chosen), chosen
+def extra_trees(
+    X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
+) -> NDArray[np.str_]:
+    """Extra trees on every taxel at ten times."""
+    trees = ExtraTreesClassifier(TREES, random_state=0).fit(_flat(X), y)
+    return np.asarray(trees.predict(_flat(new)))
 
 
-def columns(
-    X: NDArray[np.float64], types: Sequence[str], wanted: Sequence[str]
-) -> NDArray[np.float64]:
-    """The vectors of some of the types of X."""
-    blocks = X.reshape(len(X), len(types), -1)
-    return blocks[:, [list(types).index(name) for name in wanted]].reshape(len(X), -1)
+def forest(
+    X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
+) -> NDArray[np.str_]:
+    """A random forest on each taxel's mean, deviation and maximum."""
+    trees = RandomForestClassifier(TREES, random_state=0).fit(_statistics(X), y)
+    return np.asarray(trees.predict(_statistics(new)))
 
 
-def frame_cost(recordings: Sequence[Recording], context: Context, wanted: Sequence[str]) -> float:
-    """Microseconds a frame of following contacts measured for some features; best of three."""
-    data = context.dataset
-    best = np.inf
-    for _ in range(3):
-        frames = 0
-        began = time.perf_counter()
-        for recording in recordings:
-            layout = for_device(data.layout, recording.layout)
-            tracker = ContactTracker(
-                layout, data.tracking, chain=data.chain, horizon_s=WINDOW_S, features=wanted
-            )
-            contact = first_contact(recording, tracker)
-            frames += 0 if contact is None else len(contact[1].t)
-        best = min(best, (time.perf_counter() - began) / max(frames, 1))
-    return best * 1e6
-
-
-def trimmed(context: Context) -> list[Recording]:
-    """A few recordings, from onset to the window's end."""
-    data = context.dataset
-    step = max(len(data.trials) // TIMED, 1)
-    found = []
-    for trial, recording in list(zip(data.trials, context.recordings, strict=True))[::step]:
-        inside = (recording.t >= trial.onset_s) & (recording.t <= trial.onset_s + WINDOW_S)
-        valid = recording.valid
-        found.append(
-            Recording(
-                t=recording.t[inside],
-                frames=recording.frames[inside],
-                joints=None if recording.joints is None else recording.joints[inside],
-                valid=valid[inside] if valid is not None and valid.ndim == 3 else valid,
-                meta=recording.meta,
-            )
-        )
-    return found[:TIMED]
-
-
-def section(context: Context) -> Section:
-    """What each feature buys on this data set."""
-    data, y = context.dataset, context.labels
-    task = max(y, key=lambda name: len(set(y[name])))
-    types = names()
-    (series,) = context.follow_again("every feature", [View(data.layout, names=types)])
-    every = vectors(series, WINDOW_S, FEW, types)
-
-    timed = trimmed(context)
-    floor = frame_cost(timed, context, ["max_force"])
-    costs: dict[frozenset[str], float] = {}
-
-    def cost(wanted: Sequence[str]) -> float:
-        key = frozenset(wanted)
-        if key not in costs:
-            costs[key] = frame_cost(timed, context, wanted)
-        return costs[key]
-
-    singles = _singles(context, every, types, task, floor, cost)
-    sets = _sets(context, every, types, task, cost)
-    rivals = _rivals(context, task)
-    table = Table(
-        "beyond_sets",
-        f"Sets of features, {task}: nested and not, and what they cost",
-        ("features", "scaling", "columns", "how", *SCORE, "us a frame", "ms a decision"),
-        sets + rivals,
-        timed=("us a frame", "ms a decision"),
-    )
-    points = [
-        {"name": f"{row[0].split(':')[0]}, {row[1]}", "accuracy": row[4], "cost": row[-2]}
-        for row in sets
-        if row[3].startswith("nested") and not row[0].startswith("best path")
-    ]
-    png = figures.scatter(
-        points,
-        x="cost",
-        title=f"{task}: nested accuracy against cost",
-        label="us a frame, from threshold to features",
-    )
-    return Section(
-        "Beyond three features",
-        [
-            f"Every feature type is a place and a quantity by whole-number arithmetic on the "
-            f"frame ({len(types)} types; see `edge/touch/measures.py`), measured only where a "
-            f"model names it. {FEW} samples each, Method IV, 1.2 s. The cost is that of following "
-            f"a contact on this machine ({floor:.0f} us a frame with max_force alone, of the 10 ms "
-            "that a frame has).",
-            "Orientation enters as slant (a covariance), not as an angle, which would jump. A "
-            "rate of change is any name with `_rate`; PCA of 20 or 40 samples spans it already, "
-            "so it adds weight, not information.",
-            f"The ready-made set was found on the real grasps, the object task: "
-            f"{', '.join(CHOSEN)}. `python -m export --features {' '.join(CHOSEN)} --samples "
-            f"{FEW} --scaling {SCALING}` makes a model of it. The best path on all trials is "
-            "flattered by its search, nested or not, and is not plotted; where the features are "
-            "searched inside each fold, nothing of the fold's trials took part in any choice: "
-            "that line is the honest one.",
-        ],
-        [table, singles],
-        [Figure("beyond", "What features cost", png)],
+def minirocket(
+    X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
+) -> NDArray[np.str_]:
+    """MiniRocket and ridge of aeon (Dempster, Schmidt and Webb, 2021) on every taxel."""
+    convolutions = importlib.import_module("aeon.classification.convolution_based")
+    series, others = X.transpose(0, 2, 1), new.transpose(0, 2, 1)
+    return np.asarray(
+        convolutions.MiniRocketClassifier(random_state=0).fit(series, y).predict(others)
     )
 
 
-def _singles(
-    context: Context,
-    every: NDArray[np.float64],
-    types: Sequence[str],
-    task: str,
-    floor: float,
-    cost: Callable[[Sequence[str]], float],
-) -> Table:
-    """Each feature alone, and beside the paper's three."""
-    y = {task: context.labels[task]}
-    sets = [FEATURES, *((*FEATURES, name) for name in types if name not in FEATURES)]
-    cases = [(columns(every, types, wanted), y, SCALING, wanted) for wanted in sets]
-    alone = [(columns(every, types, [name]), y, SCALING, [name]) for name in types]
-    results = context.map("one more feature", grid_search, cases)
-    own = context.map("one feature alone", grid_search, alone)
-    base = results[0][task].accuracy
-    more = dict(zip([s[-1] for s in sets[1:]], results[1:], strict=True))
-    rows: list[tuple[Any, ...]] = []
-    for name, single in zip(types, own, strict=True):
-        added = more.get(name)
-        extra = max(cost([name] if name == "max_force" else ["max_force", name]) - floor, 0.0)
-        rows.append(
-            (
-                name,
-                feature(name).unit(context.dataset.layout),
-                percent(single[task].accuracy),
-                "" if added is None else percent(added[task].accuracy),
-                "" if added is None else round(100 * (added[task].accuracy - base), 2),
-                round(extra, 1),
-            )
-        )
-    rows.sort(key=lambda row: -(row[4] if row[4] != "" else -100.0))
-    return Table(
-        "beyond_features",
-        f"What each feature buys, {task}, leave-one-out: alone and beside the paper's three "
-        f"({base:.2%} at {FEW} samples)",
-        ("feature", "unit", "alone %", "with the paper's three %", "gain", "more us a frame"),
-        rows,
-        timed=("more us a frame",),
-    )
-
-
-def _sets(
-    context: Context,
-    every: NDArray[np.float64],
-    types: Sequence[str],
-    task: str,
-    cost: Callable[[Sequence[str]], float],
-) -> list[tuple[Any, ...]]:
-    """Rows of sets of features: best cell and nested."""
-    y = context.labels
-    X3 = context.vectors()
-    found = search(every, y[task], types)
-    cases: dict[tuple[str, str], tuple[NDArray[np.float64], Sequence[str]]] = {
-        ("the paper's three", "none"): (X3, FEATURES),
-        ("the paper's three", SCALING): (X3, FEATURES),
-        ("ready-made six", SCALING): (columns(every, types, CHOSEN), CHOSEN),
-        (f"all {len(types)}", SCALING): (every, types),
+def peers() -> dict[str, Peer]:
+    """What else is widely used; MiniRocket where aeon is installed."""
+    found: dict[str, Peer] = {
+        f"{TREES} extra trees on every taxel": extra_trees,
+        f"{TREES} random trees on each taxel's mean, deviation, maximum": forest,
     }
-    if set(found) != set(CHOSEN):
-        cases["best path on all trials: " + ", ".join(found), SCALING] = (
-            columns(every, types, found),
-            found,
-        )
-    work = [(X, y, s, wanted) for (_, s), (X, wanted) in cases.items()]
-    plain = context.map("sets of features", grid_search, work)
-    rows: list[tuple[Any, ...]] = []
-    for ((name, scaling), (X, wanted)), loo in zip(cases.items(), plain, strict=True):
-        us = round(cost(wanted), 1)
-        rows.append(
-            (name, scaling, X.shape[1], "leave-one-out, best cell", *score(loo[task]), us, "")
-        )
-        if X.shape[1] <= 4 * X3.shape[1]:
-            inside = nested(context, X, scaling, wanted, "nested")
-            rows.append(
-                (name, scaling, X.shape[1], f"nested, {FOLDS} folds", *score(inside[task]), us, "")
-            )
-    folds = shuffled_folds(y[task], FOLDS)
-    told = context.map(
-        "searched inside", search_and_tell, [(every, y, task, fold, types) for fold in folds]
-    )
-    result = collect(y, folds, [answer for answer, _ in told])[task]
-    frames = round(float(np.mean([cost(chosen) for _, chosen in told])), 1)
-    how = f"nested, features searched in each of {FOLDS} folds"
-    rows.append((f"{STEPS} searched inside", SCALING, STEPS * FEW, how, *score(result), frames, ""))
-    return rows
+    if importlib.util.find_spec("aeon") is None:
+        return found
+    return {**found, "MiniRocket and ridge on every taxel": minirocket}
 
 
-def taxel_vectors(context: Context, samples: int = SAMPLES) -> NDArray[np.float64]:
-    """(n, samples * taxels) all taxels at uniform times from onset, held after the last frame."""
-    times = np.linspace(0.0, WINDOW_S, samples)
+def taxels(context: Context) -> NDArray[np.float64]:
+    """(n, times, taxels) counts at uniform times from onset, held after the last frame."""
+    wanted = np.linspace(0.0, WINDOW_S, TIMES)
     alive = context.dataset.layout.alive.reshape(-1)
-    rows: list[NDArray[np.float64]] = []
-    for trial, recording in zip(context.dataset.trials, context.recordings, strict=True):
-        t = recording.t - trial.onset_s
-        flat = recording.frames.reshape(len(t), -1)[:, alive].astype(np.float64)
-        after = np.clip(np.searchsorted(t, times, side="right"), 1, len(t) - 1)
-        step = t[after] - t[after - 1]
-        part = np.clip((times - t[after - 1]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
-        rows.append(((1 - part) * flat[after - 1] + part * flat[after]).reshape(-1))
+    rows = []
+    for trial in context.dataset.trials:
+        t = trial.recording.t - trial.onset_s
+        at = np.clip(np.searchsorted(t, wanted, side="right") - 1, 0, len(t) - 1)
+        rows.append(trial.recording.frames.reshape(len(t), -1)[at][:, alive].astype(np.float64))
     return np.stack(rows)
 
 
-def _trees(
-    X: NDArray[np.float64], y: NDArray[np.str_], test: NDArray[np.int64]
-) -> tuple[NDArray[np.str_], float]:
-    train = np.setdiff1d(np.arange(len(X)), test)
-    trees = ExtraTreesClassifier(TREES, random_state=0).fit(X[train], y[train])
-    began = time.perf_counter()
-    said = np.concatenate([trees.predict(X[i : i + 1]) for i in test[:2]])
-    each = (time.perf_counter() - began) / len(said)
-    return trees.predict(X[test]), each
+def vectors(series: Sequence[FeatureSeries | None], name: str) -> NDArray[np.float64]:
+    """(n, width) the vectors of a set; zeros where there was no contact."""
+    names = SETS[name].features
+    rows = [None if s is None else feature_vector(s, WINDOW_S, SAMPLES, names) for s in series]
+    width = next(len(row) for row in rows if row is not None)
+    return np.stack([np.zeros(width) if row is None else row for row in rows])
 
 
-def _rivals(context: Context, task: str) -> list[tuple[Any, ...]]:
-    """The same trials by all taxels: 1-NN on 50 components, and extra trees."""
-    y = context.labels[task]
-    X = taxel_vectors(context)
-    rows: list[tuple[Any, ...]] = []
-    centred = X - X.mean(axis=0)
-    values, left = np.linalg.eigh(centred @ centred.T)
-    Z = left[:, -50:] * np.sqrt(np.maximum(values[-50:], 0.0))
-    lengths = (Z * Z).sum(axis=1)
-    squares = lengths[:, None] + lengths - 2.0 * Z @ Z.T
-    np.fill_diagonal(squares, np.inf)
-    right = int((y[squares.argmin(axis=1)] == y).sum())
-    head = ("all taxels, PCA(50), 1-NN", "none", X.shape[1], "leave-one-out")
-    rows.append((*head, *score(Result(right, len(y), 50, 1)), "", ""))
-    folds = shuffled_folds(y, FOLDS)
-    coarse = X.reshape(len(X), SAMPLES, -1)[:, ::8].reshape(len(X), -1)
-    told = context.map("extra trees", _trees, [(coarse, y, fold) for fold in folds])
-    said = np.empty_like(y)
-    for fold, (labels, _) in zip(folds, told, strict=True):
-        said[fold] = labels
-    each = round(1e3 * float(np.median([seconds for _, seconds in told])), 1)
-    head = (f"all taxels, {TREES} extra trees", "none", coarse.shape[1], f"{FOLDS} folds")
-    rows.append((*head, *score(Result(int((said == y).sum()), len(y))), "", each))
-    return rows
+def _ours(
+    X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64], name: str, projection: str
+) -> dict[str, Result]:
+    grid = Grid(SCALING, projection)
+    table = evaluate(X, y, folds, [grid], features=SETS[name].features)
+    return {task: table.nested(task) for task in y}
+
+
+def _theirs(
+    X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64], peer: Peer
+) -> dict[str, Result]:
+    found = {}
+    for task, labels in y.items():
+        right = 0
+        for fold in range(int(folds.max()) + 1):
+            own = folds == fold
+            right += int((peer(X[~own], labels[~own], X[own]) == labels[own]).sum())
+        found[task] = Result(right, len(labels))
+    return found
+
+
+def section(context: Context) -> Section:
+    """Sets of features, discriminants and peers; what they cost; how many trials they need."""
+    y = context.labels
+    finest = max(sorted(y), key=lambda task: len(set(y[task])))
+    sets = list(dict.fromkeys(name for name, _ in OURS))
+    view = View(context.dataset.layout, names=expand(sets))
+    (series,) = context.follow_again("every feature", [view])
+    X = {name: vectors(series, name) for name in sets}
+    raw = taxels(context)
+    folds = {"trials": stratified_folds(y[finest])}
+    others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
+    if GROUP_TASK in y and others:
+        folds["objects"] = group_folds(y[GROUP_TASK])
+    cases: list[tuple[str, str, Callable[..., Any], tuple[Any, ...]]] = []
+    for how, fold in folds.items():
+        asked = y if how == "trials" else others
+        for name, projection in OURS:
+            words = f"`{name}` ({len(SETS[name].features)} features), {projection.upper()} + k-NN"
+            cases.append((words, how, _ours, (X[name], asked, fold, name, projection)))
+        for words, peer in peers().items():
+            cases.append((words, how, _theirs, (raw, asked, fold, peer)))
+    answers = context.map("sets and peers", _call, [(f, given) for _, _, f, given in cases])
+    results: dict[str, dict[str, dict[str, Result]]] = {}
+    for (words, how, _, _), found in zip(cases, answers, strict=True):
+        results.setdefault(words, {})[how] = found
+    prices = {
+        words: SETS[name].price_us for (words, *_), (name, _) in zip(cases, OURS, strict=False)
+    }
+    table = Table(
+        "beyond_sets",
+        "Nested accuracy: trials left out, and whole objects left out",
+        ("task", "accuracy %", "95 % interval", "objects not met %", "what decides", "us a frame"),
+        narrow=5,
+    )
+    for task in y:
+        for words, by in results.items():
+            low, high = by["trials"][task].interval
+            unseen = by.get("objects", {}).get(task)
+            table.rows.append(
+                (
+                    task,
+                    percent(by["trials"][task].accuracy),
+                    f"{100 * low:.0f} to {100 * high:.0f}",
+                    "" if unseen is None else percent(unseen.accuracy),
+                    words,
+                    prices.get(words, ""),
+                )
+            )
+    png = figures.bars(
+        [words.replace("`", "") for words in results],
+        {task: [by["trials"][task] for by in results.values()] for task in y},
+        title="Features and methods, trials left out",
+    )
+    text = [
+        "The paper's three features are not all that a skin tells. Named sets of features (see "
+        "`edge/touch/feature_sets/`) on principal components (PCA) or discriminants (LDA), beside "
+        "outside methods on every taxel, on the same folds. Every number of ours is nested: "
+        "shrinkage, components and k are chosen by the other folds alone; the outside methods take "
+        "their usual settings.",
+        _best(results, y),
+        "The price is what following a contact costs more than with the paper's features, in "
+        "microseconds a frame on the machine that `bench/README.md` names. `make export` chooses "
+        "among the sets by itself.",
+    ]
+    if len(peers()) < 3:
+        text.append("MiniRocket is left out, as aeon is not installed (`pip install aeon`).")
+    return Section(
+        "Beyond three features",
+        text,
+        [table, _learning(context, X, y, finest)],
+        [Figure("beyond", "Features and methods", png)],
+    )
+
+
+def _call(function: Callable[..., Any], given: tuple[Any, ...]) -> Any:
+    return function(*given)
+
+
+def _best(results: dict[str, dict[str, dict[str, Result]]], y: Labels) -> str:
+    parts = []
+    for task in y:
+        words, by = max(results.items(), key=lambda item: item[1]["trials"][task].accuracy)
+        parts.append(f"{task} {100 * by['trials'][task].accuracy:.1f} % by {words}")
+    return "Best: " + "; ".join(parts) + "."
+
+
+def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels, finest: str) -> Table:
+    """Accuracy against the number of trials: how many touches are worth recording."""
+    parts = stratified_folds(y[finest], len(SHARES))
+    cases, heads = [], []
+    for count in range(1, len(SHARES) + 1):
+        some = np.flatnonzero(parts < count)
+        labels = {task: one[some] for task, one in y.items() if len(set(one[some])) > 1}
+        if len(some) < 20 or not labels:
+            continue
+        for name, projection in CURVE:
+            folds = stratified_folds(y[finest][some])
+            heads.append((len(some), name, projection))
+            cases.append((_ours, (X[name][some], labels, folds, name, projection)))
+    table = Table(
+        "learning",
+        "More trials: nested accuracy among so many",
+        ("task", "trials", "accuracy %", "95 % interval", "what decides"),
+        narrow=5,
+    )
+    for (n, name, projection), found in zip(
+        heads, context.map("learning curve", _call, cases), strict=True
+    ):
+        for task, result in found.items():
+            low, high = result.interval
+            table.rows.append(
+                (
+                    task,
+                    n,
+                    percent(result.accuracy),
+                    f"{100 * low:.0f} to {100 * high:.0f}",
+                    f"`{name}`, {projection.upper()}",
+                )
+            )
+    table.rows.sort(key=lambda row: (row[0], row[4], row[1]))
+    return table

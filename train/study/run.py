@@ -16,7 +16,7 @@ from train.dataset import load_trials
 from train.report import html as report
 from train.report.tables import Section
 from train.simulate import scene as scenes
-from train.study import beyond, classify, honest, paper, resolution, robust
+from train.study import beyond, classify, findings, honest, paper, resolution, robust
 from train.study.context import Context
 
 SECTIONS: tuple[Callable[[Context], Section], ...] = (
@@ -28,8 +28,6 @@ SECTIONS: tuple[Callable[[Context], Section], ...] = (
     honest.section,
     beyond.section,
 )
-PAPER = 5
-"""Where the paper's numbers are shown: after all that they are set beside."""
 LONGEST_S = 2.0
 FEWEST = 20
 """Trials below which a grid of 20 components makes no sense."""
@@ -76,10 +74,11 @@ def study(
         # First, as it is what finds out whether the scene is that of the recordings.
         others = robust.section(context)
         sections = [part(context) for part in SECTIONS]
-    if source is not None:
-        sections.insert(PAPER, paper.section(context))
-    if others is not None:
-        sections.insert(PAPER + 2, others)
+    # After all that the paper's numbers are set beside.
+    compared = [] if source is None else [paper.section(context)]
+    own, theirs = sections[-2:], sections[:-2]
+    sections = [*own, *compared, *theirs, *([] if others is None else [others])]
+    sections.insert(0, findings.section(sections))
     took = time.perf_counter() - began
     layout = dataset.layout
     lead = [

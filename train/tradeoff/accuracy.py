@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.touch.features import FEATURES
 from train.evaluate import Grid, Labels, Result, evaluate, stratified_folds
 from train.pipeline import Choice
 from train.stopping import finest
@@ -25,13 +26,17 @@ def nested(
 ) -> dict[str, Result]:
     """Each task's nested accuracy, in ten folds; see `train.evaluate`.
 
+    More features than the paper's are projected on discriminants, else on principal components.
+
     Args:
         X: (n, p).
         y: {task: (n,) labels}.
         scaling: one of `train.projection.SCALINGS`.
         features: names of the types in X.
     """
-    grid = Grid(scaling, components=COMPONENTS, neighbours=tuple(range(1, NEIGHBOURS + 1)))
+    k = tuple(range(1, NEIGHBOURS + 1))
+    kind = "lda" if len(features) > len(FEATURES) else "pca"
+    grid = Grid(scaling, kind, components=COMPONENTS, neighbours=k)
     table = evaluate(X, y, stratified_folds(y[finest(y)]), [grid], features=features)
     return {task: table.nested(task) for task in y}
 

@@ -8,10 +8,16 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from edge.commands.summary import wilson
+from train.evaluate import Labels
 from train.report.figures import COLOURS, STYLE, png
 from train.tradeoff.accuracy import MeasuredPoint
 from train.tradeoff.early import StoppingComparison
+
+CLOSE = 0.06
+"""Shares whose names would cover each other."""
 
 
 def operating_points(
@@ -150,3 +156,107 @@ def _floor(axes: Any, slow: Sequence[tuple[str, float]], full_ms: float) -> None
     for row, start in zip(rows, starts.tolist(), strict=True):
         if start < full_ms:
             axes.text(start + 6, row, f"{start:.0f}", va="center", fontsize=6.5)
+
+
+def answer(
+    both: Mapping[str, StoppingComparison],
+    y: Labels,
+    wire_s: float,
+    arithmetic_s: float,
+    *,
+    phone: bool = False,
+) -> bytes:
+    """Accuracy against time, a panel a task; below, where the time goes, on a logarithmic axis.
+
+    Args:
+        both: held-out decisions of each task.
+        y: its labels.
+        wire_s: of the last frame.
+        arithmetic_s: of a decision.
+        phone: panels stand below each other.
+    """
+    m = len(both)
+    with mpl.rc_context({**STYLE, "font.size": 10.0}):
+        if phone:
+            figure = Figure(figsize=(4.2, 2.7 * m + 2.3), layout="constrained")
+            axes = figure.subplots(m + 1, 1, height_ratios=[2.7] * m + [1.7])
+            panels, strip = list(axes[:-1]), axes[-1]
+        else:
+            figure = Figure(figsize=(3.7 * m + 0.4, 6.0), layout="constrained")
+            grid = figure.add_gridspec(2, m, height_ratios=(3.9, 1.5))
+            panels = [figure.add_subplot(grid[0, i]) for i in range(m)]
+            strip = figure.add_subplot(grid[1, :])
+        for i, (axis, (task, found)) in enumerate(zip(panels, both.items(), strict=True)):
+            _accuracy(axis, task, found, y[task], wire_s + arithmetic_s)
+            if i == 0 or phone:
+                axis.set_ylabel("decisions that are right, %")
+            if i == 0:
+                axis.legend(fontsize=8, loc="lower right", framealpha=0.9)
+        _split(strip, next(iter(both.values())).decision_points_s, wire_s, arithmetic_s)
+        return png(figure)
+
+
+def _accuracy(
+    axis: Any, task: str, found: StoppingComparison, labels: NDArray[np.str_], after_s: float
+) -> None:
+    _, counts = np.unique(labels, return_counts=True)
+    n = found.trials
+    chance = {"guessing": 1 / len(counts), "most frequent label": float(counts.max() / n)}
+    for share in chance.values():
+        axis.axhline(100 * share, color="0.55", lw=1, ls="--")
+    if max(chance.values()) - min(chance.values()) < CLOSE:
+        chance = {" or ".join(chance): max(chance.values())}
+    for name, share in chance.items():
+        axis.text(
+            0.02, 100 * share + 1, name, fontsize=8, color="0.35",
+            transform=axis.get_yaxis_transform(),
+        )  # fmt: skip
+    curve = sorted((s + after_s, 1.0 - w) for t, s, w in found.when_sure())
+    fixed = [
+        (s + after_s, float(a))
+        for s, a in zip(found.decision_points_s, 1 - found.fixed, strict=True)
+    ]
+    for rows, colour, label in (
+        (fixed, COLOURS[0], "after a fixed time"),
+        (curve, COLOURS[1], "when sure (mean time)"),
+    ):
+        x = [s for s, _ in rows]
+        low, high = zip(*(wilson(round(a * n), n) for _, a in rows), strict=True)
+        axis.fill_between(
+            x, [100 * a for a in low], [100 * a for a in high], color=colour, alpha=0.13, lw=0
+        )
+        axis.plot(x, [100 * a for _, a in rows], "-", lw=1.8, color=colour, label=label)
+    for window in (0.4, 1.2):
+        if window in found.decision_points_s:
+            at = found.decision_points_s.index(window)
+            share = 100 * float(1 - found.fixed[at])
+            axis.plot([window + after_s], [share], "o", ms=5, color=COLOURS[0])
+            axis.annotate(
+                f"{share:.0f} %", (window + after_s, share), xytext=(-3, 7),
+                textcoords="offset points", fontsize=9, ha="right", color=COLOURS[0],
+            )  # fmt: skip
+    axis.set_title(f"{task} ({len(counts)} labels)")
+    axis.set_xlim(0, found.decision_points_s[-1] + 0.08)
+    axis.set_ylim(0, 102)
+    axis.set_xlabel("seconds from first contact")
+
+
+def _split(axis: Any, windows: Sequence[float], wire_s: float, arithmetic_s: float) -> None:
+    """The three parts of the time of a few windows; each division is ten times the one before."""
+    shown = [w for w in (0.4, 0.8, 1.2) if w in windows]
+    names = [*(f"waiting {w:g} s" for w in shown), "wire", "arithmetic"]
+    values = [*(1e3 * w for w in shown), 1e3 * wire_s, 1e3 * arithmetic_s]
+    rows = np.arange(len(names))
+    colours = [COLOURS[0]] * len(shown) + [COLOURS[1], COLOURS[2]]
+    axis.barh(rows, values, color=colours, height=0.62, left=0.0)
+    axis.set_xscale("log")
+    axis.set_xlim(0.05, 6000)
+    axis.set_yticks(rows, names, fontsize=9)
+    axis.invert_yaxis()
+    axis.grid(visible=False, axis="y")
+    axis.minorticks_off()
+    axis.set_xticks([0.1, 1, 10, 100, 1000], ["0.1", "1", "10", "100", "1000"])
+    axis.set_xlabel("where the time goes, ms (each step is tenfold)")
+    for row, value in zip(rows, values, strict=True):
+        text = f"{value:.0f}" if value >= 100 else f"{value:.2g}"
+        axis.text(value * 1.15, row, f"{text} ms", va="center", fontsize=9)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from edge.config import json_file
 from edge.errors import InputError
+from edge.touch.features import FEATURES
 from train.crossval import MAX_K, accuracies, neighbours
 from train.dataset import DataSet
 from train.evaluate import Result
@@ -91,7 +92,7 @@ def read(path: str | os.PathLike[str], digest: str) -> Prices:
 
 def section(prices: Prices, dataset: DataSet, task: str) -> Section:
     """Microseconds of a decision beside the accuracy that they buy."""
-    X, y = dataset.features(), dataset.labels(task)
+    X, y = dataset.features(names=FEATURES), dataset.labels(task)
     n = len(X)
     grid = accuracies(_near(X), y)
     rows = []

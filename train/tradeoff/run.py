@@ -15,16 +15,18 @@ from tqdm import tqdm
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.touch.contact import FeatureSeries
+from edge.touch.feature_sets import SETS, expand
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
 from edge.touch.layout import SkinLayout
 from train.dataset import DataSet, load_trials
-from train.evaluate import Grid
+from train.evaluate import Grid, Labels
+from train.pipeline import Choice
 from train.report.html import write
 from train.simulate import scene as scenes
 from train.stopping import finest
 from train.study import skins
+from train.tradeoff import answer, arithmetic, early, prices, sections
 from train.tradeoff import board as boards
-from train.tradeoff import early, prices, sections
 from train.tradeoff.accuracy import Chooser, MeasuredPoint, nested, pareto_front
 from train.tradeoff.wires import Wire, wires
 
@@ -34,6 +36,10 @@ FEWER = (("max_force",), ("max_force", "contact_area"))
 PAPER = ("none", 1.2)
 """The paper's operating point: no scaling, 1.2 s, its three features, all taxels (IV-A)."""
 FEWEST = 40
+CONTACT = SETS["contact"].features
+NAMES = expand(["paper", "contact"])
+GRIDS = (Grid("IV", features=FEATURES), Grid("IV", "lda", features=CONTACT))
+"""Candidates for every task's decision: the paper's way, and the discriminants of `contact`."""
 Case = tuple[str, int, tuple[str, ...], str, float, int]
 """Skin's name, taxels, features, scaling, window, and n where only every n-th frame arrives."""
 
@@ -64,7 +70,7 @@ def tradeoff(
     """
     board = boards.read(board_path)
     scene = None if scene_path is None else scenes.load(scene_path)
-    dataset = load_trials(data, horizon_s=WINDOWS[-1], progress=True)
+    dataset = load_trials(data, horizon_s=WINDOWS[-1], features=NAMES, progress=True)
     boards.check(board, board_path, dataset.digest)
     sizes = None if prices_path is None else prices.read(prices_path, dataset.digest)
     if len(dataset.trials) < FEWEST:
@@ -73,25 +79,28 @@ def tradeoff(
         main = "category" if "category" in dataset.tasks else dataset.tasks[0]
     if main not in dataset.tasks:
         raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    order = sorted(y, key=lambda task: (task != main, task))
+    both, choice, strange = _early(dataset, {task: y[task] for task in order}, jobs)
     points = measured(dataset, board, jobs)
     best = {task: pareto_front([p for p in points if p.task == task]) for task in dataset.tasks}
-    both, most, strange = _early(dataset, jobs)
     breakaways = {} if scene is None else early.breakaway_times(scene)
+    fastest = next(point for point in points if is_paper(point))
     parts = [
-        sections.operating_points(points, best, main, board, breakaways, is_paper),
+        answer.section(both, y, fastest.wire_s, board, len(NAMES)),
+        answer.reasons(fastest.wire_s, board, len(NAMES), breakaways),
         sections.stopping(both, breakaways, main),
-        *([sections.unknown(most, strange)] if strange else []),
+        sections.operating_points(points, best, main, board, breakaways, is_paper),
+        arithmetic.section(dataset, y[main], main, choice[main], board, sizes),
+        *([sections.unknown(finest(y), strange)] if strange else []),
         *([] if sizes is None else [prices.section(sizes, dataset, main)]),
         sections.arithmetic(board),
+        answer.glossary(),
     ]
     lead = [
-        f"{len(dataset.trials)} trials, {len(points)} points. Time runs from onset to "
-        "decision: waiting for the window, the wire, arithmetic. Accuracies are nested: the "
-        "trial told took no part in scaling, components, neighbours, or the choice of their "
-        "numbers; intervals are Wilson's, 95 %.",
-        f"Arithmetic is that of {board.name}, measured by edge-classify bench with the model "
-        f"{board.model[:12]}. Wire times are counted from the drivers' own transactions over a "
-        "counting bus.",
+        "How long must a robot wait before it knows what its arm has touched, and what does each "
+        f"answer cost? Measured on {len(dataset.trials)} contacts"
+        + ("." if scene is None else f" that were simulated ({scene.name})."),
     ]
     report = write(out, "What accuracy costs in time", lead, parts)
     with write_whole(out / "front.json") as file:
@@ -121,7 +130,7 @@ def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[MeasuredP
         taxels = each.rows * each.cols
         sets: list[tuple[tuple[str, ...], str]] = [(FEATURES, "IV")]
         if not name:
-            sets += [(FEATURES, "none"), *((few, "IV") for few in FEWER)]
+            sets += [(CONTACT, "IV"), (FEATURES, "none"), *((few, "IV") for few in FEWER)]
         for every in sorted({wire.every(rate) for wire in wired[name]}):
             for features, scaling in sets if every == 1 else sets[:1]:
                 cases += [(name, taxels, features, scaling, w, every) for w in WINDOWS]
@@ -169,17 +178,15 @@ def _vectors(series: Sequence[FeatureSeries | None], case: Case) -> NDArray[np.f
 
 
 def _early(
-    dataset: DataSet, jobs: int
-) -> tuple[dict[str, early.StoppingComparison], str, list[early.Novelty]]:
-    """Early stopping of every task; the finest task, and things left out whole in it."""
-    X = np.stack([dataset.features(window) for window in DECISION_POINTS_S])
-    y = {task: dataset.labels(task) for task in dataset.tasks}
-    grids = (Grid("IV"), Grid("IV", "lda"))
-    choose = Chooser(X[-1], y, grids, FEATURES)
-    found = early.compare_stopping(X, y, DECISION_POINTS_S, FEATURES, choose, jobs=jobs)
+    dataset: DataSet, y: Labels, jobs: int
+) -> tuple[dict[str, early.StoppingComparison], dict[str, Choice], list[early.Novelty]]:
+    """Early stopping of every task, what all trials choose, and things left out whole."""
+    X = np.stack([dataset.features(window, SAMPLES, NAMES) for window in DECISION_POINTS_S])
+    choose = Chooser(X[-1], y, GRIDS, NAMES)
+    found = early.compare_stopping(X, y, DECISION_POINTS_S, NAMES, choose, jobs=jobs)
+    choices = choose(np.arange(X.shape[1]))
     most = finest(y)
-    choice = choose(np.arange(X.shape[1]))[most]
-    return found, most, early.novelty(X[-1], y[most], choice, FEATURES)
+    return found, choices, early.novelty(X[-1], y[most], choices[most], NAMES)
 
 
 def is_paper(point: MeasuredPoint) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from edge.touch.features import FEATURES
 from train.report.tables import Figure, Section, Table
 from train.tradeoff import early, plots
 from train.tradeoff.accuracy import MeasuredPoint
@@ -34,16 +35,21 @@ def operating_points(
         [p for p in points if p.task == main], best[main], main, is_paper, breakaways, board.name
     )
     columns = (
-        "task", "taxels", "wire", "features", "scaling", "components", "k",
-        "window ms", "wire ms", "arithmetic ms", "time ms",
-        "accuracy %", "low %", "high %", "front", "paper's point",
+        "task", "time ms", "accuracy %", "95 % interval", "taxels", "wire", "features", "scaling",
+        "components", "k", "window ms", "wire ms", "arithmetic ms", "low %", "high %", "front",
+        "paper's point",
     )  # fmt: skip
     every = Table("points", "Every point", columns, [])
-    few = Table("front", "The best settings, and the paper's point", columns, [])
+    few = Table(
+        "front", "The best settings, and the paper's", (*columns[:8], columns[-1]), narrow=5
+    )
     for point in sorted(points, key=lambda p: (p.task != main, p.task, p.seconds)):
         low, high = point.result.interval
         row = (
             point.task,
+            round(1e3 * point.seconds, 1),
+            round(100 * point.result.accuracy, 2),
+            f"{100 * low:.0f} to {100 * high:.0f}",
             point.taxels,
             point.wire,
             " ".join(point.features),
@@ -53,8 +59,6 @@ def operating_points(
             round(1e3 * point.window_s, 1),
             round(1e3 * point.wire_s, 2),
             round(1e3 * point.arithmetic_s, 3),
-            round(1e3 * point.seconds, 1),
-            round(100 * point.result.accuracy, 2),
             round(100 * low, 1),
             round(100 * high, 1),
             "yes" if point in best[point.task] else "",
@@ -62,20 +66,45 @@ def operating_points(
         )
         every.rows.append(row)
         if row[-1] or row[-2]:
-            few.rows.append(row)
+            few.rows.append((*row[:8], "yes" if is_paper(point) else ""))
+    oddities = [text for task in best if (text := _one_taxel(task, points))]
     return Section(
-        "Every setting, and the best settings",
+        "Every setting: skins, wires, features",
         [
-            "A best setting is one that no other matches in both speed and accuracy. The best "
-            "of many settings flatters: where intervals overlap, the cheaper one may be as good.",
-            "A pooled skin's larger taxels carry the sum of their parts' forces; a wire that "
-            "carries fewer frames a second than were recorded gets every second, third, ... of "
-            "them, and its accuracy is that of those frames.",
-            f"Arithmetic on {board.name} takes at most {100 * arithmetic:.2g} % of a point's time, "
-            f"the wire at most {100 * wire:.2g} %: what is paid for accuracy is waiting.",
+            "The same contacts, seen through other hardware. A larger taxel carries the sum of its "
+            "parts' forces; a slower wire brings every second, third, ... frame. Listed first are "
+            "the settings that no other matches in both speed and accuracy. The best of many "
+            "settings flatters: where intervals overlap, the cheaper one may be as good.",
+            f"Arithmetic on {board.name} takes at most {100 * arithmetic:.2g} % of a setting's "
+            f"time, the wire at most {100 * wire:.2g} %.",
+            *oddities,
         ],
         [few, every],
-        [Figure("tradeoff", f"Accuracy against time to decision: {main}", picture)],
+        [Figure("settings", f"Accuracy against time, every setting: {main}", picture)],
+    )
+
+
+def _one_taxel(task: str, points: Sequence[MeasuredPoint]) -> str:
+    """Why a single taxel does better than the whole skin, where it does."""
+
+    def top(some: Sequence[MeasuredPoint]) -> MeasuredPoint:
+        return max(some, key=lambda p: p.result.accuracy)
+
+    plain = [p for p in points if p.task == task and p.features == FEATURES]
+    single = [p for p in plain if p.taxels == 1]
+    whole = [p for p in plain if p.whole]
+    if not single or not whole or single[0].whole:
+        return ""
+    one, all_taxels = top(single), top(whole)
+    if one.result.accuracy <= all_taxels.result.accuracy:
+        return ""
+    return (
+        f"{task}: a single taxel reaches {100 * one.result.accuracy:.1f} %, all "
+        f"{all_taxels.taxels} with the same three features {100 * all_taxels.result.accuracy:.1f} "
+        "%. A single taxel reads the total force, and its motion is that of the arm: that is what "
+        "tells whether a thing gives way. The largest region of a finer skin leaves out what other "
+        "regions carry, and its largest taxel depends on how the thing happens to lie on the grid. "
+        "Features of the total force (`contact`) bring this to the whole skin."
     )
 
 

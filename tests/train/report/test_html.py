@@ -3,8 +3,18 @@
 import csv
 import io
 
+from matplotlib.figure import Figure as MatplotlibFigure
+
+from tests import browser
 from train.report.html import page, table_csv, write
 from train.report.tables import Figure, Section, Table
+
+WIDE = Table(
+    "wide",
+    "Many columns and rows",
+    tuple(f"a longer heading {i}" for i in range(20)),
+    [tuple(f"cell {i} with several words" for i in range(20))] * 40,
+)
 
 HOSTILE = '<script>alert("1 & 2")</script>'
 
@@ -42,3 +52,34 @@ def test_the_page_holds_its_pictures(tmp_path):
     text = report.read_text()
     assert 'src="data:image/png;base64,iVBORw=="' in text
     assert "http" not in text
+
+
+def test_a_long_table_is_folded_and_a_wide_one_is_cut_to_what_fits():
+    text = page("Title", [], [Section("One", tables=[WIDE])])
+    assert "<details><summary>40 rows</summary>" in text
+    assert "a longer heading 9" in text
+    assert "a longer heading 10" not in text
+    assert table_csv(WIDE)["wide.csv"].startswith(",".join(WIDE.columns))
+
+
+def test_words_are_explained_and_code_is_set_as_code():
+    text = page("Title", ["take `make <x>`"], [Section("Words", terms={"k": "a & b"})])
+    assert "<code>make &lt;x&gt;</code>" in text
+    assert "<dt>k</dt><dd>a &amp; b</dd>" in text
+
+
+def test_in_a_browser_nothing_overflows_and_no_link_leads_nowhere(tmp_path):
+    stream = io.BytesIO()
+    MatplotlibFigure(figsize=(16, 2)).savefig(stream, format="png")
+    pictures = [Figure("plot", "A plot", stream.getvalue(), stream.getvalue())]
+    sections = [Section("One", ["x" * 300], [WIDE, table()], pictures)]
+    assert browser.faults(write(tmp_path, "Title", [], sections)) == []
+
+
+def test_the_browser_notices_what_is_wrong(tmp_path):
+    (tmp_path / "report.html").write_text(
+        "<body><div style='width: 3000px'>wide</div><img alt='gone' src='gone.png'>"
+        "<a href='gone.csv'>gone</a><a href='#gone'>gone</a></body>"
+    )
+    found = browser.faults(tmp_path / "report.html")
+    assert {fault.split(": ")[-1] for fault in found} == {"wide", "gone", "gone.csv", "#gone"}

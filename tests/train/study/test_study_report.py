@@ -7,15 +7,14 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from edge.recording import save
+from tests import browser
 from train.__main__ import main
 from train.report.html import page, table_csv
 from train.report.tables import Figure, Section, Table
 from train.study import beyond
-from train.study.beyond import CHOSEN, columns, search
 from train.study.paper import entries, section
 
 
@@ -69,7 +68,7 @@ def test_the_page_needs_no_other_file_and_escapes_what_it_shows():
     text = page("Title", ["lead"], [section])
     links = Links()
     links.feed(text)
-    assert (links.outside, links.open) == ([], [])
+    assert (links.outside, links.open) == (["t.csv"], [])
     assert "a &amp; b" in text
     assert "One &amp; &lt;all&gt;" in text
     assert list(csv.reader(table_csv(table)["t.csv"].splitlines()))[2] == ["c,d", "2.5"]
@@ -86,17 +85,6 @@ def test_what_a_clock_measured_is_in_a_file_of_its_own():
     }
 
 
-def test_a_search_finds_the_feature_that_tells():
-    rng = np.random.default_rng(0)
-    y = np.repeat(["a", "b", "c"], 12)
-    X = rng.normal(size=(36, 4, 5))
-    X[:, 2] += np.repeat([0.0, 4.0, 8.0], 12)[:, None]
-    types = ("max_force", "regions", "skin_force", "left_width")
-    assert search(X.reshape(36, -1), y, types, 1) == ["skin_force"]
-    part = columns(X.reshape(36, -1), types, ("skin_force", "regions"))
-    assert (part.reshape(36, 2, 5) == X[:, [2, 1]]).all()
-
-
 @pytest.fixture(scope="module")
 def studied(make_touch, tmp_path_factory):
     folder = tmp_path_factory.mktemp("touches")
@@ -107,7 +95,6 @@ def studied(make_touch, tmp_path_factory):
     out = tmp_path_factory.mktemp("study")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(beyond, "TREES", 10)
-        patch.setattr(beyond, "TIMED", 1)
         assert main(["study", "--data", str(folder), "--out", str(out), "--jobs", "1"]) == 0
     return out
 
@@ -116,8 +103,7 @@ def test_every_number_of_the_report_is_in_a_csv(studied):
     text = (studied / "report.html").read_text()
     links = Links()
     links.feed(text)
-    assert links.outside == []
-    named = set(re.findall(r"<small>(\w+\.csv)</small>", text))
+    named = set(links.outside)
     assert named == {path.name for path in studied.glob("*.csv")}
     assert len(list(studied.glob("*.png"))) == text.count("data:image/png")
     for name in ("window", "scaling", "features", "resolution", "honest", "beyond_sets"):
@@ -137,16 +123,27 @@ def test_equal_scalings_are_equal(studied):
         assert seen["none", task] == seen["III", task]
 
 
-def test_easy_touches_are_told_and_the_sets_have_their_cost(studied):
+def test_easy_touches_are_told_and_the_findings_come_first(studied):
     plain = {r["task"]: float(r["accuracy %"]) for r in rows(studied / "classification.csv")}
     assert plain["category"] == 100.0
+    text = (studied / "report.html").read_text()
+    assert re.findall(r'<h2 id="s0">([^<]+)', text) == ["Findings"]
+    found = {r["task"]: r for r in rows(studied / "findings.csv")}
+    assert set(found) == {"category", "object"}
+    assert float(found["category"]["best found %"]) == 100.0
+
+
+def test_sets_and_peers_are_compared_on_the_same_trials(studied):
     sets = rows(studied / "beyond_sets.csv")
-    six = [r for r in sets if r["features"] == "ready-made six"]
-    assert len(six) == 2
-    assert all(r["columns"] == str(20 * len(CHOSEN)) for r in six)
-    timed = rows(studied / "beyond_sets_timings.csv")
-    assert [r["features"] for r in timed] == [r["features"] for r in sets]
-    assert all(float(r["us a frame"]) > 0 for r in timed if r["features"] == "ready-made six")
+    names = {r["what decides"] for r in sets if r["task"] == "category"}
+    assert len(names) >= len(beyond.OURS) + 2
+    assert all(r["us a frame"] for r in sets if r["what decides"].startswith("`"))
+    trials = [int(r["trials"]) for r in rows(studied / "learning.csv") if r["task"] == "category"]
+    assert max(trials) == 24
+
+
+def test_in_a_browser_nothing_overflows_or_is_missing(studied):
+    assert browser.faults(studied / "report.html") == []
 
 
 @pytest.mark.parametrize(

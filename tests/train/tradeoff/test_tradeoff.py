@@ -13,6 +13,7 @@ from edge.skin import file as skinfile
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export
+from tests import browser
 from train.__main__ import main as train
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.pipeline import Choice
@@ -337,7 +338,8 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
     assert "62 MB of memory, 812 ms from starting Python" in text
     again = tradeoff([str(tmp_path / "data")], tmp_path / "2", str(path), scene_path=str(SCENE))
     assert again.read_bytes() == report.read_bytes()
-    for name in ("tradeoff.png", "early_category.png", "early_object.png"):
+    assert not browser.available() or browser.faults(report) == []
+    for name in ("tradeoff.png", "settings.png", "early_category.png", "early_object.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader((out / "points.csv").read_text().splitlines()))
     for cells in rows:

@@ -1,0 +1,92 @@
+"""A report in a real browser: what overflows, images that are missing, links that lead nowhere.
+
+Needs Chromium with its driver (Debian: `apt install chromium chromium-driver`) and selenium, the
+extra `browser`; skips with a reason where they are absent.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+WIDTHS = (1200, 400)
+WIDER_THAN_THE_PAGE = """
+const width = document.documentElement.clientWidth;
+return [...document.querySelectorAll('body *')].filter(one => {
+  const box = one.getBoundingClientRect();
+  return box.width > 0 && box.right > width + 1;
+}).filter((one, i, all) => !all.includes(one.parentElement))
+  .map(one => one.tagName + ': ' + one.textContent.slice(0, 60));
+"""
+NOT_SHOWN = """
+return [...document.images].filter(one => !one.complete || one.naturalWidth === 0)
+  .map(one => one.alt);
+"""
+LINKS = "return [...document.links].map(one => one.getAttribute('href'));"
+
+
+def available() -> bool:
+    """Whether there is a browser to look with."""
+    programs = all(map(shutil.which, ("chromium", "chromedriver")))
+    return programs and importlib.util.find_spec("selenium") is not None
+
+
+@contextmanager
+def chromium(width: int, *, dark: bool = False) -> Iterator[Any]:
+    """A headless browser with a window of that width."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="needs the extra `browser`")
+    program, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if program is None or driver is None:
+        pytest.skip("needs Chromium and chromedriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = program
+    for argument in ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--disable-gpu"):
+        options.add_argument(argument)
+    if dark:
+        options.add_argument("--force-dark-mode")
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    try:
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        yield browser
+    finally:
+        browser.quit()
+
+
+def faults(report: Path) -> list[str]:
+    """What is wrong with a report, at each of `WIDTHS`."""
+    found = []
+    for width in WIDTHS:
+        with chromium(width) as browser:
+            browser.get(report.resolve().as_uri())
+            browser.execute_script(
+                "document.querySelectorAll('details').forEach(one => one.open = true)"
+            )
+            wide = browser.execute_script(WIDER_THAN_THE_PAGE)
+            found += [f"{width} px: wider than the page: {one}" for one in wide]
+            found += [f"no picture: {one}" for one in browser.execute_script(NOT_SHOWN)]
+            for link in browser.execute_script(LINKS):
+                if link.startswith("#"):
+                    there = bool(browser.find_elements("id", link[1:]))
+                else:
+                    there = (report.parent / link).is_file()
+                found += [] if there else [f"leads nowhere: {link}"]
+    return found
+
+
+def shoot(report: Path, out: Path, width: int, *, dark: bool = False) -> None:
+    """The whole page as a PNG."""
+    with chromium(width, dark=dark) as browser:
+        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
+        browser.get(report.resolve().as_uri())
+        height = browser.execute_script("return document.documentElement.scrollHeight")
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        browser.save_screenshot(str(out))

@@ -1,0 +1,142 @@
+"""What cheaper arithmetic would save in time, and what it would cost in accuracy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.touch.feature_sets import SETS, expand
+from edge.touch.features import SAMPLES, WINDOW_S
+from train.dataset import DataSet
+from train.evaluate import stratified_folds
+from train.pipeline import Choice, ContactClassifier, columns_of
+from train.report.tables import Section, Table
+from train.tradeoff.board import Board
+from train.tradeoff.prices import Prices
+
+NAMES = expand(["paper", "contact"])
+LEVELS = 255
+
+
+def rounded(X: NDArray[np.float64], widths: list[NDArray[np.int64]]) -> NDArray[np.float64]:
+    """X with each feature type in `LEVELS` equal steps of its range: what int8 would keep."""
+    out = X.copy()
+    for columns in widths:
+        part = X[:, columns]
+        low, high = part.min(), part.max()
+        step = (high - low) / LEVELS or 1.0
+        out[:, columns] = low + np.rint((part - low) / step) * step
+    return out
+
+
+def accuracy(
+    X: NDArray[np.float64], y: NDArray[np.str_], choice: Choice, *, plain: bool = False
+) -> float:
+    """In ten folds, of a choice made once: the changes are compared, not the choice.
+
+    Args:
+        plain: project by weights that are not on the exact grid, in float32.
+    """
+    folds = stratified_folds(y)
+    right = 0
+    for fold in range(int(folds.max()) + 1):
+        own = folds == fold
+        model = ContactClassifier({"task": choice}, NAMES).fit(X[~own], {"task": y[~own]})
+        if plain:
+            for projection in model.projections_.values():
+                projection.weights_ = projection.weights_.astype(np.float32).astype(np.float64)
+            for space, rows in model.rows_.items():
+                model.rows_[space] = rows.astype(np.float32).astype(np.float64)
+        right += int((model.predict(X[own])["task"] == y[own]).sum())
+    return right / len(y)
+
+
+def section(
+    dataset: DataSet,
+    y: NDArray[np.str_],
+    task: str,
+    choice: Choice,
+    board: Board,
+    sizes: Prices | None,
+) -> Section:
+    """One row a change: what it saves, and what it costs.
+
+    Args:
+        dataset: measured for `NAMES`.
+        y: labels of the task.
+        task: its name.
+        choice: of all trials.
+        board: whose figures they are.
+        sizes: of `python -m export.prices`, where they were measured.
+    """
+    X = dataset.features(WINDOW_S, SAMPLES, NAMES)
+    types = [columns_of((name,), NAMES, X.shape[1]) for name in NAMES]
+    base = accuracy(X, y, choice)
+    stages = {name: median for name, (median, _) in board.stages_us.items()}
+    whole = sum(stages[name] for name in ("track", "features", "decision"))
+    decision = stages["decision"]
+    table = Table(
+        "arithmetic",
+        f"Cheaper arithmetic, {task}",
+        ("change", "saves, us of a decision", "accuracy %", "points", "how the time was had"),
+        [("none", 0.0, round(100 * base, 1), 0.0, f"{whole:.0f} us in all")],
+        timed=("saves, us of a decision", "how the time was had"),
+        narrow=4,
+    )
+
+    def add(change: str, saves_us: float, reached: float, how: str) -> None:
+        points = round(100 * (reached - base), 1)
+        table.rows.append((change, round(saves_us, 1), round(100 * reached, 1), points, how))
+
+    usual = None
+    if sizes is not None:
+        usual = next((one for one in sizes.decisions if "skl2onnx" in one.operators), None)
+        ours = next(
+            (
+                one
+                for one in sizes.decisions
+                if usual
+                and "ours" in one.operators
+                and (one.rows, one.components, one.k) == (usual.rows, usual.components, usual.k)
+            ),
+            None,
+        )
+        if usual is not None and ours is not None:
+            add(
+                "float32 and no exactness",
+                ours.us - usual.us,
+                accuracy(X.astype(np.float32).astype(np.float64), y, choice, plain=True),
+                f"skl2onnx's own graph takes {usual.us:.0f} us, ours {ours.us:.0f} us",
+            )
+    if usual is None:
+        reached = accuracy(X.astype(np.float32).astype(np.float64), y, choice, plain=True)
+        add("float32 and no exactness", 0.5 * decision, reached, "at most half of the decision")
+    add("int8 features", 0.9 * decision, accuracy(rounded(X, types), y, choice), "at most 90 %")
+    few = max(choice.components // 2, 1)
+    fewer = Choice(**{**vars(choice), "components": few})
+    how = "at most that share of the decision"
+    add(
+        f"{few} coordinates in place of {choice.components}",
+        decision * (1 - few / choice.components),
+        accuracy(X, y, fewer),
+        how,
+    )
+    paper = Choice("IV", 5, min(3, choice.k + 2), features=SETS["paper"].features)
+    add(
+        "the paper's three features alone",
+        stages["features"] * (1 - 3 / len(NAMES)),
+        accuracy(X, y, paper),
+        "their share of the features",
+    )
+    return Section(
+        "Time by arithmetic",
+        [
+            "The other way to buy time is cheaper arithmetic. All of it together takes "
+            f"{whole:.0f} us on {board.name}, {100 * whole / 1e6 / WINDOW_S:.2g} % of a window of "
+            f"{WINDOW_S:g} s: even for nothing, it would bring the answer forward by less than a "
+            "tenth of a frame. Each row changes one thing; where the change was not built, the "
+            "saving is the most that it could be. Fewer taxels save time on the wire; they stand "
+            "among the settings above.",
+        ],
+        [table],
+    )
