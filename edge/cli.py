@@ -9,6 +9,8 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
+from functools import partial
 from importlib import import_module
 
 from edge import __version__
@@ -22,8 +24,10 @@ COMMANDS = (
     "run",
     "view",
     "replay",
+    "info",
     "verify",
     "bench",
+    "fake",
     "demo",
 )
 """Modules of `edge.commands`, in the order of the help. Each has `add_parser(subparsers)`, which
@@ -37,12 +41,23 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     """
     top = argparse.ArgumentParser(
         prog="edge-classify",
+        formatter_class=partial(argparse.HelpFormatter, max_help_position=16),
         description="Tells what a robot touched from what its skin felt.",
+        epilog="`edge-classify COMMAND --help` explains a command. At a terminal, commands print "
+        "text; where stdout is piped, one JSON object per line.",
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in wanted:
         import_module(f"edge.commands.{name}").add_parser(commands)
+    for command in commands.choices.values():
+        command.add_argument(
+            "--json", action="store_true", help="print JSON lines, as if stdout were no terminal"
+        )
+        command.add_argument("-v", "--verbose", action="store_true", help="say more on stderr")
+        command.add_argument(
+            "-q", "--quiet", action="store_true", help="say nothing on stderr but errors"
+        )
     return top
 
 
@@ -62,22 +77,33 @@ def complete(top: argparse.ArgumentParser) -> None:
 
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and run; an expected error becomes one sentence on stderr and exit status 2."""
+    complete(top)
     arguments = top.parse_args(argv)
-    with messages(top.prog):
+    level = logging.INFO
+    if getattr(arguments, "verbose", False):
+        level = logging.DEBUG
+    elif getattr(arguments, "quiet", False):
+        level = logging.ERROR
+    with messages(top.prog, level):
         return _run(top, arguments)
 
 
 @contextmanager
-def messages(prog: str) -> Iterator[None]:
-    """Within the block, log messages go to stderr, one line each."""
+def messages(prog: str, level: int = logging.INFO) -> Iterator[None]:
+    """Within the block, log messages of this level and above go to stderr, one line each."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter(f"{prog}: %(message)s"))
-    root = logging.getLogger()
-    root.addHandler(handler)
+    loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.setLevel(level)
     try:
         yield
     finally:
-        root.removeHandler(handler)
+        for logger, was in zip(loggers, before, strict=True):
+            logger.removeHandler(handler)
+            logger.setLevel(was)
 
 
 def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
@@ -115,7 +141,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns 0 if all is well, 1 if a check failed, 2 for bad usage or input."""
     words = list(sys.argv[1:] if argv is None else argv)
     wanted = [word for word in words[:1] if word in COMMANDS]
-    return dispatch(parser(wanted or COMMANDS), words)
+    top = parser(wanted or COMMANDS)
+    if not words and "_ARGCOMPLETE" not in os.environ:
+        top.print_help()
+        return 2
+    if not wanted and words and not words[0].startswith("-"):
+        near = get_close_matches(words[0], COMMANDS, 1, 0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"the commands are {', '.join(COMMANDS)}"
+        print(f"{top.prog}: there is no command {words[0]!r}; {hint}", file=sys.stderr)
+        return 2
+    return dispatch(top, words)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ class Onset:
 
     def to_dict(self) -> dict[str, Any]:
         """As a line of JSON says it."""
-        return {"event": "onset", **_which(self.contact), "onset_s": self.onset_s}
+        return {"event": "onset", **_which(self.contact), "onset_s": round(self.onset_s, 6)}
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Decided:
             "event": "decision",
             **_which(self.contact),
             "window_s": self.window_s,
-            "onset_s": self.onset_s,
+            "onset_s": round(self.onset_s, 6),
         }
         if self.contact is not None:
             line["place"] = None if self.position is None else list(self.position)
@@ -115,8 +115,8 @@ class Release:
         return {
             "event": "release",
             **_which(self.contact),
-            "onset_s": self.onset_s,
-            "release_s": self.release_s,
+            "onset_s": round(self.onset_s, 6),
+            "release_s": round(self.release_s, 6),
         }
 
 

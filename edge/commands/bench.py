@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from edge import __version__
 from edge.classifier import Classifier
 from edge.commands.check import FRAMES
+from edge.commands.output import Output
 from edge.errors import EdgeError, InputError
 from edge.fake.player import frame_bits
 from edge.files import write_whole
@@ -68,27 +69,25 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--rounds must be 20 to 1000000, not {arguments.rounds}")
     model = Model(arguments.model)
     skin = None if arguments.skin is None else load(arguments.skin)
+    output = Output.of(arguments)
     board = measure(model, arguments.rounds, skin)
     with write_whole(arguments.out) as file:
         file.write(json.dumps(board, indent=1, ensure_ascii=False).encode() + b"\n")
     for name, stage in board["stages"].items():
-        print(
-            f"{name:<10} {stage['median_us']:>9.1f} us median {stage['p99_us']:>9.1f} us p99",
-            file=sys.stderr,
+        output.text(
+            f"{name:<10} {stage['median_us']:>9.1f} us median {stage['p99_us']:>9.1f} us p99"
         )
-    print(
+    output.text(
         f"model      {board['model']['bytes'] / 1e6:>9.3f} MB\n"
         f"memory     {board['memory_mb']:>9.1f} MB\ncold start {board['cold_start_ms']:>9.1f} ms "
-        f"(median of {COLD_STARTS})",
-        file=sys.stderr,
+        f"(median of {COLD_STARTS})"
     )
     if board["wire"] is not None:
-        print(
+        output.text(
             f"wire       {board['wire']['frame_ms']:>9.3f} ms a frame, counted from the drivers' "
-            "transactions",
-            file=sys.stderr,
+            "transactions"
         )
-    print(arguments.out)
+    output.event({"event": "bench", "file": arguments.out}, f"written to {arguments.out}")
     return 0
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
+import logging
 import math
-import sys
 from datetime import UTC, datetime
 from typing import Any
 
@@ -13,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.commands.options import add_skin
+from edge.commands.output import Output
 from edge.commands.source import open_skin
 from edge.errors import InputError
 from edge.skin.calibration import save_calibration
 from edge.skin.file import TaxelCalibration
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
+
+LOG = logging.getLogger(__name__)
 
 FRAMES = 1000
 """As many as the lab averaged for its own baseline."""
@@ -111,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.frames < LEAST_FRAMES:
         raise InputError(f"--frames must be at least {LEAST_FRAMES}, not {arguments.frames}")
     with open_skin(arguments, calibrated=False) as opened:
-        print("edge-classify: measuring; keep everything off the skin", file=sys.stderr)
+        LOG.info("measuring; keep everything off the skin")
         calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
         unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
     if seen < LEAST_FRAMES:
@@ -129,19 +131,20 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.skin, TaxelCalibration(calibration.baseline, calibration.noise, taken)
     )
     if unread:
-        print(f"edge-classify: {unread} taxels could not be read", file=sys.stderr)
-    print(
-        json.dumps(
-            {
-                "event": "calibrated",
-                "skin": arguments.skin,
-                "backup": str(backup),
-                "frames": seen,
-                "noise_median": round(float(np.median(calibration.noise)), 3),
-                "noise_largest": round(float(calibration.noise.max()), 3),
-                "unread": unread,
-                "moving": moving,
-            }
-        )
+        LOG.warning("%d taxels could not be read", unread)
+    median, largest = float(np.median(calibration.noise)), float(calibration.noise.max())
+    Output.of(arguments).event(
+        {
+            "event": "calibrated",
+            "skin": arguments.skin,
+            "backup": str(backup),
+            "frames": seen,
+            "noise_median": round(median, 3),
+            "noise_largest": round(largest, 3),
+            "unread": unread,
+            "moving": moving,
+        },
+        f"{arguments.skin}: calibrated from {seen} frames; noise {median:.1f} counts (median), "
+        f"{largest:.1f} (largest). The old file is {backup}.",
     )
     return 0

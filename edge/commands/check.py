@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import Any
 
-from edge.fake.player import frame_bits
-from edge.skin.file import frame_rate, load
+from edge.commands.output import Output
+from edge.fake.player import frame_bits, highest_raw
+from edge.skin.file import SkinFile, frame_rate, load
 
 FRAMES = 100
 """Counted together, so that transactions that not every frame needs count by their share."""
@@ -20,31 +21,70 @@ def add_parser(commands: Any) -> None:
         "check",
         help="say what is wrong with a skin file, and what frame rate its wires carry",
         description="Reads a skin file and runs its drivers over a fake bus that counts the "
-        "bits on the wire. The exit status is 1 if the wires cannot carry the frame rate that "
-        "the file asks for.",
+        "bits on the wire. The exit status is 1 if the skin cannot work as the file describes "
+        "it, or if the wires cannot carry the frame rate that the file asks for.",
     )
     parser.add_argument("skin", metavar="skin.toml", help="the file that describes the skin")
     parser.set_defaults(run=run)
 
 
+def highest_count(file: SkinFile) -> int:
+    """The most counts that a touch can give on the chip with the smallest range."""
+    return min(highest_raw(chip) for chip in file.chips)
+
+
+def faults(file: SkinFile) -> Iterator[str]:
+    """Why the skin cannot work, a sentence each."""
+    top = highest_count(file)
+    if file.layout.onset >= top:
+        yield (
+            f"no contact can begin: onset_counts is {file.layout.onset}, and a taxel gives at "
+            f"most {top}"
+        )
+    if any(chip.kind == "mpr121" and chip.sign == 1 for chip in file.chips):
+        yield "sign = 1, but a touch lowers an MPR121's values: leave sign out, or set it to -1"
+    silent = file.signal.dead_band_sigma == 0.0 and file.signal.dead_band_counts == 0
+    if file.layout.onset == 0 and silent:
+        yield (
+            "every count of noise begins a contact: set threshold_counts and onset_counts, or "
+            "dead_band_sigma"
+        )
+
+
+def remarks(file: SkinFile) -> Iterator[str]:
+    """What is missing and may be meant so, a sentence each."""
+    if file.layout.onset == 0 and not list(faults(file)):
+        yield (
+            "threshold_counts is missing: anything above the noise is a contact; set "
+            "threshold_counts and onset_counts"
+        )
+    if file.layout.pitch_m is None:
+        yield (
+            "pitch_m is missing: contact motion is measured in taxels, and joint angles cannot "
+            "be used"
+        )
+    if file.uncovered:
+        yield f"{file.uncovered} taxels have no chip: they are never valid"
+    if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
+        yield "pyserial is not installed here: run `pip install edge-classify[serial]`"
+    if file.calibration is None:
+        yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
+
+
 def run(arguments: argparse.Namespace) -> int:
-    """Print the result, and remarks on stderr."""
+    """Print what was found; 1 if the skin cannot work."""
+    output = Output.of(arguments)
     file = load(arguments.skin)
     bits = [count / FRAMES for count in frame_bits(file, FRAMES)]
     clocks = [bus.clock_hz for bus in file.buses]
-    rate = frame_rate(bits, clocks)
-    remarks = []
-    if file.uncovered:
-        remarks.append(f"{file.uncovered} taxels have no chip: they are never valid")
-    if file.calibration is None:
-        remarks.append("not calibrated yet: run `edge-classify calibrate`")
-    carried = rate >= file.reading.rate_hz
-    if not carried and file.reading.region_of_interest:
-        remarks.append(f"full frames come at {rate:.1f} Hz; the chips near a contact at the rate")
-    elif not carried:
-        remarks.append(
-            f"asks for {file.reading.rate_hz:g} Hz, the wire carries {rate:.1f}: use more buses, "
-            "a faster clock, a lower [read] rate_hz, or region_of_interest = true"
+    rate, asked = frame_rate(bits, clocks), file.reading.rate_hz
+    wrong, said = list(faults(file)), list(remarks(file))
+    if rate < asked and file.reading.region_of_interest:
+        said.append(f"full frames come at {rate:.1f} Hz; the chips near a contact at the rate")
+    elif rate < asked:
+        wrong.append(
+            f"asks for {asked:g} Hz, the wires carry {rate:.1f}: use more buses, a faster clock, "
+            "a lower [read] rate_hz, or region_of_interest = true"
         )
     event = {
         "event": "check",
@@ -56,11 +96,28 @@ def run(arguments: argparse.Namespace) -> int:
             for bus, b in zip(file.buses, bits, strict=True)
         ],
         "frame_rate_hz": round(rate, 1),
-        "asked_hz": file.reading.rate_hz,
-        "remarks": remarks,
+        "asked_hz": asked,
+        "remarks": wrong + said,
     }
-    print(json.dumps(event, ensure_ascii=False))
-    print(f"{arguments.skin}: the wire carries {rate:.1f} frames a second", file=sys.stderr)
-    for remark in remarks:
-        print(f"{arguments.skin}: {remark}", file=sys.stderr)
-    return 0 if carried or file.reading.region_of_interest else 1
+    output.event(event, _text(arguments.skin, file, event, wrong, said))
+    return 1 if wrong else 0
+
+
+def _text(
+    path: str, file: SkinFile, event: dict[str, Any], wrong: list[str], said: list[str]
+) -> str:
+    rows, cols = file.layout.shape
+    count = len(file.chips)
+    lines = [f"{path}: {file.name}, {rows} x {cols} taxels on {count} chip{'s' * (count != 1)}"]
+    lines += [
+        f"  {bus['device']:<16} {bus['chips']:>3} chips  {bus['bits']:>8.0f} bits a frame at "
+        f"{bus['clock_hz'] / 1000:g} {'kbit/s' if spec.serial else 'kHz'}"
+        for bus, spec in zip(event["buses"], file.buses, strict=True)
+    ]
+    lines.append(
+        f"The wires carry {event['frame_rate_hz']:g} frames a second; {event['asked_hz']:g} are "
+        "asked for."
+    )
+    lines += [f"Wrong:  {sentence}" for sentence in wrong]
+    lines += [f"Remark: {sentence}" for sentence in said]
+    return "\n".join(lines)

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
+import logging
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from edge import demo
 from edge.classifier import Classifier
+from edge.commands import terminal
+from edge.commands.output import Output
 from edge.events import Decided, Event
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.touch.region import find_regions
+
+LOG = logging.getLogger(__name__)
+
+LABEL_WIDTH = 24
+WHAT_NEXT = "`edge-classify view --fake REC.npz` shows a touch as it happens."
 
 
 def add_parser(commands: Any) -> None:
@@ -39,23 +49,55 @@ def events(model: Model, recording: Recording) -> Iterator[Event]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 1 if a decision differs from its recording's label."""
-    model = Model(demo.MODEL)
+    model, output = Model(demo.MODEL), Output.of(arguments)
     right = asked = 0
     for path in demo.recordings():
-        right_here, asked_here = _show(model, path)
+        right_here, asked_here = _show(model, path, output)
         right, asked = right + right_here, asked + asked_here
-    print(f"edge-classify: {right} of {asked} decisions are right", file=sys.stderr)
+    if output.as_json:
+        LOG.info("%d of %d decisions are right", right, asked)
+    else:
+        output.text("")
+        output.text(_pictures(demo.recordings()))
+        output.text(f"{right} of {asked} decisions are right; {WHAT_NEXT}")
     return 0 if asked and right == asked else 1
 
 
-def _show(model: Model, path: Path) -> tuple[int, int]:
+def _show(model: Model, path: Path, output: Output) -> tuple[int, int]:
     recording = load(path)
     right = asked = 0
+    if not output.as_json:
+        output.text(path.stem.replace("-", " "))
     for event in events(model, recording):
         line = {"source": path.stem, **event.to_dict()}
         if isinstance(event, Decided):
             line["expected"] = recording.labels[event.task]
             asked += 1
             right += line["expected"] == event.label
-        print(json.dumps(line, ensure_ascii=False), flush=True)
+        output.event(line)
     return right, asked
+
+
+def _pictures(paths: list[Path]) -> str:
+    """The fullest frame of each recording, side by side as far as the terminal is wide."""
+    shown = []
+    for path in paths:
+        recording = load(path)
+        layout = recording.layout
+        fullest = int(recording.frames.sum(axis=(1, 2), dtype=np.int64).argmax())
+        frame = list(recording)[fullest]
+        regions = find_regions(frame.counts, layout.threshold_counts, wraps=layout.wraps)
+        colour = terminal.colours(
+            frame, regions, layout.threshold_counts, int(recording.frames.max())
+        )
+        lines = terminal.picture(colour, wide=1).split("\n")
+        width = max(layout.cols, LABEL_WIDTH)
+        pad = " " * (width - layout.cols)
+        shown.append([f"{path.stem:<{width}}", *(line + pad for line in lines)])
+    width = max(layout.cols, LABEL_WIDTH) + 2
+    beside = max(1, shutil.get_terminal_size().columns // width)
+    blocks = [shown[i : i + beside] for i in range(0, len(shown), beside)]
+    return "\n\n".join(
+        "\n".join("  ".join(parts).rstrip() for parts in zip(*block, strict=True))
+        for block in blocks
+    )

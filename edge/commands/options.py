@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import math
-import sys
 
 from edge.classifier import stopping_rules
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.runtime.joint_stream import OLDEST_S
 from edge.touch.arm import Chain
+
+LOG = logging.getLogger(__name__)
 
 
 def seconds(text: str) -> float:
@@ -121,10 +123,9 @@ def check_error(model: Model, error: float | None) -> None:
         return
     for task, rule in stopping_rules(model, error).items():
         if rule is None:
-            print(
-                f"edge-classify: {task}: an error of {error:g} cannot be certified, so it is "
-                f"decided at the full window: {model.info.stopping[task].refusal(error)}",
-                file=sys.stderr,
+            LOG.warning(
+                f"{task}: an error of {error:g} cannot be certified, so it is "
+                f"decided at the full window: {model.info.stopping[task].refusal(error)}"
             )
         else:
             how = (
@@ -132,8 +133,7 @@ def check_error(model: Model, error: float | None) -> None:
                 if rule.fixed
                 else f"from a confidence of {rule.confidence:g} on"
             )
-            print(
-                f"edge-classify: {task}: decided {how}, {rule.mean_s:.2f} s on average in "
-                f"training; at most {rule.error:.1%} wrong",
-                file=sys.stderr,
+            LOG.info(
+                f"{task}: decided {how}, {rule.mean_s:.2f} s on average in "
+                f"training; at most {rule.error:.1%} wrong"
             )

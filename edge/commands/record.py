@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
+import logging
 import math
 import re
 import signal
-import sys
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from edge.commands.options import add_arm, add_joints, add_skin, open_arm
+from edge.commands.output import Output
 from edge.commands.source import Opened, open_joints, open_skin
 from edge.errors import InputError
 from edge.recording import Recording, save
@@ -24,6 +24,8 @@ from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
+
+LOG = logging.getLogger(__name__)
 
 LEAD_S = 0.2
 LENGTH_S = 2.0
@@ -163,7 +165,7 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
 
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
-    labels = dict(arguments.label)
+    labels, output = dict(arguments.label), Output.of(arguments)
     if not labels:
         raise InputError(
             "give --label TASK=LABEL: nothing can be learnt from a trial without a label"
@@ -202,21 +204,21 @@ def run(arguments: argparse.Namespace) -> int:
         trials = Trials(tracker, lead_frames=lead, length_s=arguments.length)
         loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         done = 0
-        print("edge-classify: waiting for a contact", file=sys.stderr)
+        LOG.info("waiting for a contact")
         for frame in loop.frames():
             frames = trials.push(frame)
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, names, complete=True)
+                _save(frames, arguments.out, labels, opened, arm, names, output, complete=True)
                 done += 1
                 if done == wanted:
                     break
         else:
             frames = trials.rest()
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, names, complete=False)
+                _save(frames, arguments.out, labels, opened, arm, names, output, complete=False)
                 done += 1
     if done == 0:
-        print("edge-classify: there was no contact, so nothing was saved", file=sys.stderr)
+        LOG.warning("there was no contact, so nothing was saved")
         return 1
     return 0
 
@@ -228,6 +230,7 @@ def _save(
     opened: Opened,
     arm: Chain | None,
     names: Sequence[str] | None,
+    output: Output,
     *,
     complete: bool,
 ) -> None:
@@ -257,4 +260,6 @@ def _save(
         "missing_taxels": trial.valid is not None,
         "complete": complete,
     }
-    print(json.dumps(event, ensure_ascii=False), flush=True)
+    said = ", ".join(f"{task}={label}" for task, label in labels.items())
+    cut = "" if complete else ", cut short"
+    output.event(event, f"{path}: {event['seconds']:g} s, {len(frames)} frames, {said}{cut}")

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
+import logging
 from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier
 from edge.commands.options import add_error, check_error
+from edge.commands.output import Output
 from edge.commands.summary import Summary
 from edge.errors import InputError
 from edge.model.model import Model, require_joints
 from edge.recording import Recording, find, load
+
+LOG = logging.getLogger(__name__)
 
 
 def add_parser(commands: Any) -> None:
@@ -62,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the events; 2 if a file could not be used."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
-    summary = Summary(model.info.tasks)
+    summary, output = Summary(model.info.tasks), Output.of(arguments)
     failed = 0
     for path in _paths(arguments.recordings):
         try:
@@ -70,17 +72,19 @@ def run(arguments: argparse.Namespace) -> int:
             events = decide(model, recording, str(path), arguments.error)
         except InputError as error:
             failed += 1
-            print(f"edge-classify: {error}", file=sys.stderr)
+            LOG.error("%s", error)
             continue
         labels = recording.labels
+        if not output.as_json:
+            output.text(f"{path}" + "".join(f", {k}: {v}" for k, v in sorted(labels.items())))
         for event in events:
             line = {"source": str(path), **event}
             if event["event"] == "decision" and event["task"] in labels:
                 line["expected"] = labels[event["task"]]
-            print(json.dumps(line, ensure_ascii=False))
+            output.event(line)
         summary.add(labels, events)
     if arguments.summary:
-        print(summary.text(), file=sys.stderr)
+        output.text(summary.text())
     return 2 if failed else 0
 
 

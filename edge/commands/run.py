@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import signal
-import sys
 import time
 from contextlib import ExitStack
 from typing import Any
 
 from edge.classifier import Classifier
 from edge.commands.options import add_error, add_joints, add_skin, check_error
+from edge.commands.output import Output
 from edge.commands.source import check_joints, open_joints, open_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
@@ -19,6 +20,8 @@ from edge.runtime.touch_map import MapFile
 from edge.skin.loop import Loop, Schedule, stop_on
 from edge.skin.skin import ChipStatus
 from edge.touch.track import MAX_CONTACTS
+
+LOG = logging.getLogger(__name__)
 
 
 def add_parser(commands: Any) -> None:
@@ -89,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
     with ExitStack() as stack:
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
         notifier = stack.enter_context(Notifier(now=time.monotonic))
-        lines = stack.enter_context(Lines(udp=arguments.udp))
+        lines = stack.enter_context(Lines(Output.of(arguments).event, arguments.udp))
         opened = stack.enter_context(open_skin(arguments, model=model, arm=chain))
         on_skin = arguments.without_joints == "skin"
         if not on_skin:
@@ -129,8 +132,5 @@ def run(arguments: argparse.Namespace) -> int:
         emit([event.to_dict() for event in classifier.finish()])
         emit([end_event(loop.schedule, frames)])
         if lines.lost:
-            print(
-                f"edge-classify: {lines.lost} lines could not be sent to {arguments.udp}",
-                file=sys.stderr,
-            )
+            LOG.warning("%d lines could not be sent to %s", lines.lost, arguments.udp)
     return 0

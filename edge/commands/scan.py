@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from typing import Any
 
 import numpy as np
 
 from edge.commands.options import add_skin
+from edge.commands.output import Output
 from edge.commands.source import open_skin
 from edge.skin.file import UNUSED, SkinFile
 from edge.skin.skin import ChipStatus
@@ -40,11 +39,12 @@ def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print each chip and the map; 1 if a chip does not answer."""
+    output = Output.of(arguments)
     with open_skin(arguments, calibrated=False) as opened:
         statuses = opened.skin.status()
         for status in statuses:
-            print(
-                json.dumps(
+            if output.as_json or status.state != "running":
+                output.event(
                     {
                         "event": "chip",
                         "bus": status.bus,
@@ -52,10 +52,10 @@ def run(arguments: argparse.Namespace) -> int:
                         "kind": status.kind,
                         "state": status.state,
                         "error": status.error or None,
-                    }
+                    },
+                    f"{status.kind}: {status.error or status.state}",
                 )
-            )
-        print(skin_map(opened.skin.file, statuses), file=sys.stderr)
+        output.text(skin_map(opened.skin.file, statuses))
     missing = sum(status.state != "running" for status in statuses)
-    print(f"{len(statuses) - missing} of {len(statuses)} chips answer", file=sys.stderr)
+    output.text(f"{len(statuses) - missing} of {len(statuses)} chips answer")
     return 1 if missing else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -21,6 +22,8 @@ from edge.skin.loop import JointSource
 from edge.skin.skin import Skin
 from edge.touch.arm import Chain
 from edge.touch.layout import for_device
+
+LOG = logging.getLogger(__name__)
 
 
 def touch_counts(model: Model | None, file: SkinFile) -> int | None:
@@ -101,7 +104,15 @@ def open_skin(
             opened = Opened(skin, arguments.seconds, None, arguments.skin)
         for status in skin.status():
             if status.error:
-                print(f"edge-classify: {status.error}; left out for now", file=sys.stderr)
+                LOG.warning("%s; left out for now", status.error)
+        LOG.debug(
+            "%s: %d x %d taxels, %d chips on %d buses at %g Hz",
+            opened.source,
+            *file.layout.shape,
+            len(file.chips),
+            len(file.buses),
+            file.reading.rate_hz,
+        )
         yield opened
 
 
@@ -151,10 +162,10 @@ def open_joints(
         if listener is not None:
             listener.close()
         if stream.malformed:
-            print(
-                f"edge-classify: --joints: {stream.malformed} lines could not be used; "
-                f"of the last: {stream.problem}",
-                file=sys.stderr,
+            LOG.warning(
+                "--joints: %d lines could not be used; of the last: %s",
+                stream.malformed,
+                stream.problem,
             )
 
 

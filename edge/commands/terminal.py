@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -80,6 +81,36 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
     if frame.valid is not None and not frame.valid.all():
         parts.append(f"{int((~frame.valid).sum())} taxels cannot be read")
     return "  |  ".join(parts)
+
+
+def wrapped(text: str, columns: int) -> list[str]:
+    """A caption in lines of at most so many columns, broken between its parts where it can be."""
+    lines: list[str] = []
+    for part in text.split("  |  "):
+        if lines and len(lines[-1]) + 5 + len(part) <= columns:
+            lines[-1] += f"  |  {part}"
+        else:
+            lines += textwrap.wrap(part, columns) or [""]
+    return lines
+
+
+def legend(columns: int) -> list[str]:
+    """What the colours stand for."""
+    entries = [
+        ("".join(f"\x1b[38;5;{colour}m■" for colour in TOUCH[2::3]), 3, "touched, by force"),
+        (f"\x1b[38;5;{REST[-1]}m■", 1, "below the threshold"),
+        (f"\x1b[38;5;{LOST}m■", 1, "cannot be read"),
+        ("q", 1, "quits"),
+    ]
+    lines, width = [""], 0
+    for mark, marks, text in entries:
+        size = marks + 1 + len(text)
+        if width and width + 3 + size > columns:
+            lines, width = [*lines, ""], 0
+        gap = "   " if width else ""
+        lines[-1] += f"{gap}{mark}{PLAIN} {text}"
+        width += len(gap) + size
+    return lines
 
 
 def screen(lines: Sequence[str]) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
+import logging
 from typing import Any
 
+from edge.commands.output import Output
 from edge.model.model import Model
 from edge.model.verify import verify
+
+LOG = logging.getLogger(__name__)
 
 
 def add_parser(commands: Any) -> None:
@@ -29,6 +31,7 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per quantity; 1 if one differs."""
+    output = Output.of(arguments)
     checks = verify(Model(arguments.model), arguments.golden)
     for check in checks:
         line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
@@ -37,16 +40,14 @@ def run(arguments: argparse.Namespace) -> int:
             line["share_of_bound"] = round(check.worst, 6)
         if check.row is not None:
             line |= {"worst_row": check.row, "seen": check.seen, "expected": check.expected}
-        print(json.dumps(line))
+        verdict = "ok    " if check.passed else "DIFFERS"
+        output.event(line, f"{verdict:<8} {check.name:<22} {check.rows:>5} rows")
     failed = [check for check in checks if not check.passed]
     for check in failed:
-        print(
-            f"edge-classify: {check.name} differs, worst in row {check.row}: "
-            f"{check.seen} instead of {check.expected}",
-            file=sys.stderr,
+        LOG.error(
+            f"{check.name} differs, worst in row {check.row}: "
+            f"{check.seen} instead of {check.expected}"
         )
     if not failed:
-        print(
-            f"edge-classify: {len(checks)} quantities agree with the golden file", file=sys.stderr
-        )
+        output.text(f"{len(checks)} quantities agree with the golden file")
     return 1 if failed else 0

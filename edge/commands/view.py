@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
+import select
+import shutil
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from edge.classifier import Classifier
@@ -14,7 +19,8 @@ from edge.commands.source import check_joints, open_joints, open_skin
 from edge.errors import InputError
 from edge.events import Decided, Onset
 from edge.model.model import Model
-from edge.skin.loop import Loop, stop_on
+from edge.skin.loop import Loop, Stop, stop_on
+from edge.skin.skin import Skin
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import find_regions
@@ -32,7 +38,8 @@ def add_parser(commands: Any) -> None:
         help="show the skin live in a terminal",
         description="Draws the skin and, with --model, the latest decisions. Taxels in contact "
         "are red to white by force, those below the contact threshold grey, and those that "
-        "cannot be read blue. Each line shows two rows of taxels; row 0 is at the top.",
+        "cannot be read blue. Each line shows two rows of taxels; row 0 is at the top. "
+        "q or Ctrl-C ends it.",
     )
     parser.add_argument("--model", help="model.onnx, to show its decisions too")
     parser.add_argument(
@@ -51,7 +58,37 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[st
     full = FULL_FACTOR * max(threshold, 1) if scale is None else round(FULL_NEWTONS * scale)
     colour = terminal.colours(frame, regions, threshold, full)
     said = [f"{task}: {text}" for task, text in decisions.items()]
-    return [terminal.picture(colour), terminal.caption(frame, regions, layout), *said]
+    columns = shutil.get_terminal_size().columns
+    wide = 2 if 2 * layout.cols <= columns else 1
+    return [
+        terminal.picture(colour[:, :columns], wide=wide),
+        *terminal.wrapped(terminal.caption(frame, regions, layout), columns),
+        *(line for text in said for line in terminal.wrapped(text, columns)),
+        *terminal.legend(columns),
+    ]
+
+
+@contextmanager
+def quit_on_q(stop: Stop) -> Iterator[Callable[[], None]]:
+    """A function that asks the loop to stop once `q` was typed at the terminal."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        yield lambda: None
+        return
+    import termios
+    import tty
+
+    fd = sys.stdin.fileno()
+    before = termios.tcgetattr(fd)
+
+    def look() -> None:
+        while select.select([fd], [], [], 0.0)[0] and not stop.asked:
+            stop.asked = os.read(fd, 1) in (b"q", b"Q", b"")
+
+    try:
+        tty.setcbreak(fd)
+        yield look
+    finally:
+        termios.tcsetattr(fd, termios.TCSADRAIN, before)
 
 
 def spoken(event: Decided) -> str:
@@ -73,17 +110,24 @@ def run(arguments: argparse.Namespace) -> int:
     ):
         if model is not None:
             check_joints(model, arguments, opened)
-        with open_joints(arguments, opened, chain, dof) as joints:
-            _show(arguments, opened.skin, model, Loop(
+        with open_joints(arguments, opened, chain, dof) as joints, quit_on_q(stop) as look:
+            loop = Loop(
                 opened.skin,
                 joints=joints if dof is not None else None,
                 lasts_s=opened.lasts_s,
                 stop=stop,
-            ))  # fmt: skip
+            )
+            _show(arguments, opened.skin, model, loop, look)
     return 0
 
 
-def _show(arguments: argparse.Namespace, skin: Any, model: Model | None, loop: Loop) -> None:
+def _show(
+    arguments: argparse.Namespace,
+    skin: Skin,
+    model: Model | None,
+    loop: Loop,
+    look: Callable[[], None],
+) -> None:
     classifier = None if model is None else Classifier(model, skin.layout)
     layout = skin.layout if classifier is None else classifier.layout
     tasks = () if model is None else tuple(model.info.tasks)
@@ -93,6 +137,7 @@ def _show(arguments: argparse.Namespace, skin: Any, model: Model | None, loop: L
     out.write(terminal.HIDE + terminal.CLEAR)
     try:
         for frame in loop.frames():
+            look()
             for event in classifier.push(frame) if classifier is not None else ():
                 if isinstance(event, Onset):
                     decisions = dict.fromkeys(tasks, "touching ...")

@@ -1,28 +1,27 @@
-"""Writes events for other programs: JSON lines on stdout, and the same lines by UDP."""
+"""Events to whoever reads them: on stdout, and as JSON lines by UDP."""
 
 from __future__ import annotations
 
 import json
 import socket
-import sys
-from collections.abc import Iterable
-from typing import Any, TextIO
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from edge.errors import InputError
 
 
 class Lines:
-    """Writes events, each one line of JSON, at once.
+    """Writes events, and sends each as one line of JSON.
 
     Attributes:
         lost: lines that could not be sent by UDP.
     """
 
-    def __init__(self, out: TextIO | None = None, udp: str | None = None) -> None:
-        """Write to a file, and send.
+    def __init__(self, out: Callable[[dict[str, Any]], None], udp: str | None = None) -> None:
+        """Write, and send.
 
         Args:
-            out: stdout where None.
+            out: takes each event, such as `edge.commands.output.Output.event`.
             udp: `HOST:PORT`, to which each line goes as a datagram of its own, or None.
 
         Raises:
@@ -34,20 +33,14 @@ class Lines:
 
     def write(self, events: Iterable[dict[str, Any]]) -> None:
         """Write events in their order."""
-        out = sys.stdout if self._out is None else self._out
-        written = False
         for event in events:
-            line = json.dumps(event, ensure_ascii=False) + "\n"
-            out.write(line)
-            written = True
+            self._out(event)
             if self._socket is not None:
                 try:
-                    self._socket.send(line.encode())
+                    self._socket.send((json.dumps(event, ensure_ascii=False) + "\n").encode())
                 except OSError:
                     # Nobody listens, or the network is down or full: decisions go on.
                     self.lost += 1
-        if written:
-            out.flush()
 
     def close(self) -> None:
         """Send no more; twice is fine."""

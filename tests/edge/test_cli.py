@@ -1,6 +1,8 @@
 """The command line: one module a command, exit statuses, no traceback."""
 
 import argparse
+import logging
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -41,12 +43,70 @@ def test_the_version_is_the_package_s(capsys):
     assert capsys.readouterr().out == f"edge-classify {__version__}\n"
 
 
-@pytest.mark.parametrize("words", [[], ["dance"], ["run", "--no-such-option"]])
-def test_bad_usage_is_exit_2(words, capsys):
+def test_a_bad_option_is_exit_2(capsys):
     with pytest.raises(SystemExit) as left:
-        cli.main(words)
+        cli.main(["run", "--no-such-option"])
     assert left.value.code == 2
     assert "usage: edge-classify" in capsys.readouterr().err
+
+
+def test_without_a_command_the_commands_are_listed(capsys):
+    assert cli.main([]) == 2
+    said = capsys.readouterr().out
+    assert all(f"\n    {name} " in said for name in cli.COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("reply", "there is no command 'reply'; did you mean 'replay'?"),
+        ("calibrat", "did you mean 'calibrate'?"),
+        ("dance!", "the commands are check, scan,"),
+    ],
+)
+def test_a_typing_error_is_answered_by_the_nearest_command(typed, said, capsys):
+    assert cli.main([typed]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("flag", "said"), [("-q", ["e"]), ("--json", ["i", "w", "e"]), ("-v", ["d", "i", "w", "e"])]
+)
+def test_quiet_leaves_errors_and_verbose_adds_detail(flag, said, capsys, monkeypatch):
+    def run(arguments):
+        log = logging.getLogger("edge.somewhere")
+        log.debug("d")
+        log.info("i")
+        log.warning("w")
+        log.error("e")
+        return 0
+
+    top = cli.parser(["check"])
+    monkeypatch.setattr("edge.commands.check.run", run)
+    top = cli.parser(["check"])
+    assert cli.dispatch(top, ["check", flag, "skin.toml"]) == 0
+    assert capsys.readouterr().err == "".join(f"edge-classify: {word}\n" for word in said)
+    assert logging.getLogger("edge").handlers == []
+
+
+def test_a_shell_is_told_the_commands_that_a_word_begins():
+    """As bash with argcomplete asks for them."""
+    pytest.importorskip("argcomplete")
+    line = "edge-classify rec"
+    asked = {
+        **os.environ,
+        "_ARGCOMPLETE": "1",
+        "_ARGCOMPLETE_STDOUT_FILENAME": "/dev/stdout",
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+        "COMP_TYPE": "9",
+    }
+    done = subprocess.run(
+        [sys.executable, "-m", "edge.cli"], cwd=ROOT, env=asked, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["record"]
 
 
 @pytest.mark.parametrize("status", [0, 1])

@@ -1,0 +1,72 @@
+"""`edge-classify fake`: touches to rehearse with, for any skin file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from edge.commands.output import Output
+from edge.errors import InputError
+from edge.fake.touches import still, touches
+from edge.recording import save
+from edge.skin.file import load
+
+TRIALS = 8
+STILL_S = 5.0
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "fake",
+        help="make labelled touches for a skin file, to rehearse with before it is wired",
+        description="Maps the simulated touches that come with the program onto the geometry of "
+        "a skin, and writes them as labelled recordings, with one in which nothing touches. Play "
+        "them with --fake to rehearse calibrate, record, export and run. A model fitted on them "
+        "knows nothing of the real skin.",
+    )
+    parser.add_argument(
+        "--skin", required=True, metavar="skin.toml", help="the file that describes the skin"
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="the folder")
+    parser.add_argument(
+        "--trials", type=int, default=TRIALS, help="of each touch (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the variation between trials")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the recordings, and say what can be done with them."""
+    if not 1 <= arguments.trials <= 1000:
+        raise InputError(f"--trials must be 1 to 1000, not {arguments.trials}")
+    if arguments.seed < 0:
+        raise InputError(f"--seed must be 0 or more, not {arguments.seed}")
+    file = load(arguments.skin)
+    folder, rest = arguments.out / "touches", arguments.out / "still.npz"
+    save(rest, still(file, STILL_S))
+    paths = []
+    for name, recording in touches(file, trials=arguments.trials, seed=arguments.seed):
+        paths.append(folder / f"{name}.npz")
+        save(paths[-1], recording)
+    event = {
+        "event": "faked",
+        "skin": arguments.skin,
+        "touches": str(folder),
+        "trials": len(paths),
+        "still": str(rest),
+    }
+    skin, first = arguments.skin, paths[0]
+    frames = round(STILL_S * file.reading.rate_hz)
+    Output.of(arguments).event(
+        event,
+        f"{folder}: {len(paths)} labelled touches of 4 objects\n{rest}: nothing touches\n\n"
+        "Rehearse with them:\n"
+        f"  edge-classify calibrate --skin {skin} --fake {rest} --frames {frames}\n"
+        f"  edge-classify view --skin {skin} --fake {first}\n"
+        f"  edge-classify record --skin {skin} --fake {first} --label object=box --out recordings\n"
+        f"  make export DATA={folder}          (in a checkout, on the workstation)\n"
+        f"  edge-classify run --model build/model.onnx --skin {skin} --fake {first}",
+    )
+    return 0

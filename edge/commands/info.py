@@ -1,0 +1,91 @@
+"""`edge-classify info`: what a model is."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import time
+from typing import Any
+
+import numpy as np
+
+from edge.commands.output import Output
+from edge.model.model import Model, ModelInfo
+
+ROUNDS = 200
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "info",
+        help="say what a model is: its tasks, labels, accuracy, features, skin and arm",
+        description="Prints what a model file says of itself: what it tells apart and how "
+        "accurately, what it was fitted on, and which skin and arm it needs. Also its size, and "
+        "how long a decision takes on this machine.",
+    )
+    parser.add_argument("model", metavar="model.onnx", help="the model")
+    parser.set_defaults(run=run)
+
+
+def decision_us(model: Model) -> float:
+    """Median microseconds of a decision on this machine."""
+    vector = np.zeros(model.info.width)
+    times = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter_ns()
+        model.decide(vector)
+        times.append((time.perf_counter_ns() - began) / 1e3)
+    return statistics.median(times)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print it."""
+    model = Model(arguments.model)
+    about = {"file": arguments.model, "bytes": os.path.getsize(arguments.model)}
+    about["decision_us"] = round(decision_us(model), 1)
+    said = {"event": "model", **about, **json.loads(model.info.to_json())}
+    Output.of(arguments).event(said, text(model.info, said))
+    return 0
+
+
+def text(info: ModelInfo, said: dict[str, Any]) -> str:
+    """The same for a person."""
+    skin, chain = info.layout, info.chain
+    lines = [f"{said['file']}: {said['bytes'] / 1024:.0f} kB, format {said['format']}", ""]
+    for name, task in info.tasks.items():
+        lines.append(
+            f"{name}: {task.accuracy:.1%} accurate (leave-one-out), {task.components} components, "
+            f"{task.k} neighbour{'s' * (task.k != 1)}, scaling {task.scaling}"
+        )
+        lines += _wrapped(", ".join(task.labels))
+    units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())
+    lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples each of"]
+    lines += _wrapped(units)
+    if info.decision_points_s:
+        points = ", ".join(f"{point:g}" for point in info.decision_points_s)
+        lines.append(f"With --error, earlier: at {points} s.")
+    wraps = ", closed around" if skin.wraps else ""
+    lines.append(
+        f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above {skin.threshold_counts} "
+        f"counts, onset above {skin.onset}; force in {skin.force_unit}s."
+    )
+    lines.append(
+        "Arm: none; motion is measured on the skin."
+        if chain is None
+        else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}."
+    )
+    versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
+    lines += [
+        f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with {versions}.",
+        f"A decision takes {said['decision_us']:g} us on this machine.",
+    ]
+    return "\n".join(lines)
+
+
+def _wrapped(words: str) -> list[str]:
+    import textwrap
+
+    return textwrap.wrap(words, 76, initial_indent="  ", subsequent_indent="  ")

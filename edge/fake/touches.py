@@ -1,0 +1,170 @@
+"""Labelled touches for any skin: the demo's simulated contacts, mapped onto its geometry.
+
+Each taxel's force of a simulated contact is spread over the patch that the taxel covers, and what
+falls on the patches of the other skin is added up there: the sum of the forces stays, and so do
+lengths. Trials differ in place, strength and speed. They are made to rehearse with, before a wire
+is soldered: a model fitted on them knows nothing of the real skin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge import demo
+from edge.fake.player import calibrated, highest_raw
+from edge.recording import Recording, load
+from edge.skin.file import UNUSED, SkinFile
+from edge.touch.layout import SkinLayout
+
+PITCH_M = 0.01
+"""Of a skin whose pitch is not known."""
+STRENGTH, SPEED = (0.8, 1.25), (0.9, 1.1)
+"""Factors that a trial's forces and its pace are drawn from."""
+LEAD_S = 0.3
+"""Before the simulated contact begins."""
+WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
+"""Where the force of a count is not known, the strongest taxel of the weakest contact has so many
+times the counts of the onset, which is taken to be at least so many."""
+
+
+def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str, Recording]]:
+    """Name and recording of each touch: so many of every contact of the demo.
+
+    Args:
+        file: the skin.
+        trials: of each contact.
+        seed: of place, strength and speed.
+    """
+    sources = [(path, load(path)) for path in demo.recordings()]
+    counts_per_newton = file.layout.counts_per_newton
+    if counts_per_newton is None:
+        rate = file.reading.rate_hz
+        weakest = min(
+            _mapped(source, file.layout, rate, np.random.default_rng([seed, kind]))[1].max()
+            for kind, (_, source) in enumerate(sources)
+        )
+        counts_per_newton = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
+    most = reach(file)
+    covered = np.zeros(file.layout.rows * file.layout.cols, dtype=np.bool_)
+    for chip in file.chips:
+        covered[[taxel for taxel in chip.taxels if taxel != UNUSED]] = True
+    for row, col in file.signal.dead:
+        covered[row * file.layout.cols + col] = False
+    for number in range(trials):
+        for kind, (path, source) in enumerate(sources):
+            rng = np.random.default_rng([seed, kind, number])
+            t, forces = _mapped(source, file.layout, file.reading.rate_hz, rng)
+            counts = np.minimum(np.rint(forces * counts_per_newton), most)
+            name = f"{path.stem}-{number:03}"
+            meta = {
+                "labels": source.labels,
+                "skin": file.layout.to_dict(),
+                "skin_name": file.name,
+                "source": f"a simulated touch of the demo ({path.stem}), mapped onto this skin",
+                "trial": name,
+            }
+            valid = None if covered.all() else covered.reshape(file.layout.shape)
+            yield name, Recording(t, counts.astype(np.uint16), valid=valid, meta=meta)
+
+
+def still(file: SkinFile, seconds: float) -> Recording:
+    """A recording of the skin while nothing touches it."""
+    t = np.arange(max(1, round(seconds * file.reading.rate_hz))) / file.reading.rate_hz
+    meta = {"labels": {}, "skin": file.layout.to_dict(), "source": "nothing touches", "trial": 0}
+    return Recording(t, np.zeros((len(t), *file.layout.shape), np.uint16), meta=meta)
+
+
+def reach(file: SkinFile) -> int:
+    """The most counts that a touch can give on every chip, from where its fake rests."""
+    rest = calibrated(file).calibration
+    assert rest is not None
+    most = 65535
+    for chip in file.chips:
+        for taxel in chip.taxels:
+            if taxel != UNUSED:
+                at = int(rest.baseline.flat[taxel])
+                most = min(most, at - 1 if chip.sign < 0 else highest_raw(chip) - at)
+    return most
+
+
+def newtons(recording: Recording) -> NDArray[np.float64]:
+    """(n, rows, cols) forces; counts where their force is not known."""
+    return recording.frames / (recording.layout.counts_per_newton or 1.0)
+
+
+def pitch(layout: SkinLayout) -> tuple[float, float]:
+    """Metres between rows and between columns."""
+    if isinstance(layout.pitch_m, tuple):
+        return layout.pitch_m
+    known = layout.pitch_m or PITCH_M
+    return known, known
+
+
+def _mapped(
+    source: Recording, onto: SkinLayout, rate_hz: float, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times (n,) and forces (n, rows, cols) of one trial."""
+    row, col = (rng.uniform(0.25, 0.75) * (n - 1) for n in onto.shape)
+    if onto.wraps:
+        col = rng.uniform(0.0, onto.cols)
+    strength, speed = rng.uniform(*STRENGTH), rng.uniform(*SPEED)
+    forces = strength * newtons(source)
+    middle = _middle(forces)
+    lasts = float(source.t[-1] - source.t[0]) / speed
+    t = np.arange(int((LEAD_S + lasts) * rate_hz) + 1) / rate_hz
+    at = (t - LEAD_S) * speed + source.t[0]
+    right = np.clip(np.searchsorted(source.t, at, side="right"), 1, len(source.t) - 1)
+    part = (at - source.t[right - 1]) / (source.t[right] - source.t[right - 1])
+    part = np.clip(part, 0.0, 1.0)[:, None, None]
+    felt = (1.0 - part) * forces[right - 1] + part * forces[right]
+    felt[at < source.t[0]] = 0.0
+    along = _spread(source.layout.rows, pitch(source.layout)[0], pitch(onto)[0], onto.rows,
+                    middle[0], row)  # fmt: skip
+    rings = {"from_ring": source.layout.wraps, "onto_ring": onto.wraps}
+    around = _spread(source.layout.cols, pitch(source.layout)[1], pitch(onto)[1], onto.cols,
+                     middle[1], col, **rings)  # fmt: skip
+    return t, along.T @ felt @ around
+
+
+def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:
+    """Row and column about which the forces of a contact lie; the column on the circle."""
+    total = forces.sum(axis=0)
+    rows, cols = total.shape
+    angle = np.exp(2j * math.pi * np.arange(cols) / cols)
+    col = float(np.angle((total.sum(axis=0) * angle).sum())) * cols / (2.0 * math.pi)
+    return float(total.sum(axis=1) @ np.arange(rows) / total.sum()), col
+
+
+def _spread(
+    sources: int,
+    source_pitch: float,
+    pitch: float,
+    taxels: int,
+    middle: float,
+    place: float,
+    *,
+    from_ring: bool = False,
+    onto_ring: bool = False,
+) -> NDArray[np.float64]:
+    """(sources, taxels) shares of each source row (or column) that fall on each taxel's.
+
+    Each source is as wide as its pitch, and so is each taxel; `middle` of the sources comes to
+    lie on `place` of the taxels.
+    """
+    offset = np.arange(sources) - middle
+    if from_ring:
+        offset = (offset + sources / 2.0) % sources - sources / 2.0
+    ratio = source_pitch / pitch
+    left = (place + offset * ratio - ratio / 2.0)[:, None]
+    edges = np.arange(taxels) - 0.5
+    shares = np.zeros((sources, taxels))
+    # A contact that is wider than the skin goes round it as often as it must.
+    turns = range(-2, 3) if onto_ring else range(1)
+    for turn in turns:
+        low = edges + turn * taxels
+        shares += np.maximum(0.0, np.minimum(left + ratio, low + 1.0) - np.maximum(left, low))
+    return shares / ratio

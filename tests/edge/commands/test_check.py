@@ -1,0 +1,95 @@
+"""`edge-classify check`: skins that cannot work, and what may be meant so."""
+
+import json
+import shutil
+
+import pytest
+
+from edge.cli import main
+from edge.skin import file as skinfile
+
+PAD = """[skin]
+rows = 3
+cols = 4
+[[bus]]
+device = 1
+kind = "mpr121"
+chips = [{ address = 0x5A, first = [0, 0], block = [3, 4] }]
+"""
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    def run(text):
+        path = tmp_path / "skin.toml"
+        path.write_text(text)
+        status = main(["check", str(path)])
+        out = capsys.readouterr()
+        return status, json.loads(out.out)["remarks"] if out.out else out.err
+
+    return run
+
+
+def test_a_pad_that_says_little_is_told_what_is_missing(check):
+    status, remarks = check(PAD)
+    assert status == 0
+    assert [r.split(":")[0] for r in remarks] == ["pitch_m is missing", "not calibrated yet"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[[bus]]", "[signal]\nsign = 1\n[[bus]]", "a touch lowers an MPR121's values"),
+        (
+            "cols = 4",
+            "cols = 4\nthreshold_counts = 2000",
+            "no contact can begin: onset_counts is 2000, and a taxel gives at most 1023",
+        ),
+        (
+            'kind = "mpr121"',
+            'kind = "block"\nbits = 8',
+            "threshold_counts is missing: anything above the noise",
+        ),
+    ],
+)
+def test_a_skin_that_cannot_work_is_exit_1(check, old, new, said):
+    status, remarks = check(PAD.replace(old, new, 1))
+    assert said in " ".join(remarks)
+    assert status == (0 if "missing" in said else 1)
+
+
+def test_noise_without_a_threshold_or_a_dead_band_is_wrong(check):
+    text = PAD.replace('kind = "mpr121"', 'kind = "block"')
+    status, remarks = check(text.replace("[[bus]]", "[signal]\ndead_band_sigma = 0\n[[bus]]"))
+    assert status == 1
+    assert remarks[0].startswith("every count of noise begins a contact")
+
+
+def test_a_serial_port_given_as_an_i2c_bus_is_refused(check):
+    status, err = check(PAD.replace("device = 1", 'device = "/dev/ttyACM0"'))
+    assert status == 2
+    assert 'write serial = "/dev/ttyACM0" instead' in err
+
+
+@pytest.mark.parametrize("name", ["cody", "mpr121", "matrix"])
+def test_a_skin_file_that_comes_with_the_program_works(name, tmp_path, capsys):
+    path = tmp_path / "skin.toml"
+    shutil.copy(skinfile.shipped(name), path)
+    status = main(["check", str(path)])
+    event = json.loads(capsys.readouterr().out)
+    # A serial port of 115200 bits a second; over USB the number means nothing.
+    assert status == (1 if name == "matrix" else 0)
+    assert "not calibrated yet" in event["remarks"][-1]
+
+
+def test_a_person_is_told_each_thing_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    path = tmp_path / "skin.toml"
+    path.write_text(PAD)
+    assert main(["check", str(path)]) == 0
+    out = capsys.readouterr()
+    assert out.err == ""
+    first, *_, last = out.out.splitlines()
+    assert first == f"{path}: skin, 3 x 4 taxels on 1 chip"
+    assert last.startswith("Remark: not calibrated yet")
+    assert out.out.count("pitch_m") == 1

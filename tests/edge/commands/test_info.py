@@ -1,0 +1,37 @@
+"""`edge-classify info`: what a model says of itself."""
+
+import json
+
+from edge import demo
+from edge.cli import main
+from edge.model.model import Model
+
+
+def test_a_program_gets_the_metadata_with_size_and_time(capsys):
+    assert main(["info", str(demo.MODEL)]) == 0
+    said = json.loads(capsys.readouterr().out)
+    info = Model(demo.MODEL).info
+    assert said["bytes"] == demo.MODEL.stat().st_size
+    assert said["decision_us"] > 0
+    assert said["data_digest"] == info.data_digest
+    assert {task: tuple(one["labels"]) for task, one in said["tasks"].items()} == {
+        task: one.labels for task, one in info.tasks.items()
+    }
+
+
+def test_a_person_gets_sentences(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert main(["info", str(demo.MODEL)]) == 0
+    out = capsys.readouterr().out
+    info = Model(demo.MODEL).info
+    for task, one in info.tasks.items():
+        assert f"{task}: {one.accuracy:.1%} accurate (leave-one-out)" in out
+    assert "Skin: 16 x 24 taxels, closed around" in out
+    assert f"Fitted on {info.rows} trials" in out
+    assert max(map(len, out.splitlines())) < 160
+
+
+def test_what_is_no_model_is_one_sentence(tmp_path, capsys):
+    (tmp_path / "a.onnx").write_bytes(b"nothing")
+    assert main(["info", str(tmp_path / "a.onnx")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,0 +1,74 @@
+"""Text at a terminal, JSON lines elsewhere."""
+
+import json
+
+import pytest
+
+from edge import demo
+from edge.cli import main
+from edge.commands.output import event_text
+
+TOUCH = str(demo.FOLDER / "pillow-movable.npz")
+RUN = ["run", "--model", str(demo.MODEL), "--fake", TOUCH]
+
+
+@pytest.fixture
+def terminal(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+
+
+def test_a_person_reads_when_what_was_decided_and_how_sure(terminal, capsys):
+    assert main(RUN) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == [lines[0].split()[0], "s", "contact"]
+    (mobility,) = (line for line in lines if " mobility " in line)
+    assert mobility.split()[2:] == ["mobility", "movable", "█" * 10, "100%"]
+    assert lines[-1].endswith(" 0 missed")
+
+
+def test_json_at_a_terminal_is_what_a_pipe_gets(terminal, capsys):
+    assert main([*RUN, "--json"]) == 0
+    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [e["event"] for e in events] == ["onset", "decision", "decision", "decision", "end"]
+    assert all(round(e["onset_s"], 6) == e["onset_s"] for e in events[:-1])
+
+
+def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
+    assert main(["demo"]) == 0
+    out = capsys.readouterr().out
+    decisions, _, picture = out.partition("▀")
+    assert decisions.count("mobility") == 4
+    assert picture.count("▀") >= 4 * 8 * 24 - 1
+    assert out.splitlines()[-1].startswith("12 of 12 decisions are right")
+
+
+def test_a_map_of_chips_comes_last(terminal, capsys):
+    assert main(["scan", "--fake", TOUCH]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 17
+    assert lines[-1] == "32 of 32 chips answer"
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ({"event": "onset", "onset_s": 1.5, "contact": 2}, "   1.500 s  contact 2"),
+        (
+            {"event": "release", "onset_s": 1.5, "release_s": 2.75},
+            "   2.750 s  released after 1.25 s",
+        ),
+        (
+            {"event": "chip", "t": 3.0, "bus": "/dev/i2c-1", "place": "address 0x2c",
+             "state": "down", "error": "no power"},
+            "   3.000 s  /dev/i2c-1, address 0x2c is down: no power",
+        ),
+        (
+            {"event": "decision", "onset_s": 0.2, "window_s": 1.2, "task": "object",
+             "label": "box", "confidence": 0.6, "flags": ["tie"], "expected": "foam"},
+            "   1.400 s   object     box              ██████····  60%  (tie; it was foam)",
+        ),
+        ({"event": "no_contact"}, "no contact"),
+    ],
+)  # fmt: skip
+def test_each_event_has_its_words(line, text):
+    assert event_text(line) == text

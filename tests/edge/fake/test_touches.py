@@ -1,0 +1,76 @@
+"""Touches of the demo on any skin: forces and lengths are kept."""
+
+import numpy as np
+import pytest
+
+from edge import demo
+from edge.fake import touches
+from edge.recording import load
+from edge.skin import file as skinfile
+from edge.skin.file import parse
+
+WIDE = """[skin]
+rows = 120
+cols = 30
+pitch_m = {pitch}
+counts_per_newton = 1000.0
+wraps = {wraps}
+threshold_counts = 1
+[[bus]]
+device = 1
+kind = "block"
+chips = [{{ address = 0x28, first = [0, 0], block = [120, 30] }}]
+"""
+
+
+def made(pitch, *, wraps="false", trials=1, seed=0):
+    file = parse(WIDE.format(pitch=pitch, wraps=wraps))
+    return dict(touches.touches(file, trials=trials, seed=seed))
+
+
+@pytest.mark.parametrize("pitch", [0.004, 0.01, 0.02])
+def test_the_force_of_a_contact_is_kept_whatever_the_pitch(pitch):
+    """But for its strength, which a trial draws; on a ring nothing falls off beside."""
+    for path in demo.recordings():
+        source = load(path)
+        recording = made(pitch, wraps="true")[f"{path.stem}-000"]
+        strength = recording.frames.sum(axis=(1, 2)).max() / source.frames.sum(axis=(1, 2)).max()
+        assert touches.STRENGTH[0] - 0.05 < strength < touches.STRENGTH[1] + 0.05
+
+
+def test_a_contact_is_as_large_in_metres_on_a_finer_skin():
+    """The spread of its forces along the rows, in metres."""
+
+    def spread(recording, pitch):
+        rows = recording.frames.sum(axis=(0, 2)).astype(float)
+        at = np.arange(len(rows)) * pitch
+        return np.sqrt(np.average((at - np.average(at, weights=rows)) ** 2, weights=rows))
+
+    coarse, fine = (made(p, wraps="true")["cardboard-box-fixed-000"] for p in (0.01, 0.005))
+    assert spread(fine, 0.005) == pytest.approx(spread(coarse, 0.01), rel=0.1)
+
+
+def test_every_contact_begins_on_a_skin_whose_scale_is_unknown():
+    file = skinfile.load(skinfile.shipped("mpr121"))
+    for name, recording in touches.touches(file, trials=3):
+        assert recording.frames.max() > file.layout.onset, name
+        assert recording.frames.max() <= 599
+        assert set(recording.labels) == {"category", "mobility", "object"}
+        assert not recording.frames[recording.t < 0.2].any()
+
+
+def test_trials_differ_and_the_same_seed_gives_the_same():
+    one, again, other = made(0.01, trials=2), made(0.01, trials=2), made(0.01, seed=1)
+    assert len(one) == 8
+    for name, recording in one.items():
+        assert np.array_equal(recording.frames, again[name].frames)
+    first = one["pillow-movable-000"].frames
+    assert not np.array_equal(first, one["pillow-movable-001"].frames[: len(first)])
+    assert not np.array_equal(first, other["pillow-movable-000"].frames[: len(first)])
+
+
+def test_taxels_without_a_chip_are_not_valid():
+    text = WIDE.format(pitch=0.01, wraps="false").replace("block = [120, 30]", "block = [120, 20]")
+    recording = next(iter(touches.touches(parse(text), trials=1)))[1]
+    assert recording.valid[:, :20].all()
+    assert not recording.valid[:, 20:].any()
