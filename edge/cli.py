@@ -10,7 +10,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
-from functools import partial
 from importlib import import_module
 
 from edge import __version__
@@ -41,7 +40,6 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     """
     top = argparse.ArgumentParser(
         prog="edge-classify",
-        formatter_class=partial(argparse.HelpFormatter, max_help_position=16),
         description="Tells what a robot touched from what its skin felt.",
         epilog="`edge-classify COMMAND --help` explains a command. At a terminal, commands print "
         "text; where stdout is piped, one JSON object per line.",

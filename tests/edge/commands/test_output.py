@@ -6,15 +6,15 @@ import pytest
 
 from edge import demo
 from edge.cli import main
-from edge.commands.output import event_text
+from edge.commands.output import Output, event_text
 
 TOUCH = str(demo.FOLDER / "pillow-movable.npz")
 RUN = ["run", "--model", str(demo.MODEL), "--fake", TOUCH]
 
 
 @pytest.fixture
-def terminal(capsys, monkeypatch):
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+def terminal(monkeypatch):
+    monkeypatch.setattr(Output, "of", classmethod(lambda cls, arguments: cls(arguments.json)))
 
 
 def test_a_person_reads_when_what_was_decided_and_how_sure(terminal, capsys):
@@ -65,7 +65,7 @@ def test_a_map_of_chips_comes_last(terminal, capsys):
         (
             {"event": "decision", "onset_s": 0.2, "window_s": 1.2, "task": "object",
              "label": "box", "confidence": 0.6, "flags": ["tie"], "expected": "foam"},
-            "   1.400 s   object     box              ██████····  60%  (tie; it was foam)",
+            "   1.400 s  object     box              ██████····  60%  (tie; it was foam)",
         ),
         ({"event": "no_contact"}, "no contact"),
     ],
