@@ -95,7 +95,8 @@ def _pictures(paths: list[Path]) -> str:
         pad = " " * (width - layout.cols)
         shown.append([f"{path.stem:<{width}}", *(line + pad for line in lines)])
     width = max(layout.cols, LABEL_WIDTH) + 2
-    beside = max(1, shutil.get_terminal_size().columns // width)
+    fit = shutil.get_terminal_size().columns // width
+    beside = next(n for n in (len(shown), 2, 1) if n <= fit or n == 1)
     blocks = [shown[i : i + beside] for i in range(0, len(shown), beside)]
     return "\n\n".join(
         "\n".join("  ".join(parts).rstrip() for parts in zip(*block, strict=True))

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+from pathlib import Path
 
 import numpy as np
 import onnx
@@ -13,7 +14,7 @@ from onnx import TensorProto, helper
 
 from edge.errors import InputError
 from edge.model import onnx_file as onnxfile
-from edge.model.model import METADATA_KEY, Model
+from edge.model.model import FORMAT, METADATA_KEY, Model
 
 
 @pytest.fixture(scope="module")
@@ -269,3 +270,21 @@ def test_a_file_that_changes_between_its_check_and_its_use_is_refused(
     monkeypatch.setattr(onnxfile, "check", check_then_change)
     with pytest.raises(InputError, match="was changed while it was read"):
         Model(path)
+
+
+RELEASED = Path(__file__).parents[2] / "golden" / "released"
+
+
+@pytest.mark.parametrize("path", sorted(RELEASED.glob("*.onnx")), ids=lambda path: path.stem)
+def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path):
+    """`format-N.onnx` stays here when format N is no longer written."""
+    number = int(path.stem.removeprefix("format-"))
+    if number == FORMAT:
+        assert Model(path).info.tasks
+        return
+    with pytest.raises(InputError) as error:
+        Model(path)
+    assert str(error.value) == (
+        f"{path} is of format {number}, this edge-classify reads {FORMAT}; export the model again "
+        "with this version"
+    )
