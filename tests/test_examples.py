@@ -1,22 +1,21 @@
 """Each program in examples/ runs: the ROS node over a stand-in for rclpy, others as they are."""
 
 import json
+import re
 import runpy
-import socket
 import sys
-import threading
 import types
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import edge
 from edge import demo
-from edge.cli import main
 from edge.fake.player import play, skin_file
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-NODE = EXAMPLES / "ros2_node.py"
+PACKAGE = EXAMPLES / "ros2" / "edge_classify_ros"
 PILLOW = demo.FOLDER / "pillow-movable.npz"
 
 
@@ -61,58 +60,116 @@ def test_a_skin_is_watched(monkeypatch, capsys):
     assert {event.task for event in decided} == {"category", "mobility", "object"}
 
 
+class Publisher(list):
+    """Keeps what is published."""
+
+    publish = list.append
+
+
 class Ros:
-    """As much of rclpy as the node uses; it is ok until `enough` messages are published."""
+    """As much of rclpy and its messages as the node uses: one node, spun until it has ended."""
 
-    def __init__(self, enough):
-        self.published, self.enough = {}, enough
+    def __init__(self, **parameters):
+        self.parameters, self.topics, self.heard = parameters, {}, {}
+        ros = self
 
-    def init(self):
-        pass
+        class Node:
+            def __init__(self, name):
+                self.name = name
 
-    def ok(self):
-        return sum(map(len, self.published.values())) < self.enough
+            def declare_parameter(self, name, default):
+                return types.SimpleNamespace(value=ros.parameters.get(name, default))
 
-    def create_node(self, name):
-        return self
+            def create_publisher(self, kind, topic, depth):
+                return ros.topics.setdefault(topic, Publisher())
 
-    def create_publisher(self, kind, topic, depth):
-        said = self.published.setdefault(topic, [])
-        return types.SimpleNamespace(publish=lambda message: said.append(message.data))
+            def create_subscription(self, kind, topic, callback, depth):
+                ros.heard[topic] = callback
+
+            def get_clock(self):
+                stamp = types.SimpleNamespace(to_msg=lambda: "now")
+                return types.SimpleNamespace(now=lambda: stamp)
+
+            def destroy_node(self):
+                ros.destroyed = self
+
+        class Message(types.SimpleNamespace):
+            def __init__(self, **fields):
+                super().__init__(header=types.SimpleNamespace(), **fields)
+
+        names = ("String", "JointState", "Classification", "ObjectHypothesis")
+        messages = types.SimpleNamespace(**dict.fromkeys(names, Message))
+        spin = types.SimpleNamespace(init=lambda: None, spin=self.spin, try_shutdown=lambda: None)
+        self.modules = {"rclpy": spin, "rclpy.node": types.SimpleNamespace(Node=Node)}
+        for package in ("sensor_msgs", "std_msgs", "vision_msgs"):
+            self.modules |= {package: types.ModuleType(package), f"{package}.msg": messages}
+
+    def spin(self, node):
+        node._reading.join(timeout=30)
+
+    def run(self, monkeypatch):
+        for name, module in self.modules.items():
+            monkeypatch.setitem(sys.modules, name, module)
+        monkeypatch.syspath_prepend(str(PACKAGE))
+        monkeypatch.delitem(sys.modules, "edge_classify_ros.node", raising=False)
+        import_module("edge_classify_ros.node").main()
 
 
-def test_the_node_publishes_every_line_and_every_label(monkeypatch, capsys):
-    events, labels = 4, 3  # an onset and three decisions, of which each has a label
-    ros = Ros(enough=events + labels)
-    message = types.SimpleNamespace(String=lambda data: types.SimpleNamespace(data=data))
-    monkeypatch.setitem(sys.modules, "rclpy", ros)
-    monkeypatch.setitem(sys.modules, "std_msgs", types.ModuleType("std_msgs"))
-    monkeypatch.setitem(sys.modules, "std_msgs.msg", message)
-    # The example's port may be taken here: bind any, and tell the sender which.
-    bound = threading.Event()
-    port = []
+def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
+    ros = Ros(model=str(demo.MODEL), fake=str(PILLOW), frame_id="arm_skin")
+    ros.run(monkeypatch)
+    (mobility,) = ros.topics["~/mobility"]
+    assert (mobility.header.stamp, mobility.header.frame_id) == ("now", "arm_skin")
+    assert [(r.class_id, r.score) for r in mobility.results] == [("movable", 1.0)]
+    assert ros.topics["~/object"][0].results[0].class_id == "pillow"
+    events = [json.loads(message.data) for message in ros.topics["~/events"]]
+    assert [event["event"] for event in events] == ["onset", "decision", "decision", "decision"]
+    assert ros.destroyed.name == "edge_classify"
 
-    class Anywhere(socket.socket):
-        def bind(self, address):
-            super().bind((address[0], 0))
-            port.append(self.getsockname()[1])
-            bound.set()
 
-    program = runpy.run_path(str(NODE))
-    own = types.SimpleNamespace(
-        socket=Anywhere, AF_INET=socket.AF_INET, SOCK_DGRAM=socket.SOCK_DGRAM
-    )
-    program["main"].__globals__["socket"] = own
-    node = threading.Thread(target=program["main"], daemon=True)
-    node.start()
-    assert bound.wait(10)
-    touch = str(demo.FOLDER / "pillow-movable.npz")
-    run = ["run", "--model", str(demo.MODEL), "--fake", touch]
-    assert main([*run, "--udp", f"127.0.0.1:{port[0]}"]) == 0
-    node.join(timeout=20)
-    assert not node.is_alive()
-    lines = capsys.readouterr().out.splitlines(keepends=True)
-    assert ros.published["touch"] == lines[:events]
-    assert ros.published["touch/mobility"] == ["movable"]
-    assert ros.published["touch/object"] == ["pillow"]
-    assert json.loads(lines[0])["event"] == "onset"
+def test_the_ros_node_takes_joint_angles_by_name(monkeypatch):
+    """A skin that cannot be opened here: it is played, and JointState gives the angles."""
+    recording = edge.load(PILLOW)
+    chain = edge.Model(demo.MODEL).info.chain
+    skin, _ = play(skin_file(recording.layout), recording)
+    monkeypatch.setattr(edge.Skin, "open", lambda file: skin)
+    ros = Ros(model=str(demo.MODEL), skin="skin.toml")
+    spun = []
+
+    def spin(node):
+        spun.append(node._joints.at(skin.clock.now()))
+        stamp = types.SimpleNamespace(sec=7, nanosec=5 * 10**8)
+        message = types.SimpleNamespace(
+            header=types.SimpleNamespace(stamp=stamp),
+            name=["wheel", *chain.names[::-1]],
+            position=[9.0, *range(chain.dof)],
+        )
+        ros.heard["joint_states"](message)
+        spun.append(node._joints.at(skin.clock.now()))
+
+    ros.modules["rclpy"].spin = spin
+    monkeypatch.setattr(edge.Classifier, "watch", lambda self, skin, **more: iter(()))
+    ros.run(monkeypatch)
+    assert spun[0] is None
+    assert spun[1].tolist() == [4.0, 3.0, 2.0, 1.0, 0.0]
+
+
+def test_a_task_becomes_a_valid_topic(monkeypatch):
+    ros = Ros(model=str(demo.MODEL), fake=str(PILLOW))
+    ros.run(monkeypatch)
+    topic = sys.modules["edge_classify_ros.node"].topic
+    assert [topic(t) for t in ("object", "Object-36", "36 things", "Größe/x", "--")] == [
+        "object",
+        "object_36",
+        "task_36_things",
+        "gr_e_x",
+        "task",
+    ]
+
+
+def test_the_launch_file_gives_every_parameter_of_the_node():
+    launch = (PACKAGE / "launch" / "classify.launch.py").read_text()
+    node = (PACKAGE / "edge_classify_ros" / "node.py").read_text()
+    declared = set(re.findall(r'^                \("(\w+)", ', node, re.M))
+    assert declared == {"model", "skin", "fake", "error", "frame_id"}
+    assert declared <= set(re.findall(r'^    "(\w+)": \(', launch, re.M))

@@ -127,7 +127,7 @@ class ModelInfo:
             if meta.whole("format") != FORMAT:
                 raise InputError(
                     f"{where} is of format {shown(meta.raw['format'])}, this edge-classify reads "
-                    f"{FORMAT}; export the model again with this version"
+                    f"{FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
             points = tuple(meta.numbers("decision_points_s", default=()))

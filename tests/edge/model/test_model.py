@@ -285,6 +285,6 @@ def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path
     with pytest.raises(InputError) as error:
         Model(path)
     assert str(error.value) == (
-        f"{path} is of format {number}, this edge-classify reads {FORMAT}; export the model again "
-        "with this version"
+        f"{path}: its metadata is of format {number}, this edge-classify reads {FORMAT}; export it "
+        "again"
     )

@@ -1,0 +1,1 @@
+"""edge-classify as a ROS 2 node."""
