@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from edge.files import write_whole
-from tests.hard_cases import elsewhere
+from tests.hard_cases import elsewhere, margins
 from tests.hard_cases.registry import CASES
 
 COLUMNS = (
@@ -24,7 +24,8 @@ COLUMNS = (
     "worst seen",
     "where",
     "the usual stack",
-    "what float64 costs",
+    "margin",
+    "price",
 )
 
 
@@ -64,14 +65,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         beyond += not within
         error, bound, tried = number(worst.error), number(case.bound), f"{worst.tried} tried"
         where = f"{place(worst.at)} ({tried})" if worst.error else f"none of {tried}"
-        usual, cost = case.theirs(), case.cost()
-        rows.append((case.key, case.oracle, case.unit, bound, error, where, usual, cost))
+        usual, far, cost = case.theirs(), margins.margin(case), margins.price(case)
+        rows.append((case.key, case.oracle, case.unit, bound, error, where, usual, far, cost))
         took = time.perf_counter() - began
         print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
         say(f"{case.unit}: worst {error}, bound {bound}; oracle: {case.oracle}")
         say(f"worst at {where}" if worst.error else f"{tried}")
         say(f"usual stack: {usual}")
-        say(cost and f"what float64 costs: {cost}")
+        say(f"margin: {far}")
+        say(cost and f"price: {cost}")
     for missing in elsewhere.missing(arguments.out / "golden"):
         print(f"--   {missing}")
     table = io.StringIO()

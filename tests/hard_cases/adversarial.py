@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import math
 import os
 import sys
 import tempfile
@@ -212,7 +213,8 @@ class Found:
         engines: neighbours or labels that differ between engines, and queries asked of both.
         gap: the smallest part of a distance by which two neighbours in a right, unflagged order
             differ, where they differ at all.
-        missed: the largest such part at which the order came out wrong.
+        missed: the largest difference of two distances that was told wrongly, as a part of the
+            size of the training rows and the query.
         worst: (family, seed) where wrong, then of the smallest gap.
     """
 
@@ -276,7 +278,8 @@ def judged(family: str, seed: int, reference: bool = False) -> Found:
             found.gap = min(found.gap, smallest_gap(squares, hard.choice.k))
         else:
             found.wrong += 1
-            found.missed = max(found.missed, largest_miss(squares, seen, wanted))
+            size = max(int((rows**2).sum(axis=1).max()), int((point**2).sum()))
+            found.missed = max(found.missed, largest_miss(squares, seen, wanted, size))
     if reference:
         other = ReferenceEvaluator(onnx.load_from_string(data))
         numbers, neighbours = other.run(["t_label", "t_neighbours"], {"features": hard.queries})
@@ -306,10 +309,15 @@ def smallest_gap(squares: list[int], k: int) -> float:
     return 0.5 * min(gaps, default=np.inf)
 
 
-def largest_miss(squares: list[int], seen: list[int], wanted: list[int]) -> float:
-    """The largest part of a distance by which a wrong neighbour differs from the right one."""
-    pairs = [(squares[a], squares[b]) for a, b in zip(seen, wanted, strict=True)]
-    return 0.5 * max((ratio(abs(a - b), max(a, b)) for a, b in pairs if a != b), default=0.0)
+def largest_miss(squares: list[int], seen: list[int], wanted: list[int], size: int) -> float:
+    """The largest difference of two distances that was told wrongly, over sqrt(size)."""
+    roots = {i: math.sqrt(ratio(squares[i], size)) for i in (*seen, *wanted)}
+    parts = [
+        ratio(abs(squares[a] - squares[b]), size) / (roots[a] + roots[b])
+        for a, b in zip(seen, wanted, strict=True)
+        if squares[a] != squares[b]
+    ]
+    return max(parts, default=0.0)
 
 
 def ratio(part: int, whole: int) -> float:
@@ -359,7 +367,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         asked, flagged = asked + found.queries, flagged + found.close
         print(
             f"{family:<16} {found.queries:>6} queries  {found.wrong:>4} wrong without a flag "
-            f"(differ by up to {found.missed:.0e})  {found.close:>4} close  "
+            f"(by up to {found.missed:.0e} of the rows' size)  {found.close:>4} close  "
             f"engines differ in {found.engines[0]} of {found.engines[1]}  "
             f"smallest gap told {found.gap:.0e}  {found.refused} sets refused", flush=True,
         )  # fmt: skip

@@ -1,0 +1,291 @@
+"""How far the cliff is: the first value of a case's parameter that fails, found by search, beside
+where recordings lie; and what the guards cost.
+
+`python -m tests.hard_cases.margins FOLDER...` measures where the recordings of folders lie.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from edge.errors import EdgeError
+from edge.touch.features import feature_vector
+from edge.touch.frame import Frame
+from edge.touch.region import largest_region
+from edge.touch.track import ContactTracker, TrackSettings
+from tests.hard_cases.cases import Case
+from tests.hard_cases.frames import FOREARM
+from tests.hard_cases.models import Ours, features, microseconds, plain_graph, session
+from train.dataset import load_trials
+from train.projection import Projection
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Values of one parameter, each harder than the one before.
+
+    Attributes:
+        what: the parameter, in words with its unit.
+        values: from easy to hard.
+        at: the case's parameters for a value.
+        lie: where recordings lie on the same scale, a key of `lies`.
+    """
+
+    what: str
+    values: Sequence[float]
+    at: Callable[[float], Mapping[str, Any]]
+    lie: str = ""
+
+
+def decades(first: float, last: float, each: int = 2) -> list[float]:
+    """Powers of ten from one exponent to another, `each` steps a decade."""
+    count = round(abs(last - first) * each) + 1
+    return [10.0**e for e in np.linspace(first, last, count)]
+
+
+def seeded(name: str, **more: Any) -> Callable[[float], Mapping[str, Any]]:
+    """The value under a name, beside others."""
+    return lambda value: {name: value, **more}
+
+
+LADDERS: dict[str, Ladder] = {
+    "neighbours: near-duplicate rows, spread 1e-7 of the norm": Ladder(
+        "spread over norm", decades(-6, -17), seeded("spread", n=160, seed=0), "gap"
+    ),
+    "neighbours: offset 1e6, deviation 0.01": Ladder(
+        "offset over deviation",
+        decades(6, 17),
+        lambda ratio: {"offset": ratio * 0.01, "sd": 0.01, "seed": 0},
+        "offset",
+    ),
+    "neighbours: scale 1e-24": Ladder(
+        "scale", decades(-20, -150, 1), seeded("scale", n=160, seed=0), "scale"
+    ),
+    "neighbours: scale 1e+20": Ladder(
+        "scale", decades(16, 170, 1), seeded("scale", n=160, seed=0), "scale"
+    ),
+    "neighbours: vote ties with even k": Ladder(
+        "neighbours that vote", [2, 4, 8, 16, 32, 64, 128, 160], seeded("k", seed=0)
+    ),
+    "neighbours: equal distances": Ladder(
+        "training rows", [160, 640, 1400, 2800], seeded("n", seed=0), "rows"
+    ),
+    "neighbours: exact duplicates": Ladder(
+        "training rows", [160, 640, 1400, 2800], seeded("n", seed=0), "rows"
+    ),
+    "neighbours: k as large as the training set": Ladder(
+        "training rows", [60, 120, 480, 1400, 2800], seeded("n"), "rows"
+    ),
+    "neighbours: a query a million times outside the training set's range": Ladder(
+        "distance over range", decades(4, 160, 1), seeded("factor", n=160, seed=0), "far"
+    ),
+    "neighbours: distances": Ladder(
+        "scale", decades(-20, -150, 1), seeded("scale", seed=0), "scale"
+    ),
+    "PCA: singular values over 15 decades": Ladder(
+        "columns of the Hadamard matrix", [2, 4, 8, 12, 16], seeded("count", top=48, seed=0)
+    ),
+    "features: jitter, duplicates and gaps in time": Ladder(
+        "shortest step, s", decades(-3, -16), seeded("shortest", seed=0), "step"
+    ),
+    "features: random frames with dead taxels, to full scale": Ladder(
+        "counts", [255, 4095, 16383, 65535], seeded("peak", density=0.6, seed=0), "counts"
+    ),
+    "features: saturation: full scale in every taxel": Ladder(
+        "counts", [255, 4095, 16383, 65535], seeded("value"), "counts"
+    ),
+    "kinematics: orthonormal over a million steps": Ladder(
+        "radians a step", decades(0, 18, 1), seeded("reach", steps=2000)
+    ),
+    "kinematics: large and tiny angles": Ladder(
+        "radians", decades(0, 300, 0.1), seeded("angle", seed=0)
+    ),
+    "kinematics: joint angles at their limits, wrapped by 2 pi": Ladder(
+        "turns", [10, 10**3, 10**5, 10**7, 10**9], seeded("turns", seed=0)
+    ),
+    "simulator: taxel forces on a bed of 1e15 N/m": Ladder(
+        "N/m", decades(6, 30, 1), seeded("stiff", seed=0)
+    ),
+    "refusals: finite, but beyond any distance": Ladder(
+        "feature", decades(140, 308, 0.25), seeded("size")
+    ),
+    "limits: skins to 256 x 256 at full scale, across the seam": Ladder(
+        "rows and columns", [16, 64, 128, 256, 512], seeded("side", across=True), "taxels"
+    ),
+    "limits: contacts that begin late on the clock": Ladder(
+        "seconds", decades(3, 18, 1), seeded("start"), "clock"
+    ),
+}
+"""By the key of a case."""
+
+
+def search(case: Case, ladder: Ladder) -> tuple[float | None, float | None]:
+    """The last value that holds, and the first that does not; None where there is none."""
+    last = None
+    for value in ladder.values:
+        try:
+            error = case.error(**ladder.at(value))
+        except EdgeError:
+            return last, value  # refused: it goes no further
+        if not error <= case.bound:
+            return last, value
+        last = value
+    return last, None
+
+
+def margin(case: Case) -> str:
+    """The cliff of a case in words, and where recordings lie."""
+    ladder = LADDERS.get(case.key)
+    if ladder is None:
+        return "no parameter to go further with: all of it is tried"
+    with np.errstate(all="ignore"):
+        last, first = search(case, ladder)
+    held = "" if last is None else f"holds to {last:.2g}"
+    cliff = "no failure found" if first is None else f"first failure or refusal at {first:.2g}"
+    there = LIE.get(ladder.lie)
+    lies = f"; recordings lie at {there}" if there else ""
+    return f"{ladder.what}: {held}{', ' if held else ''}{cliff}{lies}"
+
+
+LIE = {
+    "gap": "7e-7 (856 real grasps) and 7e-6 (cody18)",
+    "offset": "3.6 and 1.5",
+    "scale": "0.01 to 920 and 0.03 to 38",
+    "far": "0.5 and 0.2 of the set's size",
+    "counts": "3554 and 20685",
+    "taxels": "13 x 13 and 16 x 24",
+    "clock": "7.3 and 2.6 s, or the time since the board's start",
+    "step": "0.018 and 0.010 s",
+    "rows": "856 and 140",
+}
+"""Where recordings lie: the SDH-2 grasps and the simulated `cody18`, as `main` printed it."""
+
+
+@dataclass
+class Lies:
+    """Where the recordings of a set lie on the scales of the hard cases.
+
+    Attributes:
+        gap: smallest part of the rows' size by which two of the six nearest trials differ.
+        ties: pairs among them that are exactly equally far.
+        offset: largest mean of a column over its deviation.
+        scale: largest and smallest deviation of a column.
+        far: largest distance to the nearest other trial, over the set's size.
+        counts: largest count.
+        taxels: rows and columns.
+        clock: largest time.
+        step: shortest and longest step in time.
+        rows: trials.
+    """
+
+    gap: float = math.inf
+    ties: int = 0
+    offset: float = 0.0
+    scale: tuple[float, float] = (0.0, 0.0)
+    far: float = 0.0
+    counts: int = 0
+    taxels: tuple[int, int] = (0, 0)
+    clock: float = 0.0
+    step: tuple[float, float] = (math.inf, 0.0)
+    rows: int = 0
+
+
+def measured(folder: Path) -> Lies:
+    """Where a folder of recordings lies: leave-one-out in 20 components of scaling III."""
+    data = load_trials(sorted(folder.glob("*.npz")), progress=False)
+    X = data.features()
+    out = Lies(rows=len(X))
+    spread = X.std(axis=0)
+    moving = spread > 0.0
+    out.offset = float((np.abs(X.mean(axis=0))[moving] / spread[moving]).max())
+    out.scale = float(spread.max()), float(spread[moving].min())
+    z = Projection("III", 20).fit(X).transform(X)
+    size = float(np.sqrt((z**2).sum(axis=1)).max())
+    for i, point in enumerate(z):
+        near = np.sort(np.sqrt(((np.delete(z, i, axis=0) - point) ** 2).sum(axis=1)))[:6]
+        gaps = np.diff(near) / size
+        out.ties += int((gaps == 0.0).sum())
+        out.gap = min(out.gap, float(gaps[gaps > 0.0].min()))
+        out.far = max(out.far, float(near[0]) / size)
+    for trial in data.trials:
+        recording = trial.recording
+        steps = np.diff(recording.t)
+        out.counts = max(out.counts, int(recording.frames.max()))
+        out.taxels = recording.frames.shape[1], recording.frames.shape[2]
+        out.clock = max(out.clock, float(np.abs(recording.t).max()))
+        steps = steps[steps > 0.0]
+        out.step = min(out.step[0], float(steps.min())), max(out.step[1], float(steps.max()))
+    return out
+
+
+@cache
+def prices() -> Mapping[str, str]:
+    """What the guards of each group of cases cost."""
+    ours = Ours(features(160))
+    x = features(1, 1)
+    whole, bare = session(ours.data), session(plain_graph(ours, np.float64))
+    single = session(plain_graph(ours))
+    counts = np.zeros((16, 24), np.uint16)
+    counts[4:12, 20:24] = counts[4:12, 0:4] = 65535
+    tracker = ContactTracker(FOREARM, TrackSettings(debounce=1))
+    contact = [c for i in range(4) for c in tracker.push(Frame(0.01 * i, counts))][-1]
+    series = contact.series()
+    graph, plain, narrow, region, vector, finite = microseconds(
+        [
+            lambda: whole.run(["t_label", "t_neighbours"], {"features": x}),
+            lambda: bare.run(["rows"], {"x": x}),
+            lambda: single.run(["rows"], {"x": x.astype(np.float32)}),
+            lambda: largest_region(counts, 50),
+            lambda: feature_vector(series, 0.03),
+            lambda: np.isfinite(x).all(),
+        ],
+        200,
+    )
+    kilobytes = (len(ours.data) - len(plain_graph(ours))) / 1024
+    decision = (
+        f"{graph - plain:.0f} us of {graph:.0f} a decision against neighbours alone in float64 "
+        f"({graph - narrow:.0f} against float32), {kilobytes:.1f} kB of model file (160 rows)"
+    )
+    fit = "0 us and 0 bytes on the board: it is paid when the model is fitted"
+    touch = f"within {region:.0f} us a frame for the region and its whole-number sums, 0 bytes"
+    return {
+        "neighbours": decision,
+        "everywhere": decision,
+        "scaling": fit,
+        "PCA": fit,
+        "simulator": "0 us and 0 bytes on the board: it is paid when trials are simulated",
+        "features": f"{touch}; {vector:.0f} us a feature vector",
+        "limits": touch,
+        "kinematics": "within the pose of a frame (make bench: pose), 0 bytes",
+        "refusals": f"{finite:.1f} us a vector at the edge, and the graph's own guard within it",
+        "early stopping": "0 us where no decision point is asked for",
+    }
+
+
+def price(case: Case) -> str:
+    """What the guard of a case costs: its own figure where it has one, else its group's."""
+    return case.cost() or prices().get(case.group, "")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print where the recordings of each folder lie."""
+    parser = argparse.ArgumentParser(prog="margins", description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="+")
+    for folder in parser.parse_args(argv).folder:
+        print(f"{folder.name}:")
+        for name, value in vars(measured(folder)).items():
+            print(f"  {name:<8} {value}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
