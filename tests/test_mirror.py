@@ -40,6 +40,8 @@ TOPICS = {
 """Test files that specify several modules together."""
 
 THROUGH = {
+    "train/study": "train/study/test_study_report.py",
+    "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "edge/commands/source.py": "edge/commands/test_live_commands.py",
     "edge/commands/summary.py": "edge/commands/test_replay_verify.py",
     "edge/config.py": "edge/skin/test_file.py",
@@ -53,13 +55,8 @@ THROUGH = {
     "train/simulate/reader.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/scene_model.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/sensor_frames.py": "train/simulate/test_simulate_run.py",
-    "train/study/classify.py": "train/study/test_study_report.py",
-    "train/study/honest.py": "train/study/test_study_report.py",
-    "train/study/run.py": "train/study/test_study_report.py",
-    "train/tradeoff/plots.py": "train/tradeoff/test_tradeoff.py",
-    "train/tradeoff/sections.py": "train/tradeoff/test_tradeoff.py",
 }
-"""{module: the test file that specifies it through what it is a part of}."""
+"""{module, or a report's folder of sections: the test file that specifies it as a part of more}."""
 
 MODULES = [
     path.relative_to(ROOT)
@@ -78,7 +75,7 @@ def specified(module: Path) -> bool:
     """Whether a test file has the module's name, imports it, or runs it as a command."""
     if (module.parent / f"test_{module.name}").as_posix() in TESTS:
         return True
-    if THROUGH.get(module.as_posix()) in TESTS:
+    if {THROUGH.get(part.as_posix()) for part in (module, module.parent)} & set(TESTS):
         return True
     package, name = ".".join(module.parent.parts), module.stem
     imported = rf"(from|import) {package}\.{name}\b|from {package} import .*\b{name}\b"
