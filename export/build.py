@@ -10,6 +10,8 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
+from train.projection import Grid
+
 OPSET = 18
 
 
@@ -104,8 +106,7 @@ class Affine(Protocol):
 
     mean_: NDArray[np.float64]
     gain_: NDArray[np.float64]
-    high_: Any
-    low_: Any
+    grid_: Grid
     weights_: NDArray[np.float64]
 
 
@@ -115,8 +116,8 @@ def project(build: Builder, x: str, decision_points: Sequence[Affine]) -> str:
     if not all((p.gain_ == 1.0).all() for p in decision_points):
         d = build.node("Mul", [d, build.by_decision_point([p.gain_ for p in decision_points])])
     grids = [
-        build.by_decision_point([p.high_ for p in decision_points]),
-        build.by_decision_point([p.low_ for p in decision_points]),
+        build.by_decision_point([p.grid_.high for p in decision_points]),
+        build.by_decision_point([p.grid_.low for p in decision_points]),
     ]
     halves = []
     for step in grids:

@@ -42,9 +42,16 @@ def _gaps(build: Builder, z: str, rows: Sequence[NDArray[np.float64]]) -> str:
     return build.node("Sub", [columns, build.node("Unsqueeze", [z, build.ints(2)])])
 
 
-def _squares(build: Builder, gaps: str) -> str:
-    """Squared distances (n, rows) of the differences (n, c, rows)."""
-    return build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)
+def _running(build: Builder, gaps: str, axis: int) -> str:
+    """`train.distance.running_squares` of differences, along the axis of their components."""
+    return build.node("CumSum", [build.node("Mul", [gaps, gaps]), build.constant(axis, np.int64)])
+
+
+def _by_first(build: Builder, running: str, components: int, axis: int) -> str:
+    """Squared distances by so many components; 0 by none."""
+    if components == 0:
+        return build.node("ReduceSum", [running, build.ints(axis)], keepdims=0)
+    return build.node("Gather", [running, build.constant(components - 1, np.int64)], axis=axis)
 
 
 def _nearest(
@@ -105,7 +112,7 @@ def _shortlisted(
     ordered, _ = build.nodes("TopK", [picked, ints(count)], ["", ""], largest=0, sorted=1)
     near = build.node("Gather", [build.by_decision_point(rows), ordered], axis=0)
     gaps = build.node("Sub", [near, build.node("Unsqueeze", [z, ints(1)])])
-    squares = build.node("ReduceSumSquare", [gaps, ints(2)], keepdims=0)
+    squares = _by_first(build, _running(build, gaps, 2), c, 2)
     short, places = build.nodes("TopK", [squares, ints(k)], ["", ""], largest=0, sorted=1)
     found = build.node("GatherElements", [ordered, places], axis=1)
     kth = build.node("Slice", [short, ints(k - 1), ints(k), ints(1)])
@@ -124,7 +131,11 @@ def _shortlisted(
     kinds = {"squares": (TensorProto.DOUBLE, 2), "rows": (TensorProto.INT64, 2)}
     then = build.branch("shortlisted", kinds, lambda: [short, found])
     other = build.branch(
-        "measured", kinds, lambda: _nearest(build, _squares(build, _gaps(build, z, rows)), k)
+        "measured",
+        kinds,
+        lambda: _nearest(
+            build, _by_first(build, _running(build, _gaps(build, z, rows), 1), c, 1), k
+        ),
     )
     near_squares, near_rows = build.nodes(
         "If",
@@ -212,7 +223,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     }
     tasks = {task: names[f"{task}_label"].removesuffix("_label") for task in model.choices}
     near: dict[tuple[Space, int], list[str]] = {}
-    gaps: dict[Space, str] = {}
+    running: dict[Space, str] = {}
     all_squares: dict[tuple[Space, int], str] = {}
     early = isinstance(model, SequentialClassifier)
     for (space, components), most in groups.items():
@@ -225,9 +236,9 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
             z = _first(build, points[space], have, components)
             found = _shortlisted(build, z, [r[:, :components] for r in rows], k, outputs)
         else:
-            if space not in gaps:
-                gaps[space] = _gaps(build, points[space], rows)
-            measured = _squares(build, _first(build, gaps[space], have, components))
+            if space not in running:
+                running[space] = _running(build, _gaps(build, points[space], rows), 1)
+            measured = _by_first(build, running[space], components, 1)
             all_squares[space, components] = measured
             found = _nearest(build, measured, k, outputs)
         near[space, components] = found

@@ -19,8 +19,9 @@ from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
+from train.distance import running_squares
 from train.pipeline import Choice
-from train.projection import SCALINGS, Spectrum, gains_of
+from train.projection import SCALINGS, Grid, Spectrum, gains_of, on_grid
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -36,12 +37,11 @@ def split_neighbours(
     max_components: int,
     max_k: int,
     features: Sequence[str] = FEATURES,
-    first: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Neighbours of some trials among others, for each number of components.
 
-    A product's rounding hangs on a row's place in the matrix, so equal trials are given the
-    coordinates of the first of them: they are then equally far, and at 0 from each other.
+    Coordinates and distances are those of a `Projection` and of the exported graph, to the bit:
+    equal trials are equally far, and at 0 from each other.
 
     Args:
         X: (n, features * samples).
@@ -51,7 +51,6 @@ def split_neighbours(
         max_components: components tried, from 1.
         max_k: neighbours wanted, at most m.
         features: names of the feature types, in the order of X.
-        first: (n,) `first_equal(X)`, where it is at hand.
 
     Returns:
         (t, max_components, max_k) rows of X, nearest first, equal distances in the order of the
@@ -60,13 +59,13 @@ def split_neighbours(
     known = X[train]
     scaled = (X - known.mean(axis=0)) * gains_of(known, scaling, features)
     axes = Spectrum(scaled[train]).leading(max_components)
-    z = (scaled @ axes.T)[first_equal(X) if first is None else first]
+    exact = Grid(np.abs(scaled[train]).max(initial=0.0))
+    z = exact.project(scaled, on_grid(axes.T))
     places, queries = z[train], z[test]
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
     used = len(axes)
     for near, query in zip(rows, queries, strict=True):
-        gaps = (places - query).T  # (components, m)
-        order = _nearest(np.cumsum(gaps * gaps, axis=0), max_k)
+        order = _nearest(running_squares(places, query), max_k)
         near[:used] = train[order]
         near[used:] = train[order[-1]] if used else train[:max_k]
     return rows
@@ -99,11 +98,10 @@ def fold_neighbours(
     max_components: int,
     max_k: int,
     features: Sequence[str] = FEATURES,
-    first: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """(max_components, max_k) `split_neighbours` of one trial among all others."""
     train = np.delete(np.arange(len(X)), test)
-    form = scaling, max_components, max_k, features, first
+    form = scaling, max_components, max_k, features
     found: NDArray[np.int64] = split_neighbours(X, train, np.array([test]), *form)[0]
     return found
 
@@ -174,11 +172,10 @@ def _chunk(
     k: int,
     features: Sequence[str],
 ) -> NDArray[np.int64]:
-    first = first_equal(X)
     # Matrices this small only lose by several threads; processes share the work instead.
     with threadpool_limits(1):
         return np.stack(
-            [fold_neighbours(X, int(i), scaling, components, k, features, first) for i in tests]
+            [fold_neighbours(X, int(i), scaling, components, k, features) for i in tests]
         )
 
 

@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
+from train.distance import squared_distances
 from train.projection import Projection
 
 
@@ -65,7 +66,7 @@ class NearestNeighbours(ClassifierMixin, BaseEstimator):
         distances = np.empty((len(X), self.k))
         rows = np.empty((len(X), self.k), dtype=np.int64)
         for i, x in enumerate(np.asarray(X, dtype=np.float64)):
-            squares = ((self.rows_ - x) ** 2).sum(axis=1)
+            squares = squared_distances(self.rows_, x)
             rows[i] = np.argsort(squares, kind="stable")[: self.k]
             distances[i] = np.sqrt(squares[rows[i]])
         return distances, rows
@@ -193,7 +194,7 @@ class ContactClassifier:
         """(m, n) squared distances of vectors (m, p) to all training trials, taken directly."""
         space, c = self.spaces_[task], self.components_[task]
         rows = self.rows_[space][:, :c]
-        return np.stack([((rows - z) ** 2).sum(axis=1) for z in self.project(space, X)[:, :c]])
+        return np.stack([squared_distances(rows, z) for z in self.project(space, X)[:, :c]])
 
     def predict(self, X: NDArray[np.float64]) -> dict[str, NDArray[np.str_]]:
         """{task: (m,) labels} for vectors (m, p)."""

@@ -269,6 +269,27 @@ def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.ascontiguousarray(np.ldexp(np.rint(np.ldexp(weights, powers)), -powers))
 
 
+class Grid:
+    """Differences from a mean, split so that their products with weights add up exactly.
+
+    Adding and subtracting `high`, then `low`, rounds to the grid of that half.
+
+    Args:
+        largest: of the training set's differences, in absolute value.
+    """
+
+    def __init__(self, largest: float) -> None:
+        exponent = int(np.ceil(np.log2(RANGE * largest))) if largest > 0.0 else 0
+        self.high = 1.5 * 2.0 ** (52 + exponent - HALF_BITS)
+        self.low = 1.5 * 2.0 ** (52 + exponent - 2 * HALF_BITS)
+
+    def project(self, d: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates (n, c) of differences (n, p) by weights (p, c) of `on_grid`."""
+        high = (d + self.high) - self.high
+        low = ((d - high) + self.low) - self.low
+        return np.asarray(high @ weights + low @ weights)
+
+
 class Projection(TransformerMixin, BaseEstimator):
     """Features to a few coordinates, the same bits on every machine.
 
@@ -294,7 +315,7 @@ class Projection(TransformerMixin, BaseEstimator):
     Attributes:
         mean_: (p,) subtracted first.
         gain_: (p,) multiplied next.
-        high_, low_: adding and subtracting it rounds to the grid of that half.
+        grid_: what the differences are split by.
         weights_: (p, c).
         rank_: how many coordinates there could be.
         gap_: smallest relative gap of squared singular values at any cut up to c; 1 of `lda`.
@@ -341,9 +362,7 @@ class Projection(TransformerMixin, BaseEstimator):
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
-        exponent = int(np.ceil(np.log2(RANGE * largest))) if largest > 0.0 else 0
-        self.high_ = 1.5 * 2.0 ** (52 + exponent - HALF_BITS)
-        self.low_ = 1.5 * 2.0 ** (52 + exponent - 2 * HALF_BITS)
+        self.grid_ = Grid(largest)
         return self
 
     def _axes(
@@ -369,6 +388,4 @@ class Projection(TransformerMixin, BaseEstimator):
         """Coordinates (n, c) of vectors (n, p)."""
         check_is_fitted(self)
         d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
-        high = (d + self.high_) - self.high_
-        low = ((d - high) + self.low_) - self.low_
-        return np.asarray(high @ self.weights_ + low @ self.weights_)
+        return self.grid_.project(d, self.weights_)

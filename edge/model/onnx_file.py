@@ -18,6 +18,7 @@ OPERATORS = frozenset(
         "ArgMax",
         "Cast",
         "Concat",
+        "CumSum",
         "Div",
         "Gather",
         "GatherElements",

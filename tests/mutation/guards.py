@@ -92,14 +92,14 @@ GUARDS = (
     ),
     Guard(
         "a projection is exact: high half",
-        f"{PROJECTION}:transform",
-        "high = (d + self.high_) - self.high_",
+        f"{PROJECTION}:project",
+        "high = (d + self.high) - self.high",
         "high = 0.5 * d",
     ),
     Guard(
         "a projection is exact: low half",
-        f"{PROJECTION}:transform",
-        "low = ((d - high) + self.low_) - self.low_",
+        f"{PROJECTION}:project",
+        "low = ((d - high) + self.low) - self.low",
         "low = d - high",
         beside=GRAPH,
     ),
@@ -137,10 +137,10 @@ GUARDS = (
     ),
     Guard(
         "the graph measures distances directly",
-        f"{GRAPH}:_nearest",
-        'build.node("ReduceSumSquare", [gaps, build.ints(1)], keepdims=0)',
-        'build.node("ReduceSumSquare", [build.node("Cast", [build.node("Cast", [gaps], '
-        "to=TensorProto.FLOAT)], to=TensorProto.DOUBLE), build.ints(1)], keepdims=0)",
+        f"{GRAPH}:_running",
+        'build.node("Mul", [gaps, gaps])',
+        'build.node("Cast", [build.node("Cast", [build.node("Mul", [gaps, gaps])], '
+        "to=TensorProto.FLOAT)], to=TensorProto.DOUBLE)",
         "distances or near-duplicate",
     ),
     Guard(
@@ -202,7 +202,7 @@ GUARDS = (
     Guard(
         "leave-one-out: equal trials are equally far",
         f"{CROSSVAL}:split_neighbours",
-        "z = (scaled @ axes.T)[first_equal(X) if first is None else first]",
+        "z = exact.project(scaled, on_grid(axes.T))",
         "z = scaled @ axes.T",
     ),
     Guard(

@@ -110,8 +110,8 @@ def test_a_projection_is_exact_in_any_order(seed, scaling, offset, spread):
     projection = Projection(scaling, 4).fit(X)
     z = projection.transform(X)
     d = (X - projection.mean_) * projection.gain_
-    high = (d + projection.high_) - projection.high_
-    low = ((d - high) + projection.low_) - projection.low_
+    high = (d + projection.grid_.high) - projection.grid_.high
+    low = ((d - high) + projection.grid_.low) - projection.grid_.low
     for i in range(0, len(X), 7):
         for j in range(4):
             w = [Fraction(v) for v in projection.weights_[:, j].tolist()]

@@ -13,7 +13,6 @@ from train.crossval import (
     MAX_COMPONENTS,
     MAX_K,
     accuracies,
-    first_equal,
     neighbours,
     split_neighbours,
 )
@@ -77,7 +76,6 @@ def transfer(
     """
     n = len(X)
     both = np.concatenate([X, changed])
-    first = first_equal(both)
     k = min(MAX_K, n - 1)
     with threadpool_limits(1):
         rows = np.concatenate(
@@ -90,7 +88,6 @@ def transfer(
                     MAX_COMPONENTS,
                     k,
                     features,
-                    first,
                 )
                 for i in range(n)
             ]
