@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants fuzz bench faults soak clean
+  board-test hard-cases hard-cases-versions mutants fuzz bench docs faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types and tests"
@@ -23,6 +23,7 @@ help:
 	@echo "make board-test   tests the wheel on an emulated aarch64 and counts its instructions"
 	@echo "make demo-data    renews the model and the touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
+	@echo "make docs     the documentation as a site: build/site/index.html"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
@@ -128,6 +129,14 @@ endif
 	$(BIN)/python -m export.prices --data $(RECORDINGS) --out $(OUT)/tradeoff/prices.json
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
 	  --prices $(OUT)/tradeoff/prices.json --out $(OUT)/tradeoff $(TRADEOFF)
+
+# The site, with the reference from the docstrings; every link must lead somewhere.
+$(VENV)/.docs: $(READY)
+	$(PIP) --group docs
+	@touch $@
+
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
 
 faults: $(READY)
 	$(BIN)/python -m bench.faults

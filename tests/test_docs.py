@@ -1,0 +1,79 @@
+"""docs/: the tutorial and the notebook run as they are written, and links lead somewhere."""
+
+import json
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from edge import cli
+from edge.i2c import block
+from edge.model.model import FORMAT
+from export.__main__ import main as export
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
+
+
+def commands():
+    """The tutorial's lines of shell, but for the first block, which makes the environment."""
+    blocks = re.findall(r"```sh\n(.*?)```", (DOCS / "tutorial.md").read_text(), re.S)
+    return [line for lines in blocks[1:] for line in lines.splitlines()]
+
+
+def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    ran = []
+    for line in commands():
+        words = shlex.split(line, comments=True)
+        if words[0] == "cp":
+            shutil.copy(ROOT / words[1], words[2])
+            continue
+        run = cli.main if words[0] == "edge-classify" else export
+        given = words[1:] if words[0] == "edge-classify" else [*words[3:], "--jobs", "1"]
+        assert run(given) == 0, (line, capsys.readouterr().err)
+        ran.append(words[1])
+    assert ran == ["check", "fake", "calibrate", "record", "-m", "info", "verify", "run", "replay"]
+    said = [json.loads(x) for x in capsys.readouterr().out.splitlines() if x.startswith("{")]
+    assert {e["label"] for e in said if e.get("task") == "object"} >= {"pillow", "foam block"}
+
+
+def test_the_notebook_runs(tmp_path):
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    notebook = nbformat.read(DOCS / "first-touch.ipynb", as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells)
+    nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": ROOT}}).execute()
+    (printed,) = (o.text for cell in notebook.cells for o in cell.get("outputs", ())
+                  if o.output_type == "stream")  # fmt: skip
+    assert "label='soft-fixed'" in printed
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_page_is_on_the_site_and_its_links_lead_somewhere(page):
+    assert f": {page.name}" in (ROOT / "mkdocs.yml").read_text()
+    for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text()):
+        assert link.startswith("https://") or (DOCS / link).exists(), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_path_that_a_page_names_is_there(page):
+    prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
+    for named in re.findall(r"`((?:edge|train|examples|tests|board)/[\w./-]+)`", prose):
+        assert (ROOT / named).exists(), named
+
+
+def test_the_table_of_formats_ends_with_the_one_that_is_written():
+    rows = re.findall(r"^\| ([\d, ]+) \| .*versions? ?|^\| ([\d, ]+) \|", (DOCS / "formats.md")
+                      .read_text(), re.M)  # fmt: skip
+    numbers = [int(n) for row in rows for part in row if part for n in part.split(",")]
+    assert numbers == list(range(1, FORMAT + 1))
+
+
+def test_the_block_protocol_is_described_as_it_is():
+    text = (DOCS / "block-protocol.md").read_text()
+    assert f"`{block.crc16(b'123456789'):#06x}`".replace("0x29b1", "0x29B1") in text
+    assert f"at most {block.MOST_TAXELS} taxels" in text
+    assert block.pack(__import__("numpy").array([0xABC, 0xDEF], "u2"), 12).hex(" ").upper() in text
