@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import io
 import logging
 import os
 import sys
@@ -130,6 +131,24 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
         return 130
 
 
+def _complete_stdio() -> None:
+    """Give the program the standard streams that it was started without.
+
+    The next file to be opened would take the descriptor of one that is closed, and be written to.
+    What an encoding does not have is written as an escape.
+    """
+    for name, descriptor in (("stdin", 0), ("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != descriptor:
+                os.dup2(null, descriptor)
+                os.close(null)
+            setattr(sys, name, open(descriptor, "r" if descriptor == 0 else "w", closefd=False))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def _discard_output() -> None:
     """Redirect stdout, so that flushing its buffer at exit cannot fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -137,6 +156,7 @@ def _discard_output() -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns 0 if all is well, 1 if a check failed, 2 for bad usage or input."""
+    _complete_stdio()
     words = list(sys.argv[1:] if argv is None else argv)
     wanted = [word for word in words[:1] if word in COMMANDS]
     top = parser(wanted or COMMANDS)

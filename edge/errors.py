@@ -1,26 +1,30 @@
-"""The base of all errors, and the errors that a user can correct."""
+"""Errors a user can mend, and text that is safe to show."""
+
+
+def printable(text: str) -> str:
+    """Text for a terminal or a line of a log: what does not print stands as Python writes it.
+
+    That holds for line breaks, escape sequences, controls that turn the direction of writing,
+    and lone surrogates, which no encoding has.
+
+    >>> printable("box\\x1b[2J")
+    'box\\\\x1b[2J'
+    """
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 class EdgeError(Exception):
-    """The base of the errors that edge-classify raises; its text is one sentence for a person.
+    """Whatever edge-classify reports on purpose; its text is one sentence for a person.
 
-    The text stays on one line whatever a file contributes to it: characters that cannot be
-    printed are escaped as in Python, a line break as `\\n`.
-
-    >>> import edge
-    >>> try:
-    ...     edge.Chain([]).pose([0.0])
-    ... except edge.EdgeError as error:
-    ...     print(error)
-    the arm base to tip takes 0 joint angles (), not 1
+    What a file brings into the sentence, a name with a line break say, cannot break the line.
     """
 
     def __str__(self) -> str:
-        text = super().__str__()
-        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        return printable(super().__str__())
 
 
 class InputError(EdgeError, ValueError):
+<<<<<<< HEAD
     """A file, option or value that cannot be used; the sentence names it and the remedy.
 
     >>> import edge
@@ -30,3 +34,6 @@ class InputError(EdgeError, ValueError):
     ...     print(error)
     touch.npz: cannot be read: No such file or directory
     """
+=======
+    """A file, an option or a value that cannot be used; the sentence names it and the mend."""
+>>>>>>> d1a3388 (Sinks never stop decisions: lines leave by bounded writers, counted where lost; the map is a log of decisions; one encoder for all that leaves)

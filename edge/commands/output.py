@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping
 from typing import Any
+
+from edge.errors import printable
+from edge.runtime.event_writer import json_line
 
 BAR = 10
 """Characters of a bar that shows a share."""
@@ -30,8 +32,14 @@ class Output:
             line: the event.
             text: the same for a person; `event_text` says it where None.
         """
-        said = json.dumps(line, ensure_ascii=False) if self.as_json else text
-        print(event_text(line) if said is None else said, flush=True)
+        print(self.line(line, text), flush=True)
+
+    def line(self, line: Mapping[str, Any], text: str | None = None) -> str:
+        """What `event` writes, without its end; nothing in it but its line breaks is a control."""
+        if self.as_json:
+            return json_line(line)
+        lines = (event_text(line) if text is None else text).split("\n")
+        return "\n".join(map(printable, lines))
 
     def text(self, text: str) -> None:
         """Write what no program needs, a picture or a table, without disturbing JSON lines."""
@@ -70,7 +78,7 @@ def event_text(line: Mapping[str, Any]) -> str:
         period = line["period_ms"]
         kept = f", period {period['p50']:g} ms (p99 {period['p99']:g})" if period else ""
         return f"{line['frames']} frames{kept}, {line['missed_ticks']} missed"
-    return "no contact" if kind == "no_contact" else json.dumps(line, ensure_ascii=False)
+    return "no contact" if kind == "no_contact" else json_line(line)
 
 
 def decision_text(line: Mapping[str, Any], which: str = "") -> str:

@@ -16,7 +16,7 @@ from edge.commands.source import check_joints, open_joints, open_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
 from edge.runtime.systemd import Notifier
-from edge.runtime.touch_map import MapFile
+from edge.runtime.touch_map import events_on_map, map_writer
 from edge.skin.loop import Loop, Schedule, stop_on
 from edge.skin.skin import ChipStatus
 from edge.touch.track import MAX_CONTACTS
@@ -70,8 +70,8 @@ def chip_event(status: ChipStatus, t: float) -> dict[str, Any]:
     return {**event, "error": status.error} if status.error else event
 
 
-def end_event(schedule: Schedule, frames: int) -> dict[str, Any]:
-    """How well the loop kept its period, as an event."""
+def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
+    """How well the loop kept its period, and the lines that were lost on the way, as an event."""
     return {
         "event": "end",
         "frames": frames,
@@ -81,6 +81,7 @@ def end_event(schedule: Schedule, frames: int) -> dict[str, Any]:
         }
         if schedule.periods.n
         else {},
+        **({"lost": lost} if lost else {}),
     }
 
 
@@ -90,10 +91,18 @@ def run(arguments: argparse.Namespace) -> int:
     check_error(model, arguments.error)
     chain, dof = model.info.chain, model.info.dof
     with ExitStack() as stack:
-        stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
         notifier = stack.enter_context(Notifier(now=time.monotonic))
-        lines = stack.enter_context(Lines(Output.of(arguments).event, arguments.udp))
         opened = stack.enter_context(open_skin(arguments, model=model, arm=chain))
+        # Until here a signal ends the program at once: there is nothing to lose yet.
+        stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
+        virtual = opened.playback is not None and not arguments.real_time
+        lines = stack.enter_context(
+            Lines(
+                udp=arguments.udp,
+                form=Output.of(arguments).line,
+                patient=lambda: virtual and not stop.asked,
+            )
+        )
         on_skin = arguments.without_joints == "skin"
         if not on_skin:
             check_joints(model, arguments, opened)
@@ -106,9 +115,9 @@ def run(arguments: argparse.Namespace) -> int:
             max_contacts=1 if arguments.map is None else MAX_CONTACTS,
             motion_on_skin=on_skin,
         )
-        touch_map = None
-        if arguments.map is not None:
-            touch_map = stack.enter_context(MapFile(arguments.map, model.info))
+        touch_map = None if arguments.map is None else map_writer(arguments.map, model.info)
+        if touch_map is not None:
+            lines.add(touch_map)
         loop = Loop(
             skin,
             joints=joints if dof is not None else None,
@@ -118,8 +127,11 @@ def run(arguments: argparse.Namespace) -> int:
 
         def emit(events: list[dict[str, Any]]) -> None:
             lines.write(events)
-            if touch_map is not None and events:
-                touch_map.write(events)
+            if touch_map is not None:
+                for line in events_on_map(events):
+                    touch_map.put(line)
+            if lines.unheard:
+                stop.asked = True
 
         notifier.ready(f"reading {opened.source}")
         frames = 0
@@ -130,7 +142,5 @@ def run(arguments: argparse.Namespace) -> int:
             emit([event.to_dict() for event in classifier.push(frame)])
         notifier.stopping()
         emit([event.to_dict() for event in classifier.finish()])
-        emit([end_event(loop.schedule, frames)])
-        if lines.lost:
-            LOG.warning("%d lines could not be sent to %s", lines.lost, arguments.udp)
+        emit([end_event(loop.schedule, frames, lines.lost)])
     return 0

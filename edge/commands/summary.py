@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from edge.classifier import AS_TRAINED
+from edge.errors import printable
 from edge.model.model import Task
 
 NONE = "(none)"
@@ -31,12 +32,12 @@ class Summary:
         as_trained = False
         for event in events:
             if event["event"] == "decision":
-                first.setdefault(event["task"], event["label"] or NONE)
+                first.setdefault(event["task"], printable(event["label"] or NONE))
                 as_trained |= AS_TRAINED in event["flags"]
         self.as_trained += as_trained
         for task in self._tasks:
             if task in labels:
-                self._pairs[task][labels[task], first.get(task, NONE)] += 1
+                self._pairs[task][printable(labels[task]), first.get(task, NONE)] += 1
 
     def accuracy(self, task: str) -> tuple[int, int]:
         """(right, labelled) recordings of a task."""
@@ -55,11 +56,11 @@ class Summary:
         for task in self._tasks:
             right, total = self.accuracy(task)
             if total == 0:
-                parts.append(f"{task}: no recording has a label")
+                parts.append(f"{printable(task)}: no recording has a label")
                 continue
             low, high = wilson(right, total)
             parts.append(
-                f"{task}: {right} of {total} right, {right / total:.2%} "
+                f"{printable(task)}: {right} of {total} right, {right / total:.2%} "
                 f"(95 % interval {low:.1%} to {high:.1%})\n" + self._matrix(task)
             )
         return "\n\n".join(parts)

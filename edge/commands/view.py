@@ -16,7 +16,7 @@ from edge.classifier import Classifier
 from edge.commands import terminal
 from edge.commands.options import add_joints, add_skin
 from edge.commands.source import check_joints, open_joints, open_skin
-from edge.errors import InputError
+from edge.errors import InputError, printable
 from edge.events import Decided, Onset
 from edge.model.model import Model
 from edge.skin.loop import Loop, Stop, stop_on
@@ -57,7 +57,7 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[st
     scale = layout.counts_per_newton
     full = FULL_FACTOR * max(threshold, 1) if scale is None else round(FULL_NEWTONS * scale)
     colour = terminal.colours(frame, regions, threshold, full)
-    said = [f"{task}: {text}" for task, text in decisions.items()]
+    said = [f"{printable(task)}: {text}" for task, text in decisions.items()]
     columns = shutil.get_terminal_size().columns
     wide = 2 if 2 * layout.cols <= columns else 1
     return [
@@ -93,7 +93,7 @@ def quit_on_q(stop: Stop) -> Iterator[Callable[[], None]]:
 
 def spoken(event: Decided) -> str:
     """A decision as text."""
-    text = f"{event.label} ({event.confidence:.0%})"
+    text = f"{printable(str(event.label))} ({event.confidence:.0%})"
     return f"{text} [{', '.join(event.flags)}]" if event.flags else text
 
 
@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
     chain = None if model is None else model.info.chain
     dof = None if model is None else model.info.dof
     with (
-        stop_on(signal.SIGINT) as stop,
+        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
         open_skin(arguments, paced=sys.stdout.isatty(), arm=chain) as opened,
     ):
         if model is not None:

@@ -20,6 +20,8 @@ from edge.touch.frame import Frame
 
 COLLECT_TICKS = 100
 COLLECT_SLACK_S = 0.001
+STOP_S = 0.05
+"""A loop that waits longer than this for its tick asks in between whether to end."""
 
 
 class JointSource(Protocol):
@@ -67,6 +69,13 @@ class Periods:
         return self.longest
 
 
+@dataclass
+class Stop:
+    """Whether someone has asked the loop to end."""
+
+    asked: bool = False
+
+
 class Schedule:
     """Ticks at start + k * period: one that comes late does not move the next ones.
 
@@ -84,8 +93,12 @@ class Schedule:
         self.periods = Periods()
         self._last = math.nan
 
-    def wait(self) -> float:
-        """Wait for the next tick; returns its time as it should be, in seconds."""
+    def wait(self, stop: Stop | None = None) -> float:
+        """Wait for the next tick, or until `stop` is asked for.
+
+        Returns:
+            The tick's time as it should be, in seconds.
+        """
         now = self.clock.now()
         if self.tick < 0:
             self.start, self._last = now, math.nan
@@ -98,7 +111,11 @@ class Schedule:
             due = self.start + self.tick * self.period_s
         elif self.tick % COLLECT_TICKS == 0 and due - now > COLLECT_SLACK_S and not gc.isenabled():
             gc.collect(1)
-        self.clock.sleep_until(due)
+        while stop is not None and not stop.asked and due - now > STOP_S:
+            now += STOP_S
+            self.clock.sleep_until(now)
+        if stop is None or not stop.asked:
+            self.clock.sleep_until(due)
         began = self.clock.now()
         self.late_s = began - due
         if not math.isnan(self._last):
@@ -123,13 +140,6 @@ def garbage_aside() -> Iterator[None]:
         gc.unfreeze()
         if was:
             gc.enable()
-
-
-@dataclass
-class Stop:
-    """Whether someone has asked the loop to end."""
-
-    asked: bool = False
 
 
 @contextmanager
@@ -185,7 +195,7 @@ class Loop:
         """Read until the time is over or someone asks to stop."""
         with garbage_aside():
             while not self._stop.asked:
-                due = self.schedule.wait()
+                due = self.schedule.wait(self._stop)
                 # A thousandth of a tick: a time that is meant to be the end is the end.
                 if due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s:
                     return

@@ -12,6 +12,7 @@ import pytest
 
 from edge import __version__, cli
 from edge.errors import InputError
+from edge.skin import file as skinfile
 
 ROOT = Path(__file__).parents[2]
 
@@ -140,3 +141,14 @@ def test_only_the_command_that_is_asked_for_is_loaded():
     ).stdout.split()
     assert "edge.commands.check" in said
     assert not {"edge.commands.run", "edge.commands.replay", "edge.commands.bench"} & set(said)
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_path):
+    """Nor does a file that is opened later take its descriptor, and get what is printed."""
+    log = tmp_path / "log"
+    command = f"{sys.executable} -m edge.cli check {skinfile.shipped()} {closed}"
+    redirected = f"({command}) > {log}.out 2> {log}.err; echo $? > {log}.status"
+    subprocess.run(["sh", "-c", redirected], cwd=ROOT, timeout=60)
+    assert Path(f"{log}.status").read_text() == "0\n"
+    assert "Traceback" not in Path(f"{log}.err").read_text()

@@ -207,13 +207,13 @@ def maps() -> list[bytes]:
     """A map of two runs."""
     head = {"event": "map", "frame": "torso", "unit": "metre", "tasks": ["object"]}
     touch = {
-        "event": "touch",
+        "event": "decision",
+        "task": "object",
         "contact": 1,
         "onset_s": 1.5,
         "place": [0.1, 0.2, 0.3],
-        "position_m": [0.1, 0.2, 0.3],
-        "labels": {"object": "cup"},
-        "confidence": {"object": 0.5},
+        "label": "cup",
+        "confidence": 0.5,
         "flags": ["tie"],
     }
     lines = [head, touch, touch, head, touch]
@@ -224,7 +224,7 @@ def read_map(path: Path) -> None:
     """Load it."""
     from edge.runtime.touch_map import load
 
-    load(path)
+    list(load(path))
 
 
 def scenes() -> list[bytes]:

@@ -109,16 +109,18 @@ def metadata(bad: float) -> None:
 def touch_map(bad: float, key: str) -> None:
     head = {"event": "map", "frame": "skin", "unit": "metre", "tasks": ["t"]}
     touch = {
-        "event": "touch",
+        "event": "decision",
+        "contact": 1,
+        "task": "t",
         "onset_s": bad if key == "onset_s" else 1.0,
         "place": [0.0, bad if key == "place" else 0.0, 0.0],
-        "labels": {"t": "a"},
-        "confidence": {"t": bad if key == "confidence" else 1.0},
+        "label": "a",
+        "confidence": bad if key == "confidence" else 1.0,
     }
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "map.jsonl"
         path.write_text(f"{json.dumps(head)}\n{json.dumps(touch)}\n")
-        touchmap.load(path)
+        list(touchmap.load(path))
 
 
 def csv_frames(bad: float, named: bool) -> None:

@@ -26,15 +26,16 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
     Raises:
         InputError: the map is empty, or has no such task.
     """
-    if not found.touches:
+    touches = list(found)
+    if not touches:
         raise InputError(f"{where}: no contact is on this map yet")
-    tasks = sorted({task for touch in found.touches for task in touch.labels})
+    tasks = sorted({task for touch in touches for task in touch.labels})
     chosen = task or ("category" if "category" in tasks else tasks[0])
     if chosen not in tasks:
         raise InputError(f"{where}: has no task {chosen!r}; it has {', '.join(tasks)}")
-    labels = [touch.labels.get(chosen) or UNKNOWN for touch in found.touches]
-    sure = np.array([touch.confidence.get(chosen, 0.0) for touch in found.touches])
-    positions = np.array([touch.place for touch in found.touches])
+    labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
+    sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
+    positions = np.array([touch.place for touch in touches])
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
         for i, label in enumerate(sorted(set(labels))):
@@ -57,7 +58,7 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
         axis.grid(alpha=0.3)
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, title=chosen, loc="outside right upper")
-    figure.suptitle(f"{len(found.touches)} contacts in the frame of {found.frame}")
+    figure.suptitle(f"{len(touches)} contacts in the frame of {found.frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
     plt.close(figure)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from edge.cli import main
+from edge.commands.summary import Summary
 
 ROOT = Path(__file__).parents[3]
 
@@ -176,3 +177,11 @@ def test_output_without_room_is_one_sentence(exported, recordings):
     assert run.returncode == 2
     assert run.stderr.startswith("edge-classify: standard output cannot be written: No space left")
     assert run.stderr.count("\n") == 1
+
+
+def test_a_label_cannot_send_escape_sequences_to_the_terminal():
+    summary = Summary({"object": None})
+    event = {"event": "decision", "task": "object", "label": "\x1b]0;a\x07", "flags": []}
+    summary.add({"object": "\u202ebox\x9b"}, [event])
+    assert all(line.isprintable() for line in summary.text().splitlines())
+    assert "\\x1b]0;a\\x07" in summary.text()

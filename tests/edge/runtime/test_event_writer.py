@@ -1,12 +1,18 @@
-"""Events as they are written, and as datagrams."""
+"""Events as lines: to a file, and by UDP."""
 
+import io
 import json
+import math
+import os
 import socket
+import threading
+import time
 
 import pytest
 
 from edge.errors import InputError
-from edge.runtime.event_writer import Lines
+from edge.runtime import event_writer
+from edge.runtime.event_writer import Lines, json_line
 
 
 @pytest.fixture
@@ -18,31 +24,96 @@ def listener():
 
 
 def test_each_event_is_a_line_and_the_same_line_a_datagram(listener):
-    written = []
+    out = io.StringIO()
     events = [{"event": "onset", "onset_s": 1.5}, {"event": "decision", "label": "Kissen für 2"}]
-    with Lines(written.append, f"127.0.0.1:{listener.getsockname()[1]}") as lines:
+    with Lines(out, udp=f"127.0.0.1:{listener.getsockname()[1]}") as lines:
         lines.write(events)
         received = [listener.recv(65536).decode() for _ in events]
-    assert written == events
-    assert all(line.endswith("\n") for line in received)
+    assert "".join(received) == out.getvalue()
     assert [json.loads(line) for line in received] == events
-    assert lines.lost == 0
+    assert lines.lost == {}
 
 
-def test_where_nobody_listens_lines_are_counted_and_all_is_written():
+def test_where_nobody_listens_lines_are_counted_and_the_file_is_whole():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-    written = []
-    with Lines(written.append, f"127.0.0.1:{port}") as lines:
+    out = io.StringIO()
+    with Lines(out, udp=f"127.0.0.1:{port}") as lines:
         for n in range(20):
             lines.write([{"n": n}])
-    assert [event["n"] for event in written] == list(range(20))
-    assert lines.lost > 0
+    assert [json.loads(line)["n"] for line in out.getvalue().splitlines()] == list(range(20))
+    assert sum(lines.lost.values()) > 0
     lines.close()
 
 
 @pytest.mark.parametrize("address", ["", "47400", ":47400", "127.0.0.1:", "127.0.0.1:0", "a:b:c"])
 def test_an_address_that_makes_no_sense_is_one_sentence(address):
     with pytest.raises(InputError, match="give HOST:PORT"):
-        Lines(print, address)
+        Lines(udp=address)
+
+
+@pytest.mark.parametrize("address", ["a..b:80", "nobody.invalid:80", "x" * 300 + ":80"])
+def test_a_host_that_is_none_is_one_sentence(address):
+    with pytest.raises(InputError, match="cannot be reached"):
+        Lines(udp=address)
+
+
+def test_a_line_is_ascii_and_json_whatever_a_label_holds():
+    label = "a\u001b[2J\u202e\u2028\ud800\u0085é"
+    line = json_line({"label": label, "confidence": math.nan, "list": [math.inf, 1.0]})
+    assert line.isascii()
+    assert line.isprintable()
+    assert json.loads(line) == {"label": label, "confidence": None, "list": [None, 1.0]}
+
+
+def test_a_reader_that_reads_nothing_costs_lines_and_no_time(monkeypatch):
+    monkeypatch.setattr(event_writer, "MOST_LINES", 100)
+    monkeypatch.setattr(event_writer, "CLOSE_S", 0.1)
+    reading, writing = os.pipe()
+    with os.fdopen(writing, "w") as out:
+        lines = Lines(out)
+        for n in range(20_000):  # a pipe holds 64 kB
+            lines.write([{"n": n}])
+        lines.close()
+        lost = lines.lost["stdout"]
+        os.set_blocking(reading, False)
+        arrived = os.read(reading, 1 << 20).splitlines()
+        os.close(reading)
+    assert lost >= 20_000 - len(arrived) - 1
+    numbers = [json.loads(line)["n"] for line in arrived[:-1]]
+    assert numbers == sorted(set(numbers))
+
+
+def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
+    monkeypatch.setattr(event_writer, "MOST_LINES", 10)
+    reading, writing = os.pipe()
+    got = []
+
+    def read():
+        while data := os.read(reading, 4096):
+            got.append(data)
+
+    with os.fdopen(writing, "w") as out:
+        reader = threading.Thread(target=read)
+        reader.start()
+        with Lines(out, patient=lambda: True) as lines:
+            for n in range(20_000):
+                lines.write([{"n": n}])
+    reader.join()
+    os.close(reading)
+    assert len(b"".join(got).splitlines()) == 20_000
+    assert lines.lost == {}
+
+
+def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as out, Lines(out) as lines:
+        for _ in range(1000):
+            lines.write([{"n": 1}])
+            if lines.unheard:
+                break
+            time.sleep(0.001)
+        assert lines.unheard
+    assert capsys.readouterr().err == ""

@@ -134,14 +134,14 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, capsys):
     assert len({line["contact"] for line in decisions}) == 2
     found = touchmap.load(place)
     assert (found.frame, found.unit) == (Model(demo.MODEL).info.chain.base, "metre")
-    first, second = found.touches
+    first, second = touches = list(found)
     assert first.labels == {
         "category": "rigid-fixed",
         "mobility": "fixed",
         "object": "cardboard box",
     }
     assert second.onset_s - first.onset_s == pytest.approx(0.35, abs=0.02)  # 0.05 of it their own
-    for touch in found.touches:
+    for touch in touches:
         assert on_the_skin(touch.place, both)
     # Opposite sides of the forearm.
     assert np.linalg.norm(np.subtract(first.place, second.place)) > both.layout.radius_m
@@ -171,6 +171,14 @@ def test_a_place_is_the_centroid_turned_and_moved_by_the_arm():
     assert contact.position() == pytest.approx(expected, abs=1e-15)
 
 
+def write(path, info, events):
+    writer = touchmap.map_writer(path, info)
+    for line in touchmap.events_on_map(events):
+        writer.put(line)
+    writer.close()
+    return writer
+
+
 def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     path = tmp_path / "map.jsonl"
     info = Model(demo.MODEL).info
@@ -185,16 +193,15 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
         "flags": ["tie"],
     }
     others = [{**event, "task": t, "label": t, "flags": ["short"]} for t in ("category", "object")]
-    with touchmap.MapFile(path, info) as file:
-        file.write([{"event": "onset", "contact": 1, "onset_s": 0.5}, event])
-        assert not touchmap.load(path).touches  # two tasks are still open
-        file.write(others)
-        file.write([{**event, "contact": 2, "place": None}])
+    onset = {"event": "onset", "contact": 1, "onset_s": 0.5}
+    write(path, info, [onset, event])
+    assert not list(touchmap.load(path))  # two tasks are still open
+    path.unlink()
+    write(path, info, [onset, event, *others, {**event, "contact": 2, "place": None}])
     with path.open("a") as damaged:
-        damaged.write('{"event": "touch", "pla')
-    with touchmap.MapFile(path, info) as file:
-        file.write([event, *others])
-    first, second = touchmap.load(path).touches
+        damaged.write('{"event": "decision", "pla')
+    write(path, info, [event, *others])
+    first, second = touchmap.load(path)
     assert first == second
     assert first.place == (0.1, 0.2, 0.3)
     assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
@@ -207,6 +214,7 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
         ("", "not a map"),
         ("[1]\n", "line 1 is not of a map"),
         ("hello\n", "not a map"),
+        ('{"event": "decision"}\n', "line 1 is not of a map"),
         ('{"event": "map", "frame": "a", "unit": "metre"}\n', "line 1 is not of a map"),
         (
             '{"event": "map", "frame": "a", "unit": "metre", "tasks": []}\n'
@@ -219,12 +227,61 @@ def test_what_is_not_a_map_is_named(tmp_path, text, sentence):
     path = tmp_path / "some.jsonl"
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
-        touchmap.load(path)
+        list(touchmap.load(path))
 
 
 def test_a_file_that_is_not_a_map_is_not_written_to(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_text("what I did today\n")
     with pytest.raises(InputError, match="not a map"):
-        touchmap.MapFile(path, Model(demo.MODEL).info)
+        touchmap.map_writer(path, Model(demo.MODEL).info)
     assert path.read_text() == "what I did today\n"
+
+
+def test_a_map_of_another_arm_is_refused_at_the_first_start(tmp_path):
+    path = tmp_path / "map.jsonl"
+    head = {"event": "map", "frame": "another", "unit": "metre", "tasks": []}
+    path.write_text(json.dumps(head) + "\n")
+    with pytest.raises(InputError, match="in the frame another .* keep a map for each"):
+        touchmap.map_writer(path, Model(demo.MODEL).info)
+    assert path.read_text() == json.dumps(head) + "\n"
+
+
+@pytest.mark.parametrize("left", ['{"ev', '{"event": "map", "fra', '{"event": "map", "fra\n'])
+def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(tmp_path, left):
+    path = tmp_path / "map.jsonl"
+    path.write_text(left)
+    write(path, Model(demo.MODEL).info, [])
+    assert list(touchmap.load(path)) == []
+
+
+def test_a_full_disk_costs_lines_and_not_decisions():
+    """/dev/full answers each write as a full disk does; here it stands behind a map's writer."""
+    with open("/dev/full", "wb", buffering=0) as full:
+        writer = touchmap.LineWriter("map", full.write)
+        writer.put("a")
+        writer.put("b")
+        writer.close()
+    assert (writer.lost, writer.problem) == (2, "No space left on device")
+
+
+def test_what_is_no_file_is_refused_as_a_map(tmp_path):
+    import os
+
+    os.mkfifo(tmp_path / "fifo")
+    for path in (tmp_path / "fifo", tmp_path, "/dev/null", "a\0b"):
+        with pytest.raises(InputError, match="cannot be written"):
+            touchmap.map_writer(path, Model(demo.MODEL).info)
+
+
+def test_a_long_map_is_opened_by_its_head_alone(tmp_path, monkeypatch):
+    """Counted in bytes, not in seconds: 98 MB of contacts take no more than 64 kB of reading."""
+    path = tmp_path / "map.jsonl"
+    info = Model(demo.MODEL).info
+    write(path, info, [])
+    with path.open("ab") as file:
+        file.truncate(98 << 20)
+    read, pread = [], touchmap.os.pread
+    monkeypatch.setattr(touchmap.os, "pread", lambda fd, n, at: read.append(n) or pread(fd, n, at))
+    write(path, info, [])
+    assert sum(read) <= touchmap.LONGEST_LINE + 1

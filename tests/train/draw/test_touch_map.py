@@ -13,12 +13,13 @@ HEAD = {"event": "map", "frame": "torso_lift_link", "unit": "metre", "tasks": ["
 
 def touch(n, place, label, confidence=1.0):
     return {
-        "event": "touch",
+        "event": "decision",
+        "task": "category",
         "contact": n,
         "onset_s": float(n),
         "place": place,
-        "labels": {"category": label},
-        "confidence": {"category": confidence},
+        "label": label,
+        "confidence": confidence,
         "flags": [],
     }
 
