@@ -1,4 +1,4 @@
-"""Errors a user can mend, and text that is safe to show."""
+"""The base of all errors, the errors that a user can correct, and text that is safe to show."""
 
 
 def printable(text: str) -> str:
@@ -14,9 +14,16 @@ def printable(text: str) -> str:
 
 
 class EdgeError(Exception):
-    """Whatever edge-classify reports on purpose; its text is one sentence for a person.
+    """The base of the errors that edge-classify raises; its text is one sentence for a person.
 
-    What a file brings into the sentence, a name with a line break say, cannot break the line.
+    The text stays on one line whatever a file contributes to it (see `printable`).
+
+    >>> import edge
+    >>> try:
+    ...     edge.Chain([]).pose([0.0])
+    ... except edge.EdgeError as error:
+    ...     print(error)
+    the arm base to tip takes 0 joint angles (), not 1
     """
 
     def __str__(self) -> str:
@@ -24,7 +31,6 @@ class EdgeError(Exception):
 
 
 class InputError(EdgeError, ValueError):
-<<<<<<< HEAD
     """A file, option or value that cannot be used; the sentence names it and the remedy.
 
     >>> import edge
@@ -34,6 +40,3 @@ class InputError(EdgeError, ValueError):
     ...     print(error)
     touch.npz: cannot be read: No such file or directory
     """
-=======
-    """A file, an option or a value that cannot be used; the sentence names it and the mend."""
->>>>>>> d1a3388 (Sinks never stop decisions: lines leave by bounded writers, counted where lost; the map is a log of decisions; one encoder for all that leaves)
