@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from edge.skin.skin import Skin
 
 AS_TRAINED = "as_trained"
-"""Flag of a decision whose features are those of a training trial to the last bit: nearly always
-it is that trial, replayed. Only a model that sees whole numbers alone meets such twins anew."""
+"""Flag of a decision at distance 0 from a training trial: the two are the same, to the last bit,
+in all that the model looks at. Nearly always it is that trial, replayed; a feature that told
+nothing in training is not looked at."""
 
 
 @dataclass
@@ -239,7 +240,6 @@ class Classifier:
         waiting.decision_point = decision_point
         window_s = self.model.decision_points_s[decision_point]
         contact = waiting.contact
-        vector = feature_vector(contact.series(), window_s, info.samples, info.features)
         flags = tuple(
             flag
             for flag, raised in (
@@ -251,6 +251,7 @@ class Classifier:
             if raised
         )
         try:
+            vector = feature_vector(contact.series(), window_s, info.samples, info.features)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
             none = _Answer(None, 0.0, (*flags, "out_of_range"))

@@ -253,7 +253,10 @@ def _check_joint(joint: Joint) -> None:
 
 def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """K and K^2 of a turn about the joint's axis; of a slide its direction and nothing."""
-    x, y, z = np.array(joint.axis, dtype=float) / math.hypot(*joint.axis)
+    # A power of two brings the axis near length 1, whose square neither over- nor underflows.
+    power = -math.frexp(max(map(abs, joint.axis)))[1]
+    near = [math.ldexp(part, power) for part in joint.axis]
+    x, y, z = (part / math.hypot(*near) for part in near)
     first = np.zeros((4, 4))
     if joint.kind == "prismatic":
         first[:3, 3] = x, y, z

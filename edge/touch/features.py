@@ -109,12 +109,13 @@ def feature_vector(
         raise InputError("the contact has no frame")
     course = _Course(series, window_s)
     blocks = []
-    for (wide, own, transforms, summary), alike in groupby(wanted, key=_kind):
-        group, times = tuple(alike), own or samples
-        if wide:
-            blocks += [_finish(*course.wide(f, times), transforms, summary) for f in group]
-        else:
-            blocks.append(_finish(*course.narrow(group, times), transforms, summary))
+    with np.errstate(over="ignore"):  # what is then infinite is refused
+        for (wide, own, transforms, summary), alike in groupby(wanted, key=_kind):
+            group, times = tuple(alike), own or samples
+            if wide:
+                blocks += [_finish(*course.wide(f, times), transforms, summary) for f in group]
+            else:
+                blocks.append(_finish(*course.narrow(group, times), transforms, summary))
     return np.concatenate(blocks)
 
 
@@ -180,6 +181,9 @@ class _Course:
         if whole.all():
             sampled = _resample(times, series.t, values)
         else:
+            for feature, row in zip(group, values, strict=True):
+                if np.isinf(row).any():
+                    raise _too_large(feature)
             sampled = np.zeros((len(group), samples))
             sampled[whole] = _resample(times, series.t, values[whole])
             for i in np.flatnonzero(~whole & known.any(axis=1)):
@@ -248,6 +252,13 @@ class _Course:
         if values is None:
             raise _not_measured(feature)
         return np.asarray(values, dtype=np.float64)
+
+
+def _too_large(feature: Feature) -> InputError:
+    return InputError(
+        f"{feature.name} is too large for a number of 64 bits; look at the skin's "
+        "counts_per_newton and pitch_m"
+    )
 
 
 def _not_measured(feature: Feature) -> InputError:

@@ -130,7 +130,8 @@ class Measurer:
         As for a region's centroid (`edge.touch.region.Grid.col_sum`); of equal cuts the lowest.
         """
         n = self.layout.cols
-        sums = (self._cuts @ weights).astype(self._exact)
+        # By way of int64: a float64 made an object is a Python float, which rounds.
+        sums = (self._cuts @ weights).astype(np.int64).astype(self._exact)
         first, second = sums[:n], sums[n:]
         cut = int((int(weights.sum()) * second - first * first).argmin())
         basis: NDArray[Any] = self._bases[cut]

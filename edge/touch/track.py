@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from edge.touch.contact import Contact, FeatureSeries, region_time, released
+from edge.touch.contact import CLOCK_ROUNDING_S, Contact, FeatureSeries, region_time, released
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measurer import Measurer
@@ -195,6 +195,11 @@ class ContactTracker:
             )
         if not math.isfinite(frame.t):
             raise InputError(f"the time of a frame is not finite: {frame.t}")
+        if math.ulp(frame.t) > CLOCK_ROUNDING_S:
+            raise InputError(
+                f"the time of a frame is {frame.t:g} s, where a clock in seconds has steps of "
+                f"{math.ulp(frame.t):.2g} s; give seconds, not milliseconds or less"
+            )
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t

@@ -143,3 +143,9 @@ def test_too_few_samples_and_an_empty_series_are_refused():
         feature_vector(series([0.0], [1]), 1.2, samples=1)
     with pytest.raises(InputError, match="no frame"):
         feature_vector(series([], []), 1.2)
+
+
+def test_what_is_too_large_is_refused_and_not_taken_for_unknown():
+    large = series([0.0, 0.5, 1.2], [10, 20, 30], scale=1e-308)
+    with pytest.raises(InputError, match="max_force is too large"):
+        feature_vector(large, 1.2)

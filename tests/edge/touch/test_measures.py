@@ -372,3 +372,14 @@ def test_a_feature_that_was_not_measured_is_one_sentence():
     ):
         with pytest.raises(InputError, match=f"{name} was not measured"):
             feature_vector(series, 1.0, 2, [name])
+
+
+@pytest.mark.parametrize("shape", [(64, 62), (33, 32)])
+def test_of_equal_cuts_the_lowest_also_beyond_64_bits(shape):
+    """A uniform frame is cut at its seam; rounding would choose another cut."""
+    rows, cols = shape
+    active = ActiveTaxels(np.full(shape, 65535, dtype=np.uint16), 0)
+    row = Measurer(SkinLayout(rows, cols, wraps=True), ["skin_around"]).measure(
+        active, active.largest()
+    )
+    assert Fraction(row[4], row[2]) == Fraction(cols - 1, 2)

@@ -226,3 +226,23 @@ def test_the_first_of_two_contacts_is_given_whole(make_touch, forearm):
 def test_a_recording_without_a_contact_gives_none(make_touch, forearm):
     still = make_touch(seconds=0.0, arm=False)
     assert first_contact(still, ContactTracker(forearm)) is None
+
+
+def test_a_clock_too_large_for_its_steps_is_refused_and_says_so():
+    """Seconds since 1970 are fine; as milliseconds or nanoseconds, steps of a frame drown."""
+    counts = np.zeros(FLAT.shape, dtype=np.uint16)
+    ContactTracker(FLAT).push(Frame(1.7e9, counts))
+    for t in (1.7e12, 1.7e18, -1e15):
+        with pytest.raises(InputError, match="give seconds"):
+            ContactTracker(FLAT).push(Frame(t, counts))
+
+
+def test_a_region_s_time_loses_nothing_to_a_large_clock():
+    counts = np.zeros(FLAT.shape, dtype=np.uint16)
+    counts[1, 1:4] = 50
+    start = 1.7e9 + 0.25
+    times = np.full(FLAT.shape, start - 0.25)
+    (contact,) = ContactTracker(FLAT, TrackSettings(debounce=1)).push(
+        Frame(start, counts, times=times)
+    )
+    assert contact.onset_s == start - 0.25
