@@ -26,8 +26,8 @@ from tests.mutation.equivalent import EQUIVALENT
 
 ASKED = ("tests/edge", "tests/golden", "tests/hard_cases")
 """Tests whose way through edge/ is measured."""
-APART = ("tests/edge/commands", "tests/edge/runtime", "tests/test_demo_data.py")
-"""Tests that run edge/ in processes of their own, where no one measures: asked at the end."""
+APART = ("tests/edge/commands", "tests/edge/runtime", "tests/test_demo_data.py", "tests/export")
+"""Tests that run edge/ in processes of their own, or through an export: asked at the end."""
 MOST_TESTS = 400
 SHARE = 0.9
 
