@@ -8,7 +8,7 @@ from typing import Any
 
 from edge.commands.output import Output
 from edge.model.model import Model
-from edge.model.verify import verify
+from edge.model.verify import in_float32, verify
 
 LOG = logging.getLogger(__name__)
 
@@ -47,6 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
         LOG.error(
             f"{check.name} differs, worst in row {check.row}: "
             f"{check.seen} instead of {check.expected}"
+        )
+    if in_float32(failed):
+        LOG.error(
+            "the distances differ as in float32: what runs the model must compute in float64, as "
+            "ONNX Runtime does"
         )
     if not failed:
         output.text(f"{len(checks)} quantities agree with the golden file")

@@ -21,6 +21,7 @@ A bound b allows abs(seen - expected) <= b * max(1, abs(expected)).
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,6 +63,21 @@ class Check:
     def passed(self) -> bool:
         """Within the bound."""
         return self.worst <= 1.0
+
+
+SINGLE = (2.0**-36, 2.0**-9)
+"""Parts by which a distance differs that was computed in float32: its rounding is 2^-24, which
+cancellation makes larger and luck smaller; another float64 stays below 2^-39."""
+
+
+def in_float32(checks: Sequence[Check], bound: float = 1e-12) -> bool:
+    """Whether distances differ as those of an engine do that computes in float32.
+
+    The operators are the standard's and the tensors float64, yet an engine may compute in less
+    without a word.
+    """
+    parts = [bound * check.worst for check in checks if check.name.endswith("_distances")]
+    return any(SINGLE[0] < part < SINGLE[1] for part in parts)
 
 
 def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeries] | None:

@@ -1,11 +1,13 @@
 """What counts as the golden file's value: bounds, exact integers, what is not a number."""
 
 import numpy as np
+import onnx
+import onnxruntime
 import pytest
 
 from edge.errors import InputError
 from edge.model.model import Model
-from edge.model.verify import _close, _exact, verify
+from edge.model.verify import _close, _exact, in_float32, verify
 
 NAN, INF = float("nan"), float("inf")
 
@@ -67,3 +69,42 @@ def test_a_golden_file_of_another_width_is_refused(exported, tmp_path):
     np.savez(tmp_path / "golden.npz", **arrays)
     with pytest.raises(InputError, match=r"golden\.npz: .*export"):
         verify(Model(exported / "model.onnx"), tmp_path / "golden.npz")
+
+
+def narrowed(data):
+    """The model as an engine runs it that computes in float32: every float64 tensor narrowed."""
+    model = onnx.load_from_string(data)
+    for tensor in model.graph.initializer:
+        if tensor.data_type == onnx.TensorProto.DOUBLE:
+            values = onnx.numpy_helper.to_array(tensor).clip(-3e38, 3e38).astype(np.float32)
+            tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
+    for value in (*model.graph.input, *model.graph.output, *model.graph.value_info):
+        if value.type.tensor_type.elem_type == onnx.TensorProto.DOUBLE:
+            value.type.tensor_type.elem_type = onnx.TensorProto.FLOAT
+    for node in model.graph.node:
+        for attribute in node.attribute:
+            if attribute.name == "to" and attribute.i == onnx.TensorProto.DOUBLE:
+                attribute.i = onnx.TensorProto.FLOAT
+    return onnxruntime.InferenceSession(model.SerializeToString())
+
+
+def test_an_engine_that_computes_in_float32_is_found_out(exported):
+    class Narrow(Model):
+        """Runs the same file in float32."""
+
+        def run(self, vectors, decision_point=None):
+            with np.errstate(over="ignore"):
+                given = {"features": vectors.astype(np.float32)}
+            names = [output.name for output in single.get_outputs()]
+            values = single.run(names, given)
+            return {
+                name: value.astype(np.float64) if value.dtype == np.float32 else value
+                for name, value in zip(names, values, strict=True)
+            }
+
+    path = exported / "model.onnx"
+    single = narrowed(path.read_bytes())
+    right = verify(Model(path), exported / "golden.npz")
+    wrong = verify(Narrow(path), exported / "golden.npz")
+    assert not in_float32(right)
+    assert in_float32([check for check in wrong if not check.passed])
