@@ -94,6 +94,9 @@ docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
 	cp $(OUT)/tradeoff/front.json train/tradeoff/front.json
 
+docs/touches.png: $(READY)
+	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx --out $@
+
 docs/touch.png: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1
 	$(BIN)/python -m train show $(OUT)/picture/cardboard-box-movable-00.npz --scene --out $@

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from edge.errors import InputError
+
 
 def add_parser(subparsers: Any) -> None:
     """Add the command."""
@@ -14,10 +16,14 @@ def add_parser(subparsers: Any) -> None:
         "show",
         help="draw a recording or a map of touch",
         description="Draw a recording: frames over time with the region found, and the three "
-        "features; with --scene, what happens, seen from the side. Draw a map that "
+        "features; with --scene, what happens, seen from the side. Draw several "
+        "recordings side by side, with the decisions of --model. Draw a map that "
         "`edge-classify run --map` wrote: where things were touched, and what they were.",
     )
-    parser.add_argument("recording", help="an .npz recording, or a map")
+    parser.add_argument(
+        "recording", nargs="+", help="an .npz recording, several to compare, or a map"
+    )
+    parser.add_argument("--model", metavar="model.onnx", help="show its decisions on several")
     parser.add_argument("--out", metavar="PNG", help="the picture; beside the recording without it")
     parser.add_argument(
         "--scene", action="store_true", help="sketch arm, contact and its path from the side too"
@@ -30,24 +36,27 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
     from edge.recording import load
-    from train.draw.recording import draw
 
-    out = Path(arguments.out or Path(arguments.recording).with_suffix(".png"))
-    if Path(arguments.recording).suffix != ".npz":
-        from edge.runtime import touch_map as touchmap
-        from train.draw import touch_map as showmap
+    first = arguments.recording[0]
+    out = Path(arguments.out or Path(first).with_suffix(".png"))
+    if arguments.model is not None and len(arguments.recording) == 1:
+        raise InputError("--model shows decisions on several recordings; give more than one")
+    if len(arguments.recording) > 1:
+        from edge.model.model import Model
+        from train.draw import comparison
 
-        found = touchmap.load(arguments.recording)
-        showmap.draw(found, out, arguments.recording, arguments.task)
-        print(out, file=sys.stdout)
-        return 0
-    recording = load(arguments.recording)
-    draw(
-        recording,
-        out,
-        where=arguments.recording,
-        scene=arguments.scene,
-        threshold=arguments.threshold,
-    )
+        if arguments.scene or arguments.threshold is not None:
+            raise InputError("--scene and --threshold are for a single recording")
+        model = None if arguments.model is None else Model(arguments.model)
+        comparison.draw([(path, load(path)) for path in arguments.recording], out, model=model)
+    elif Path(first).suffix != ".npz":
+        from edge.runtime import touch_map
+        from train.draw import touch_map as picture
+
+        picture.draw(touch_map.load(first), out, first, arguments.task)
+    else:
+        from train.draw.recording import draw
+
+        draw(load(first), out, where=first, scene=arguments.scene, threshold=arguments.threshold)
     print(out, file=sys.stdout)
     return 0

@@ -58,7 +58,8 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
         axis.grid(alpha=0.3)
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, title=chosen, loc="outside right upper")
-    figure.suptitle(f"{len(touches)} contacts in the frame of {found.frame}")
+    count = len(touches)
+    figure.suptitle(f"{count} contact{'s' * (count != 1)} in the frame of {found.frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
     plt.close(figure)
