@@ -15,9 +15,10 @@ from edge.recording import Recording, load, save
 from edge.skin import file as skinfile
 from export.__main__ import parser as export_parser
 from train.__main__ import main as train
+from train.importers import sdh2
 
 ROOT = Path(__file__).parents[1]
-GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps_856.npz"
+GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
 CODE = [" ".join(found.split()) for found in re.findall(r"`([^`]+)`", TEXT)]
@@ -66,7 +67,11 @@ def test_a_command_of_the_workstation_does_as_it_is_written(command, bench, monk
     monkeypatch.chdir(bench)
     scene = bench / "SCENE.toml"
     scene.write_text((ROOT / "train/scenes/demo.toml").read_text())
-    names = {"FILE": str(GRASPS), "DIR": "made", "SCENE": str(scene)}
+    if "sdh2" in command:
+        for file in sdh2.files(GRASPS)[:2]:
+            (bench / "FOLDER" / file.parent.name).mkdir(parents=True, exist_ok=True)
+            shutil.copy(file, bench / "FOLDER" / file.parent.name)
+    names = {"DIR": "made", "SCENE": str(scene)}
     words = [names.get(word.strip("[]"), word.strip("[]")) for word in command.split()[3:]]
     assert train([*words, *(["--trials", "1"] if words[0] == "simulate" else [])]) == 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import contextlib
 import io
 import json
@@ -18,7 +19,6 @@ from tests.fuzz import mutate
 
 ROOT = Path(__file__).parents[2]
 MODEL = ROOT / "tests" / "golden" / "model.onnx"
-GRASPS = 3
 
 
 BIDI = "\u2028\u2029\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
@@ -297,18 +297,32 @@ def imported(kind: str) -> Callable[[Path], None]:
     return read
 
 
-def archives() -> list[bytes]:
-    """A small archive as that of the SDH-2 grasps."""
-    draw = np.random.default_rng(0)
+def grasps() -> list[bytes]:
+    """The XML of a small grasp of the SDH-2 hand."""
+    matrices = "".join(
+        f'<matrix index="{i}"><cells_x>6</cells_x><cells_y>{13 if i % 2 else 14}</cells_y>'
+        "<texel_width>3.4</texel_width></matrix>"
+        for i in range(6)
+    )
+    frames = "".join(
+        f"<frame><time_stamp>{1000 + 32 * i}</time_stamp><frame_data>{data}</frame_data></frame>"
+        # 486 zeros; 100 of them, a count of 600, 385 more.
+        for i, data in enumerate(["C3F30000", "C2C8000044160000C3C08000"])
+    )
+    angle = "<angle><time_stamp>1000</time_stamp><angle_data>1,2,3,4,5,6,7</angle_data></angle>"
     return [
-        npz(
-            frames=draw.integers(0, 4000, (5 * GRASPS, 2, 13, 6)).astype(np.uint16),
-            t_ms=np.tile(np.arange(5, dtype=np.int32), GRASPS),
-            start=np.arange(GRASPS + 1) * 5,
-            label=np.array(["a", "b", "c"]),
-            fname=np.array(["x", "y", "z"]),
-        )
+        f"<root><sensor>{matrices}</sensor><data>{frames}</data>"
+        f"<joint_angles>{angle}</joint_angles></root>".encode()
     ]
+
+
+def read_grasp(path: Path) -> None:
+    """Import the XML as the one grasp of a folder."""
+    folder = path.parent / "grasps"
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "cup").mkdir(parents=True)
+    (folder / "cup" / "a.dsa").write_bytes(bz2.compress(path.read_bytes()))
+    imported("sdh2")(folder)
 
 
 def logs() -> list[bytes]:
@@ -414,7 +428,7 @@ READERS = (
     Reader("board", ".json", boards, mutate.of_text, read_board),
     Reader("prices", ".json", prices, mutate.of_text, read_prices),
     Reader("front", ".json", fronts, mutate.of_text, read_front),
-    Reader("sdh2", ".npz", archives, mutate.of_npz, imported("sdh2")),
+    Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
     Reader("csv_frames", ".one", frame_files, of_frames, read_frames),
     Reader("mcap", ".mcap", logs, mutate.of_bytes, imported("mcap")),
     Reader("mcap_words", ".mcap", lambda: logs()[1:2], mutate.of_text, imported("mcap")),

@@ -67,8 +67,8 @@ def test_the_table_is_that_of_grid_search_on_real_grasps(real, tmp_path):
     from edge.recording import save
     from train.importers import sdh2
 
-    for name, recording in list(sdh2.trials(real / "sdh2_grasps_856.npz"))[::30]:
-        save(tmp_path / f"{name}.npz", recording)
+    for file in sdh2.files(real / "sdh2_grasps")[::30]:
+        save(tmp_path / f"{file.stem}.npz", sdh2.grasp(file))
     data = load_trials([tmp_path])
     X, y = data.features(), np.array([label[:4] for label in data.labels("object")])
     ours = leave_one_out(X, y, max_components=5, max_k=6, scaling="IV")

@@ -1,75 +1,160 @@
-"""The real grasps as recordings, number by number."""
+"""The real grasps as recordings, number by number, and files of theirs that are damaged."""
+
+import bz2
+import math
+import struct
 
 import numpy as np
 import pytest
 
 from edge.errors import InputError
 from edge.recording import load
+from edge.touch.arm import Chain
 from train.__main__ import main
+from train.dataset import load_trials
 from train.importers import names, sdh2
 
-
-@pytest.fixture(scope="module")
-def archive(real):
-    return real / "sdh2_grasps_856.npz"
+MASK = "\n".join(["011110"] * 5 + ["111111"] * 8)
 
 
-def test_every_grasp_is_one_recording_with_its_own_frames_and_times(archive):
-    raw = np.load(archive)
-    trials = list(sdh2.trials(archive))
-    assert len(trials) == 856
-    assert len({name for name, _ in trials}) == 856
-    assert len({r.labels["object"] for _, r in trials}) == 36
-    for i in (0, 400, 855):
-        a, b = raw["start"][i : i + 2]
-        _, recording = trials[i]
-        assert (recording.frames[:, :, :6] == raw["frames"][a:b, 0]).all()
-        assert (recording.frames[:, :, 7:] == raw["frames"][a:b, 1]).all()
-        assert (recording.t * 1000).round().astype(int).tolist() == raw["t_ms"][a:b].tolist()
-        assert recording.valid.sum() == 2 * 13 * 6
-        assert not recording.valid[:, 6].any()
-        assert recording.labels == {"object": str(raw["label"][i])}
-        assert recording.layout.force_unit == "count"
-        assert recording.layout.pitch_m == 0.0034
+def packed(values) -> str:
+    return "".join(struct.pack(">f", value).hex().upper() for value in values)
 
 
-def test_the_command_writes_a_folder(archive, tmp_path, monkeypatch, capsys):
-    few = list(sdh2.trials(archive))[:3]
-    monkeypatch.setattr(sdh2, "trials", lambda path, arm: iter(few))
-    assert main(["import", "sdh2", str(archive), "--out", str(tmp_path / "out")]) == 0
-    written = sorted((tmp_path / "out").iterdir())
-    assert [p.name for p in written] == [f"000{i}_aerosol_can.npz" for i in range(3)]
-    assert (load(written[2]).frames == few[2][1].frames).all()
-    assert "3 recordings" in capsys.readouterr().out
+FRAMES = [
+    # 84 cells of matrix 0, 78 of matrix 1, 246 of matrices 2 to 4, 78 of matrix 5.
+    [-486],
+    [-84, -8, 70, 80, -68, -246, 90, -77],
+    [-84, -8, 170, 180, -68, -246, -77, 4095],
+]
+ANGLES = [(0, [0.0] * 7), (40, [90.0] * 7)]
 
 
-def good() -> dict[str, np.ndarray]:
-    return {
-        "frames": np.zeros((5, 2, 13, 6), np.uint16),
-        "t_ms": np.arange(5, dtype=np.int32),
-        "start": np.array([0, 3, 5]),
-        "label": np.array(["a", "b"]),
-        "fname": np.array(["a", "b"]),
-    }
+def dsa(
+    frames=FRAMES, stamps=(1000, 1032, 1064), angles=ANGLES, mask=MASK, width="3.4", pads=range(6)
+) -> str:
+    matrices = "".join(
+        f'<matrix index="{i}"><cells_x>6</cells_x><cells_y>{13 if i % 2 else 14}</cells_y>'
+        f"<texel_width>{width}</texel_width>"
+        + (f"<static_mask>{mask}</static_mask>" if i == 1 else "")
+        + "</matrix>"
+        for i in pads
+    )
+    data = "".join(
+        f"<frame><time_stamp>{stamp}</time_stamp><frame_data>\n  {packed(values)}\n</frame_data>"
+        "</frame>"
+        for stamp, values in zip(stamps, frames, strict=True)
+    )
+    lines = "".join(
+        f"<angle><time_stamp>{1000 + at}</time_stamp>"
+        f"<angle_data>{', '.join(map(str, row))}</angle_data></angle>"
+        for at, row in angles
+    )
+    return (
+        f"<root><sensor>{matrices}</sensor><data>{data}</data>"
+        f"<joint_angles>{lines}</joint_angles></root>"
+    )
+
+
+def written(folder, text, name="cup_1.dsa"):
+    file = folder / "cup" / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(bz2.compress(text.encode()) if isinstance(text, str) else text)
+    return file
+
+
+def test_a_grasp_is_unpacked_cell_by_cell(tmp_path):
+    recording = sdh2.grasp(written(tmp_path, dsa()))
+    left, right = recording.frames[:, :, :6], recording.frames[:, :, 7:]
+    assert left.reshape(3, -1)[:, 8:10].tolist() == [[0, 0], [70, 80], [170, 180]]
+    assert right.reshape(3, -1)[:, [0, -1]].tolist() == [[0, 0], [90, 0], [0, 4095]]
+    assert int(recording.frames.sum()) == 70 + 80 + 170 + 180 + 90 + 4095
+    assert recording.t.tolist() == [0.0, 0.032, 0.064]
+    assert recording.labels == {"object": "cup"}
+    assert recording.layout.pitch_m == pytest.approx(0.0034)
+    assert recording.layout.force_unit == "count"
+
+
+def test_masked_texels_and_the_column_between_the_pads_are_dead(tmp_path):
+    recording = sdh2.grasp(written(tmp_path, dsa()))
+    assert not recording.valid[:, 6].any()
+    assert not recording.valid[:5, [0, 5]].any()
+    assert recording.valid.sum() == (13 * 6 - 10) + 13 * 6
+    assert (recording.layout.alive == recording.valid).all()
+
+
+def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_path):
+    recording = sdh2.grasp(written(tmp_path, dsa(stamps=(1000, 1032, 1164))))
+    assert recording.joints[:2, 3] == pytest.approx([0.0, math.radians(90 * 32 / 40)])
+    assert np.isnan(recording.joints[2]).all()
+    assert sdh2.grasp(written(tmp_path, dsa(angles=()))).joints is None
 
 
 @pytest.mark.parametrize(
-    ("change", "word"),
+    ("content", "word"),
     [
-        ({"label": None}, "has no label"),
-        ({"frames": np.zeros((5, 13, 6), np.uint16)}, "not uint16"),
-        ({"start": np.array([0, 3])}, "does not divide"),
-        ({"label": np.array(["a"])}, "differ in number"),
-        ({"t_ms": np.zeros(3, np.int32)}, "differ in number"),
+        (b"BZh9 no bzip2", "cannot be unpacked"),
+        (bz2.compress(dsa().encode())[:-20], "cannot be unpacked"),
+        (b"", "cannot be unpacked"),
+        (dsa()[:-20], "not well-formed XML"),
+        ('<!DOCTYPE x [<!ENTITY a "b">]>' + dsa(), "declares a document type"),
+        (dsa(frames=[], stamps=()), "has no frame"),
+        (dsa(pads=(0, 1, 2)), "lacks matrix 1 or 5"),
+        (dsa(mask="01"), "static_mask is not one 0 or 1"),
+        (dsa(width="-1"), "texel_width must be"),
+        (dsa(frames=[[-485]], stamps=(0,)), "does not unpack to 486"),
+        (dsa(frames=[[-485, 1e6]], stamps=(0,)), "does not unpack to 486"),
+        (dsa(frames=[[-485, 0.5]], stamps=(0,)), "no whole number"),
+        (dsa(frames=[[float("nan")]], stamps=(0,)), "no whole number"),
+        (dsa().replace("C3F30000", "C3F3"), "hexadecimal"),
+        (dsa().replace("C3F30000", "hello"), "hexadecimal"),
+        (dsa().replace("<time_stamp>1032</time_stamp>", ""), "time_stamp must be"),
+        (dsa(stamps=(1000, 1032, 1032)), "times of its frames do not increase"),
+        (dsa(angles=[(0, [1.0] * 6)]), "does not hold 7"),
+        (dsa(angles=[(0, ["x"] * 7)]), "no number"),
+        (dsa(angles=[(40, [0.0] * 7), (0, [0.0] * 7)]), "go back"),
     ],
 )
-def test_another_archive_is_refused(change, word, tmp_path, capsys):
-    arrays = {k: v for k, v in {**good(), **change}.items() if v is not None}
-    np.savez(tmp_path / "x.npz", **arrays)
-    with pytest.raises(InputError, match=word):
-        list(sdh2.trials(tmp_path / "x.npz"))
-    assert main(["import", "sdh2", str(tmp_path / "x.npz"), "--out", str(tmp_path)]) == 2
-    assert "x.npz" in capsys.readouterr().err
+def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, capsys):
+    file = written(tmp_path, content)
+    assert main(["import", "sdh2", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert word in said
+    assert "cup" in said
+    assert file.exists()
+
+
+def test_a_folder_without_grasps_and_an_arm_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"holds no OBJECT/\*.dsa"):
+        list(sdh2.trials(tmp_path))
+    with pytest.raises(InputError, match="joints are those of a hand"):
+        list(sdh2.trials(tmp_path, Chain.cody()))
+
+
+def test_the_command_writes_a_folder_that_trains_with_the_hands_joints(tmp_path, capsys):
+    for i in range(3):
+        written(tmp_path, dsa(), f"cup_{i}.dsa")
+    out = tmp_path / "out"
+    assert main(["import", "sdh2", str(tmp_path), "--out", str(out)]) == 0
+    assert sorted(p.name for p in out.iterdir()) == [f"000{i}_cup.npz" for i in range(3)]
+    assert "3 recordings" in capsys.readouterr().out
+    assert load(out / "0000_cup.npz").joints.shape == (3, 7)
+    data = load_trials([out], features=["contact_motion", "joint_change@2"])
+    assert (data.chain, data.joints) == (None, 7)
+    assert data.features(samples=3).shape == (3, 3 + 14)
+
+
+def test_every_published_grasp_has_frames_and_joint_angles(real):
+    """Every sixtieth is read."""
+    files = sdh2.files(real / "sdh2_grasps")
+    assert len(files) == 856
+    assert len({file.parent.name for file in files}) == 36
+    for file in files[::60]:
+        recording = sdh2.grasp(file)
+        assert recording.frames.max() > sdh2.ONSET_COUNTS
+        assert recording.joints.shape == (len(recording.t), 7)
+        assert np.isfinite(recording.joints).all()
+        assert (recording.frames[:, ~recording.valid] == 0).all()
 
 
 def test_formats_are_found_by_their_file():
