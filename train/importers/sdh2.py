@@ -157,7 +157,7 @@ def _mask(matrix: ElementTree.Element, name: str, rows: int, cols: int) -> NDArr
     text = "".join((matrix.findtext(name) or "1" * (rows * cols)).split())
     if len(text) != rows * cols or set(text) - {"0", "1"}:
         raise InputError(f"its {name} is not one 0 or 1 for each of {rows} x {cols} texels")
-    return (np.array(list(text)) == "1").reshape(rows, cols)
+    return np.array([sign == "1" for sign in text]).reshape(rows, cols)
 
 
 def _unpacked(text: str, cells: int) -> NDArray[np.uint16]:
