@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -98,6 +98,52 @@ def read_text(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> str:
         return read_bytes(path, at_most).decode()
 
 
+class NameTaken(InputError):
+    """A file of that name exists already."""
+
+
+def check_writable(folder: str | os.PathLike[str]) -> None:
+    """Make a folder if need be, and refuse one in which no file can be made.
+
+    Raises:
+        InputError: the sentence names it.
+    """
+    import tempfile
+
+    try:
+        os.makedirs(folder, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{os.fspath(folder)}: cannot be written: {reason}") from None
+
+
+def _name_free(temporary: str, target: Path) -> None:
+    """Give a file a name that nobody else has taken, not even at this moment.
+
+    Raises:
+        FileExistsError: it is taken.
+    """
+    try:
+        os.link(temporary, target)
+        os.unlink(temporary)
+    except FileExistsError:
+        raise
+    except OSError:  # FAT, exFAT and some network folders know no hard links
+        os.close(os.open(target, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        os.replace(temporary, target)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Let a new name outlast a loss of power, where the file system can promise that."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
 @contextmanager
 def write_whole(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path`; at the end of the block it takes the name.
@@ -105,34 +151,37 @@ def write_whole(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iter
     Where the block raises, `path` is as it was and the temporary file is gone.
 
     Raises:
-        InputError: the folder cannot be written, the disk is full, or `path` exists and
-            `overwrite` is False.
+        NameTaken: `path` exists and `overwrite` is False.
+        InputError: the folder cannot be written, or the disk is full.
     """
     target = Path(path)
+    taken = NameTaken(f"{target}: exists already; choose another name or remove it")
     if not overwrite and target.exists():
-        raise InputError(f"{target}: exists already; choose another name or remove it")
+        raise taken
     temporary: str | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         import tempfile  # most commands write nothing
 
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        # Not after the target's name, which may be as long as a name can be.
+        handle, temporary = tempfile.mkstemp(prefix=".edge-classify-", dir=target.parent)
         with os.fdopen(handle, "wb") as file:
             yield file
             file.flush()
+            os.fsync(file.fileno())
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)
         if overwrite:
             os.replace(temporary, target)
         else:
-            os.link(temporary, target)
-            os.unlink(temporary)
+            _name_free(temporary, target)
         temporary = None
+        _sync_folder(target.parent)
     except FileExistsError as error:
-        raise InputError(
-            f"{target}: {error.filename} exists already; choose another name or remove it"
-        ) from None
+        if error.filename == os.fspath(target.parent):
+            raise InputError(f"{target}: cannot be written: {target.parent} is a file") from None
+        raise taken from None
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
     finally:

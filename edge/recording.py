@@ -39,7 +39,7 @@ class Recording:
     Attributes:
         t: (n,) seconds, never going back; of frames at equal times the last one counts.
         frames: (n, rows, cols) counts above baseline.
-        joints: (n, dof) radians, or None.
+        joints: (n, dof) radians, NaN in a frame whose pose was not known; or None.
         valid: (rows, cols) or (n, rows, cols), taxels that could be read, or None for all.
         meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of each
             column of `joints`], `source`, `trial`, and more.
@@ -92,6 +92,8 @@ class Recording:
             if valid is not None and valid.ndim == 3:
                 valid = valid[i]
             joints = None if self.joints is None else self.joints[i]
+            if joints is not None and np.isnan(joints[0]):
+                joints = None
             yield Frame(t=t, counts=self.frames[i], valid=valid, joints=joints)
 
 
@@ -125,9 +127,12 @@ def _check(path: str, recording: Recording) -> None:
             )
         if joints.shape[1] == 0:
             fail("joints have no column; leave them out where the arm is unknown")
-        finite = np.isfinite(joints).all(axis=1)
-        if not finite.all():
-            fail(f"a joint angle of frame {int(np.argmin(finite))} is not finite")
+        known = np.isfinite(joints).all(axis=1) | np.isnan(joints).all(axis=1)
+        if not known.all():
+            fail(
+                f"a joint angle of frame {int(np.argmin(known))} is not finite; where the pose was "
+                "not known, all angles of a frame must be NaN"
+            )
     if valid is not None and (
         valid.dtype != np.bool_ or valid.shape not in ((rows, cols), (n, rows, cols))
     ):
@@ -296,7 +301,10 @@ def save_arrays(
     compress: bool = False,
 ) -> None:
     """Write arrays and their JSON metadata as one `.npz`, whole or not at all."""
-    text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    try:
+        text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{os.fspath(path)}: meta cannot be written as JSON: {error}") from None
     with write_whole(path, overwrite=overwrite) as file:
         if compress:
             np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]

@@ -18,6 +18,7 @@ from edge.commands.options import add_arm, add_joints, add_skin, open_arm
 from edge.commands.output import Output
 from edge.commands.source import Opened, open_joints, open_skin
 from edge.errors import InputError
+from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
 from edge.skin.loop import Loop, stop_on
 from edge.touch.arm import Chain
@@ -27,6 +28,8 @@ from edge.touch.track import ContactTracker, TrackSettings
 
 LOG = logging.getLogger(__name__)
 
+LONGEST_STEM = 60
+"""Characters of a file's name from its labels: with four bytes each, a name has at most 255."""
 LEAD_S = 0.2
 LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest allows longer windows to be tried."""
@@ -130,15 +133,17 @@ _DEBOUNCE = TrackSettings().debounce
 
 
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
-    """Frames as a recording, with joint angles if every frame has them."""
+    """Frames as a recording; NaN for the joint angles of a frame in which they were not known."""
     valid = np.array(
         [np.ones(f.counts.shape, bool) if f.valid is None else f.valid for f in frames]
     )
-    joints = [f.joints for f in frames if f.joints is not None]
+    dof = next((len(f.joints) for f in frames if f.joints is not None), None)
+    unknown = np.full(dof or 0, np.nan)
+    joints = np.array([unknown if f.joints is None else f.joints for f in frames])
     return Recording(
         t=np.array([f.t - frames[0].t for f in frames]),
         frames=np.array([f.counts for f in frames]),
-        joints=np.array(joints) if len(joints) == len(frames) else None,
+        joints=None if dof is None else joints,
         valid=None if valid.all() else valid,
         meta=meta,
     )
@@ -155,7 +160,8 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
         if path.exists():
             raise InputError(f"{path}: exists already; choose another name or remove it")
         return path
-    stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())) or "trial"
+    # A name that begins with a dot is hidden, and a folder's listing passes over it.
+    stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
     taken = {p.name for p in path.glob(f"{stem}-*.npz")} if path.is_dir() else set()
     number = 1
     while f"{stem}-{number:03}.npz" in taken:
@@ -176,7 +182,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--lead must be 0 to 60 seconds, --length 0.1 to 600")
     single = Path(arguments.out).suffix == ".npz"
     wanted = 1 if single else arguments.trials
-    trial_path(arguments.out, labels)
+    check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
     if arguments.dof not in (None, dof):
@@ -249,7 +255,17 @@ def _save(
     if names is not None and all(frame.joints is not None for frame in frames):
         meta["joint_names"] = list(names)
     trial = recording(frames, meta)
-    save(path, trial, overwrite=False)
+    while True:
+        try:
+            save(path, trial, overwrite=False)
+            break
+        except NameTaken:
+            # Another recorder in this folder was faster: the next name that is free.
+            path = trial_path(out, labels)
+            trial.meta["trial"] = path.stem
+    without = sum(frame.joints is None for frame in frames)
+    if without and (trial.joints is not None or opened.playback is None):
+        LOG.warning("%s: %d of %d frames have no joint angles", path, without, len(frames))
     event = {
         "event": "saved",
         "file": str(path),
@@ -257,6 +273,7 @@ def _save(
         "frames": len(frames),
         "seconds": round(frames[-1].t - frames[0].t, 3),
         "joints": trial.joints is not None,
+        **({"frames_without_joints": without} if trial.joints is not None and without else {}),
         "missing_taxels": trial.valid is not None,
         "complete": complete,
     }

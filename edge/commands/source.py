@@ -141,6 +141,7 @@ def open_joints(
     if dof is None:
         raise InputError("--joints: the model measures motion without joint angles; leave it out")
     kind, _, address = arguments.joints.partition(":")
+    source: Any
     listener: Any = None
     if kind == "stdin" and not address:
         source = joint_stream.from_file(sys.stdin.fileno())
@@ -161,6 +162,10 @@ def open_joints(
     finally:
         if listener is not None:
             listener.close()
+            for name, count in source.others.items():
+                LOG.warning(
+                    "--joints: %d datagrams of a second sender, %s, were ignored", count, name
+                )
         if stream.malformed:
             LOG.warning(
                 "--joints: %d lines could not be used; of the last: %s",

@@ -80,7 +80,10 @@ class Playback:
 
     def at(self, t: float) -> NDArray[np.float64] | None:
         """Joint angles (dof,) at `t`, where the recording has them."""
-        return None if self._joints is None else self._joints[self._index(t)]
+        if self._joints is None:
+            return None
+        joints: NDArray[np.float64] = self._joints[self._index(t)]
+        return None if np.isnan(joints[0]) else joints
 
 
 def calibrated(file: SkinFile) -> SkinFile:

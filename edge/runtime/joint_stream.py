@@ -9,25 +9,35 @@ is older by the difference.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import select
 import socket
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.config import parse_json
 from edge.errors import InputError
 from edge.touch.arm import joint_columns
 
 OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
 LONGEST_LINE = 65536
-MOST_READS = 64
-"""Of one frame, so that a flood of lines does not stop the loop."""
+MOST_LINES, MOST_READS, MOST_BYTES = 64, 64, 65536
+"""Lines, datagrams and bytes that one frame takes in, so that a flood does not stop the loop. Of
+more lines the newest are taken: two senders at 1 kHz give 20 lines in a frame."""
+AHEAD_S = 0.02
+"""A line that seems to have come by so much faster than the quickest tenth of the last 64 says a
+time that is wrong; unless others do so too, when the sender's clock was set."""
+RECENT, LEAST_RECENT = 64, 8
+BACKWARD_LINES = 16
+"""Lines in a row whose time goes back before the sender is taken to have set its clock back."""
+SILENT_S = 1.0
+"""After so long without a line from the sender that was chosen, another one may take its place."""
 WINDOW_S = 10.0
 """The shortest delay is that of the last 10 to 20 seconds, so that it follows a clock's drift."""
 RESTART_S = 1.0
@@ -75,6 +85,9 @@ class Joints:
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
         self._delay = [math.inf, math.inf]
         """Shortest arrival minus t in the window that runs, and in the one before."""
+        self._recent: deque[float] = deque(maxlen=RECENT)
+        """Arrival minus t of the last lines, those that were rejected too."""
+        self._backward = 0
         self._window_ends = -math.inf
         self._ended = False
         self.received = 0
@@ -116,29 +129,42 @@ class Joints:
 
     def _take(self) -> None:
         """Take in what has come."""
-        arrived = self._now()
+        arrived, taken = self._now(), 0
+        lines: list[bytes] = []
         for _ in range(MOST_READS):
-            data = None if self._ended else self._source()
+            data = None if self._ended or taken >= MOST_BYTES else self._source()
             if not data:
-                self._ended = data is None
+                self._ended = self._ended or (data is None and taken < MOST_BYTES)
                 break
-            *lines, self._rest = (self._rest + data).split(b"\n")
-            for line in lines:
-                if line.strip():
-                    self._line(line, arrived)
+            taken += len(data)
+            *more, self._rest = (self._rest + data).split(b"\n")
+            lines += more
             if len(self._rest) > LONGEST_LINE:
                 self._rest = b""
                 self._bad(f"a line is longer than {LONGEST_LINE} bytes")
+        if len(lines) > MOST_LINES:
+            self._bad(f"more than {MOST_LINES} lines came in one frame", len(lines) - MOST_LINES)
+        for line in lines[-MOST_LINES:]:
+            if line.strip():
+                self._line(line, arrived)
 
-    def _bad(self, problem: str) -> None:
-        self.malformed += 1
+    def _bad(self, problem: str, lines: int = 1) -> None:
+        self.malformed += lines
         self.problem = problem
+
+    def _ahead(self, delay: float) -> bool:
+        """Whether a line's time is so far ahead of the other lines' that it must be wrong."""
+        if self._shared:
+            return delay < -AHEAD_S
+        self._recent.append(delay)
+        quickest = sorted(self._recent)[len(self._recent) // 10]
+        return len(self._recent) >= LEAST_RECENT and delay < quickest - AHEAD_S
 
     def _line(self, line: bytes, arrived: float) -> None:
         try:
-            pose = json.loads(line)
+            pose = parse_json(line, "a line")
             t, q = pose["t"], pose["q"]
-        except (ValueError, KeyError, TypeError, RecursionError):
+        except (InputError, KeyError, TypeError):
             return self._bad('a line is not {"t": seconds, "q": [angles]}')
         numbers = [t, *q] if isinstance(q, list) else []
         if not numbers or any(
@@ -162,11 +188,16 @@ class Joints:
             finite = False
         if not finite:
             return self._bad("a time or an angle is not finite")
+        if self._ahead(arrived - t):
+            return self._bad("its time is ahead of the other lines'")
         if self._poses and t <= self._poses[-1][0]:
-            if t > self._poses[-1][0] - RESTART_S:
+            self._backward += 1
+            if t > self._poses[-1][0] - RESTART_S and self._backward < BACKWARD_LINES:
                 return self._bad("time goes back")
             self._poses.clear()
+            self._recent.clear()
             self._delay = [math.inf, math.inf]
+        self._backward = 0
         self.received += 1
         if arrived > self._window_ends:
             self._window_ends = arrived + WINDOW_S
@@ -186,30 +217,53 @@ def from_file(fd: int) -> Source:
     return source
 
 
-def from_udp(address: str) -> tuple[Source, socket.socket]:
+class Datagrams:
+    """What one sender has sent to a socket: the first that is heard, until it falls silent.
+
+    The clocks of two senders differ, so that their lines must not be mixed.
+
+    Attributes:
+        others: {sender: datagrams that were left out}.
+    """
+
+    def __init__(self, listener: socket.socket, now: Callable[[], float] = time.monotonic) -> None:
+        self._listener, self._now = listener, now
+        self._sender: object = None
+        self._heard = -math.inf
+        self.others: dict[str, int] = {}
+
+    def __call__(self) -> bytes | None:
+        """The next datagram as lines, or b"" for none."""
+        try:
+            data, sender = self._listener.recvfrom(LONGEST_LINE)
+        except BlockingIOError:
+            return b""
+        now = self._now()
+        if sender != self._sender and now - self._heard < SILENT_S:
+            name = f"{sender[0]}:{sender[1]}"
+            if name in self.others or len(self.others) < MOST_LINES:
+                self.others[name] = self.others.get(name, 0) + 1
+            return b"\n"
+        self._sender, self._heard = sender, now
+        return data + b"\n"
+
+
+def from_udp(address: str) -> tuple[Datagrams, socket.socket]:
     """Datagrams of one or more lines, on `PORT` of the loopback interface or on `HOST:PORT`.
 
     Raises:
         InputError: the address makes no sense or cannot be bound.
     """
     host, _, port = address.rpartition(":")
-    if not port.isdecimal() or not 0 <= int(port) <= 65535:
+    if not (port.isascii() and port.isdecimal() and int(port[:6]) <= 65535):
         raise InputError(f"joints udp:{address}: give udp:PORT or udp:HOST:PORT")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_DGRAM)
     try:
         listener.bind((host.strip("[]") or "127.0.0.1", int(port)))
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: a name that IDNA does not allow
         listener.close()
-        raise InputError(
-            f"joints udp:{address}: cannot be bound: {error.strerror or error}"
-        ) from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"joints udp:{address}: cannot be bound: {reason}") from None
     listener.setblocking(False)
-
-    def source() -> bytes | None:
-        try:
-            return listener.recv(LONGEST_LINE) + b"\n"
-        except BlockingIOError:
-            return b""
-
-    return source, listener
+    return Datagrams(listener), listener

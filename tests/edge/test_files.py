@@ -5,7 +5,15 @@ import os
 import pytest
 
 from edge.errors import InputError
-from edge.files import open_regular, parsing, read_bytes, read_text, write_whole
+from edge.files import (
+    NameTaken,
+    check_writable,
+    open_regular,
+    parsing,
+    read_bytes,
+    read_text,
+    write_whole,
+)
 
 
 def test_a_regular_file_is_read(tmp_path):
@@ -71,3 +79,48 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
     with write_whole(path) as file:
         file.write(b"after")
     assert (path.read_text(), os.listdir(tmp_path)) == ("after", ["a"])
+
+
+def test_a_name_that_another_process_takes_first_stays_as_it_is(tmp_path):
+    path = tmp_path / "a"
+    with pytest.raises(NameTaken, match="exists already"), write_whole(path, overwrite=False) as f:  # noqa: PT012
+        f.write(b"mine")
+        path.write_text("theirs")
+    assert (path.read_text(), os.listdir(tmp_path)) == ("theirs", ["a"])
+
+
+def test_where_there_are_no_hard_links_a_file_is_still_whole_and_overwrites_none(
+    tmp_path, monkeypatch
+):
+    def refused(*_):
+        raise PermissionError(1, "Operation not permitted")  # what FAT answers
+
+    monkeypatch.setattr(os, "link", refused)
+    with write_whole(tmp_path / "a", overwrite=False) as file:
+        file.write(b"first")
+    with pytest.raises(NameTaken), write_whole(tmp_path / "a", overwrite=False) as file:
+        file.write(b"second")
+    assert ((tmp_path / "a").read_bytes(), os.listdir(tmp_path)) == (b"first", ["a"])
+
+
+def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    order = []
+    fsync, replace = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda fd: order.append("fsync") or fsync(fd))
+    monkeypatch.setattr(os, "replace", lambda *names: order.append("name") or replace(*names))
+    with write_whole(tmp_path / "a") as file:
+        file.write(b"x")
+    assert order == ["fsync", "name", "fsync"]
+
+
+def test_the_longest_name_can_be_written(tmp_path):
+    with write_whole(tmp_path / ("a" * 255)) as file:
+        file.write(b"x")
+
+
+def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
+    (tmp_path / "file").write_text("")
+    check_writable(tmp_path / "new" / "folder")
+    for folder in (tmp_path / "file" / "folder", "/proc/none", "a\0b"):
+        with pytest.raises(InputError, match="cannot be written"):
+            check_writable(folder)

@@ -3,6 +3,7 @@
 import json
 import os
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -131,10 +132,10 @@ def test_the_clocks_may_drift_apart(wire):
         (b'{"t": 1.0, "q": [1, true]}', "not a number"),
         (b'{"t": 1.0, "q": [1, null]}', "not a number"),
         (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm has 2"),
-        (b'{"t": 1.0, "q": [1, NaN]}', "not finite"),
-        (b'{"t": Infinity, "q": [1, 2]}', "not finite"),
-        (b'{"t": 1e400, "q": [1, 2]}', "not finite"),
-        (b'{"t": 1' + b"0" * 400 + b', "q": [1, 2]}', "not finite"),
+        (b'{"t": 1.0, "q": [1, NaN]}', "a line is not"),
+        (b'{"t": Infinity, "q": [1, 2]}', "a line is not"),
+        (b'{"t": 1e400, "q": [1, 2]}', "a line is not"),
+        (b'{"t": 1' + b"0" * 400 + b', "q": [1, 2]}', "a line is not"),
         (b"[" * 100_000, "longer than"),
         (b"\xff\xfe", "is not"),
         (b'{"t": 0.995, "q": [1, 2]}', "goes back"),
@@ -222,3 +223,62 @@ def test_names_that_do_not_suit_are_refused(named, q, names, problem):
     named.send(5.0, q, names=names)
     assert named.at() is None
     assert named.joints.problem.startswith(problem)
+
+
+@pytest.mark.parametrize("ahead_s", [0.03, 0.3, 100.0])
+def test_one_line_ahead_of_time_costs_one_line(wire, ahead_s):
+    stream(wire, n=50)
+    wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
+    assert wire.joints.at(wire.now) is not None
+    for i in range(50, 100):
+        wire.now = i * 0.01 + 0.002
+        wire.send(i * 0.01 + 1000.0, [i * 0.01, -i * 0.01])
+        assert wire.at() == pytest.approx([i * 0.01, -i * 0.01], abs=1e-6)
+    assert (wire.joints.malformed, wire.joints.missing) == (1, 0)
+    assert "ahead" in wire.joints.problem
+
+
+@pytest.mark.parametrize("step_s", [0.5, -0.5])
+def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
+    stream(wire, n=50)
+    known = []
+    for i in range(50, 150):
+        wire.now = i * 0.01 + 0.002
+        wire.send(i * 0.01 + 1000.0 + step_s, [i * 0.01, 0.0])
+        known.append(wire.at())
+    assert None not in known[60:]
+    assert known[-1] == pytest.approx([1.49, 0.0], abs=1e-6)
+
+
+def test_a_flood_of_lines_is_bounded_in_each_frame(wire):
+    reads = []
+
+    def flood():
+        reads.append(1)
+        return b"{}\n" * 20_000
+
+    joints = Joints(flood, dof=2, now=lambda: 0.0)
+    joints.at(0.0)
+    assert len(reads) <= 2
+    assert joints.malformed >= 20_000
+    assert "more than 64 lines" in joints.problem or joints.received == 0
+
+
+def test_of_two_senders_one_is_heard_and_the_other_counted():
+    now = [0.0]
+    source, listener = from_udp("0")
+    source._now = lambda: now[0]
+    with listener, udp() as first, udp() as second:
+        for sender, text in ((first, b"a"), (second, b"b"), (first, b"c")):
+            sender.sendto(text, listener.getsockname())
+        time.sleep(0.05)
+        assert [source().strip() for _ in range(4)] == [b"a", b"", b"c", b""]
+        assert list(source.others.values()) == [1]
+        now[0] = 2.0  # the first has fallen silent
+        second.sendto(b"d", listener.getsockname())
+        time.sleep(0.05)
+        assert source().strip() == b"d"
+
+
+def udp():
+    return socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
