@@ -29,9 +29,9 @@ from edge.commands.bench import machine
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.model import Model
-from export.__main__ import describe
+from edge.touch.features import SAMPLES
+from export.api import describe
 from export.graph import to_onnx
-from train.crossval import Chosen
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
 
@@ -75,7 +75,7 @@ def sized(
     y = dataset.labels(task)[np.arange(len(X)) % len(dataset.trials)]
     choice = Choice(SCALING, components, k)
     fitted = ContactClassifier({task: choice}, dataset.names).fit(X, {task: y})
-    info = describe(dataset, fitted, {task: Chosen(choice, 0.0)}, 1.2)
+    info = describe(dataset, fitted, {}, 1.2, SAMPLES)
     data = to_onnx(fitted, replace(info, rows=len(X)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.onnx"

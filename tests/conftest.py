@@ -93,6 +93,10 @@ def recordings(tmp_path_factory) -> Path:
     return folder
 
 
+PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")
+"""Options of `make export` that give the paper's features, where a test is not about the choice."""
+
+
 @pytest.fixture(scope="session")
 def exported(recordings, tmp_path_factory) -> Path:
     """A folder with the model.onnx and golden.npz of those recordings.
@@ -105,7 +109,7 @@ def exported(recordings, tmp_path_factory) -> Path:
     from export.__main__ import main
 
     out = tmp_path_factory.mktemp("exported")
-    assert main(["--data", str(recordings), "--out", str(out), "--jobs", "1"]) == 0
+    assert main(["--data", str(recordings), "--out", str(out), *PAPER]) == 0
     return out
 
 

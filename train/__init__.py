@@ -1,1 +1,21 @@
-"""The workstation: recordings to a fitted pipeline."""
+"""The workstation: recordings to a fitted model.
+
+`train.fit` is what `make export` does, from Python; `export.save` writes what it gives.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from train.fitting import Fitted, fit
+
+__all__ = ["Fitted", "fit"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        from importlib import import_module
+
+        return getattr(import_module("train.fitting"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

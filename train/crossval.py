@@ -8,8 +8,7 @@ component count serves all k, and votes are accumulated over k.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -20,8 +19,7 @@ from tqdm import tqdm
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.distance import running_squares
-from train.pipeline import Choice
-from train.projection import SCALINGS, Grid, Spectrum, gains_of, on_grid
+from train.projection import Grid, Spectrum, gains_of, on_grid
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -216,61 +214,6 @@ def leave_one_out(
         jobs=jobs,
     )
     return accuracies(rows, np.asarray(y))
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """The best cell of a task's grid."""
-
-    choice: Choice
-    accuracy: float
-
-
-def choose(
-    X: NDArray[np.float64],
-    y: Mapping[str, NDArray[np.str_]],
-    *,
-    scalings: Sequence[str] = SCALINGS,
-    components: int | None = None,
-    k: int | None = None,
-    features: Sequence[str] = FEATURES,
-    jobs: int = 1,
-    progress: bool = False,
-) -> dict[str, Chosen]:
-    """For each task the scaling, components and k of the highest leave-one-out accuracy.
-
-    Equal cells go to the smallest model: fewest components, then the smallest k, then the
-    earlier scaling. `components` and `k` fix a value instead. Methods I and II, and no scaling
-    and Method III, differ by a constant per feature type that centring removes: they have the
-    same neighbours but for rounding, and only the earlier of each pair is fitted.
-    """
-    if k is not None and k > len(X) - 1:
-        raise InputError(f"k must be 1 to {len(X) - 1} with {len(X)} trials, not {k}")
-    seen: set[str] = set()
-    best: dict[str, tuple[tuple[float, int, int, int], Chosen]] = {}
-    for order, scaling in enumerate(scalings):
-        twin = {"III": "none", "II": "I"}.get(scaling, scaling)
-        if twin in seen:
-            continue
-        seen.add(twin)
-        rows = neighbours(
-            X,
-            scaling=scaling,
-            max_components=components or min(MAX_COMPONENTS, len(X) - 1),
-            max_k=k or MAX_K,
-            features=features,
-            jobs=jobs,
-            progress=progress,
-        )
-        for task, labels in y.items():
-            grid = accuracies(rows, labels)
-            for c in range(grid.shape[0]) if components is None else [components - 1]:
-                for j in range(grid.shape[1]) if k is None else [k - 1]:
-                    key = (-float(grid[c, j]), c, j, order)
-                    if task not in best or key < best[task][0]:
-                        found = Chosen(Choice(scaling, c + 1, j + 1), float(grid[c, j]))
-                        best[task] = (key, found)
-    return {task: found for task, (_, found) in best.items()}
 
 
 def jobs_here() -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,25 +16,48 @@ from edge.errors import InputError
 from edge.recording import Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
-from edge.touch.contact import FeatureSeries
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
+from edge.touch.contact import Contact, FeatureSeries
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
+from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, TrackSettings, first_contact
+from edge.touch.track import ContactTracker, TrackSettings
+
+NO_CONTACT = "none"
+"""The label of a recording in which nothing is touched."""
+ALIKE = "alike"
+"""`meta.contacts` of a recording whose contacts all have its labels."""
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """Recordings as read from their files.
+
+    Attributes:
+        paths: of the files, in their order.
+        recordings: one a file.
+        digest: SHA-256 over the files' bytes.
+    """
+
+    paths: tuple[Path, ...]
+    recordings: tuple[Recording, ...]
+    digest: str
+
+    @property
+    def joints(self) -> bool:
+        """Whether most of them have joint angles."""
+        have = sum(recording.joints is not None for recording in self.recordings)
+        return 2 * have > len(self.recordings)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One recording's first contact."""
+    """One contact of a recording: the first, or each where the recording labels each."""
 
     path: Path
     recording: Recording
+    labels: dict[str, str]
     onset_s: float
     series: FeatureSeries
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """{task: label}."""
-        return self.recording.labels
 
 
 @dataclass(frozen=True)
@@ -45,28 +68,41 @@ class DataSet:
         trials: in the order of the files' names.
         layout: the skin, with the thresholds that all trials were followed with.
         tracking: how contacts were followed.
-        chain: the arm, where every trial has joint angles and a feature calls for them; motion
+        chain: the arm, where the trials have joint angles and a feature calls for them; motion
             is then in the world's frame.
-        names: the features that were measured, by default the paper's three.
-        untouched: recordings in which no contact was found.
+        untouched: recordings in which no contact was found, with their labels.
         digest: SHA-256 over the recordings' bytes.
+        names: the features that were measured, by default the paper's three.
+        joints: joint angles of a frame, where a feature is made of them; else 0.
+        tasks: keys of the labels, sorted; every trial has them all.
+        left_out: {what they lack: recordings that were left out for it}.
+        unused: recordings with contacts beyond those that were used.
     """
 
     trials: tuple[Trial, ...]
     layout: SkinLayout
     tracking: TrackSettings
     chain: Chain | None
-    untouched: tuple[Path, ...]
+    untouched: tuple[tuple[Path, dict[str, str]], ...]
     digest: str
-    names: tuple[str, ...] = FEATURES
-    joints: int = 0
-    """Joint angles of a frame, where a feature is made of them."""
+    names: tuple[str, ...]
+    joints: int
+    tasks: tuple[str, ...]
+    left_out: dict[str, tuple[Path, ...]]
+    unused: tuple[Path, ...]
 
-    @property
-    def tasks(self) -> tuple[str, ...]:
-        """The keys that all trials' labels share, sorted."""
-        shared = set.intersection(*(set(trial.labels) for trial in self.trials))
-        return tuple(sorted(shared))
+    def untouched_labels(self, task: str) -> list[str]:
+        """The labels for a task of the recordings in which no contact was found."""
+        return [labels[task] for _, labels in self.untouched if task in labels]
+
+    def groups(self, key: str) -> NDArray[np.str_] | None:
+        """(n,) what each trial's labels or metadata say under a key; None where one lacks it."""
+        found = [trial.labels.get(key, trial.recording.meta.get(key)) for trial in self.trials]
+        return None if None in found else np.array([str(value) for value in found])
+
+    def widths(self, samples: int = SAMPLES) -> tuple[int, ...]:
+        """Columns of each feature in `features`."""
+        return widths(self.names, samples, self.layout, self.joints)
 
     def labels(self, task: str) -> NDArray[np.str_]:
         """(n,) the trials' labels for a task."""
@@ -87,6 +123,17 @@ class DataSet:
         """
         names = self.names if names is None else tuple(names)
         return np.stack([feature_vector(t.series, window_s, samples, names) for t in self.trials])
+
+    def of(self, names: Sequence[str]) -> DataSet:
+        """The same trials with some of the features measured, in the order of `self.names`."""
+        taken = tuple(name for name in self.names if name in names)
+        types = measures.features(taken)
+        return replace(
+            self,
+            names=taken,
+            chain=self.chain if any(feature.moves for feature in types) else None,
+            joints=self.joints if any(feature.of_joints for feature in types) else 0,
+        )
 
     @property
     def units(self) -> dict[str, str]:
@@ -129,7 +176,19 @@ def _contents(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
 
 
-def _load_all(paths: list[Path], progress: bool) -> tuple[list[Recording], str]:
+def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
+    """Read recordings, each file once.
+
+    Args:
+        data: `.npz` files and folders of them.
+        progress: show a progress bar on stderr.
+
+    Raises:
+        InputError: no file is named, or one cannot be used.
+    """
+    paths = find([str(path) for path in data])
+    if not paths:
+        raise InputError("no recordings given; name .npz files or a folder of them")
     digest = hashlib.sha256()
     recordings: list[Recording] = []
     bad: list[str] = []
@@ -143,11 +202,11 @@ def _load_all(paths: list[Path], progress: bool) -> tuple[list[Recording], str]:
     if bad:
         more = f" (and {len(bad) - 1} more files)" if len(bad) > 1 else ""
         raise InputError(f"{bad[0]}{more}; repair or remove it, nothing was fitted")
-    return recordings, digest.hexdigest()
+    return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 
 def load_trials(
-    data: Sequence[str | Path],
+    data: Recordings | Sequence[str | Path],
     *,
     threshold: int | None = None,
     onset: int | None = None,
@@ -157,10 +216,15 @@ def load_trials(
     arm: Chain | None = None,
     progress: bool = False,
 ) -> DataSet:
-    """Read recordings and follow the first contact of each.
+    """Follow the contacts of recordings.
+
+    A recording's first contact is a trial, with the recording's labels. Where `meta.contacts` is
+    "alike", each of its contacts is; where it is a list of labels, the contacts have these in
+    their order. What most recordings have and a few lack (a task's label; joint angles, where a
+    feature calls for them) is not taken from the others: the few are left out, by name.
 
     Args:
-        data: `.npz` files and folders of them.
+        data: recordings, or `.npz` files and folders of them.
         threshold: counts above which a taxel is in contact; the first recording's where None.
             One for all, as the board cannot know which object it touches.
         onset: counts above which a contact begins; scaled with the threshold where None.
@@ -173,86 +237,144 @@ def load_trials(
     Raises:
         InputError: a file cannot be used, the skins differ, or nothing is labelled or touched.
     """
-    names = tuple(feature.name for feature in measures.features(tuple(features)))
-    moving = any(measures.feature(name).moves for name in names)
-    paths = find([str(path) for path in data])
-    if not paths:
-        raise InputError("no recordings given; name .npz files or a folder of them")
-    recordings, digest = _load_all(paths, progress)
-    reference = recordings[0].layout
-    if threshold is not None:
-        begin = onset
-        if begin is None:
-            ratio = (
-                reference.onset / reference.threshold_counts if reference.threshold_counts else 1
-            )
-            begin = round(threshold * ratio)
-        reference = replace(reference, threshold_counts=threshold, onset_counts=begin)
-    elif onset is not None:
-        reference = replace(reference, onset_counts=onset)
-    reference = replace(reference, dead=_dead(recordings))
-    arms = [arm_of(r, str(p), arm) for r, p in zip(recordings, paths, strict=True)]
-    recordings = [
-        recording if of is None else recording.for_joints(of.names)
-        for recording, of in zip(recordings, arms, strict=True)
+    types = measures.features(tuple(features))
+    raw = data if isinstance(data, Recordings) else read(data, progress=progress)
+    reference = _thresholds(raw.recordings[0].layout, threshold, onset)
+    reference = replace(reference, dead=_dead(raw.recordings))
+    needed = any(feature.of_joints for feature in types)
+    tasks, left_out = _lacking(raw, needed or any(feature.moves for feature in types))
+    out = {path for paths in left_out.values() for path in paths}
+    kept = [(r, p) for r, p in zip(raw.recordings, raw.paths, strict=True) if p not in out]
+    arms = [arm_of(recording, str(path), arm) for recording, path in kept]
+    kept = [
+        (recording if of is None else recording.for_joints(of.names), path)
+        for (recording, path), of in zip(kept, arms, strict=True)
     ]
-    chain = arms[0] if moving and None not in arms else None
+    moving = any(feature.moves for feature in types) and None not in arms
+    chain = arms[0] if moving else None
     if chain is not None:
-        for other, path in zip(arms, paths, strict=True):
+        for other, (_, path) in zip(arms, kept, strict=True):
             if other is not None and other.to_dict() != chain.to_dict():
-                raise InputError(f"{path}: its arm is not that of {paths[0]}; train on one arm")
-    joints = 0
-    if any(measures.feature(name).of_joints for name in names):
-        joints = _joint_angles(recordings, paths)
+                raise InputError(f"{path}: its arm is not that of {kept[0][1]}; train on one arm")
+    joints = _joint_angles(kept) if needed else 0
+    names = tuple(feature.name for feature in types)
     settings = tracking or TrackSettings()
     trials: list[Trial] = []
-    untouched: list[Path] = []
-    both = list(zip(recordings, paths, strict=True))
-    for recording, path in tqdm(both, desc="following", unit=" trials", disable=not progress):
+    untouched: list[tuple[Path, dict[str, str]]] = []
+    unused: list[Path] = []
+    for recording, path in tqdm(kept, desc="following", unit=" trials", disable=not progress):
         try:
-            layout = for_device(reference, recording.layout)
             tracker = ContactTracker(
-                layout,
+                for_device(reference, recording.layout),
                 settings,
                 chain=chain,
                 horizon_s=horizon_s,
                 features=names,
                 joints=joints,
             )
-            found = first_contact(recording, tracker)
+            found = contacts(recording, tracker)
+            labels = labels_of(recording, len(found))
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
-        if found is None:
-            untouched.append(path)
-        else:
-            trials.append(Trial(path, recording, *found))
+        if not found:
+            untouched.append((path, recording.labels))
+        if len(found) > len(labels):
+            unused.append(path)
+        trials += [
+            Trial(path, recording, own, *one) for own, one in zip(labels, found, strict=False)
+        ]
     if not trials:
         raise InputError(
-            f"no contact in any of {len(paths)} recordings; lower the threshold "
+            f"no contact in any of {len(kept)} recordings; lower the threshold "
             f"of {reference.threshold_counts} counts"
         )
-    dataset = DataSet(
-        tuple(trials), reference, settings, chain, tuple(untouched), digest, names, joints
+    return DataSet(
+        tuple(trials),
+        reference,
+        settings,
+        chain,
+        tuple(untouched),
+        raw.digest,
+        names,
+        joints,
+        tasks,
+        left_out,
+        tuple(unused),
     )
-    if not dataset.tasks:
+
+
+def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> list[tuple[float, FeatureSeries]]:
+    """Onset in seconds and series of every contact of a recording, in their order."""
+    found: dict[int, Contact] = {}
+    for frame in frames:
+        found |= {id(contact): contact for contact in tracker.push(frame)}
+    return [(contact.onset_s, contact.series()) for contact in found.values()]
+
+
+def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
+    """The labels of a recording's contacts, of which it has `count`: those that are trials."""
+    each = recording.meta.get("contacts")
+    if each is None:
+        return [recording.labels]
+    if each == ALIKE:
+        return [recording.labels] * count
+    if not isinstance(each, list) or not all(isinstance(one, dict) for one in each):
+        raise InputError(f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact')
+    if len(each) != count:
+        raise InputError(
+            f"meta.contacts labels {len(each)} contacts, {count} are found; mend the labels or "
+            "the threshold"
+        )
+    return [{**recording.labels, **{str(k): str(v) for k, v in one.items()}} for one in each]
+
+
+def _each(recording: Recording) -> list[dict[str, str]]:
+    each = recording.meta.get("contacts")
+    return [one for one in each if isinstance(one, dict)] if isinstance(each, list) else []
+
+
+def _thresholds(layout: SkinLayout, threshold: int | None, onset: int | None) -> SkinLayout:
+    """The skin with other thresholds, where they are given."""
+    if threshold is not None:
+        ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1
+        begin = round(threshold * ratio) if onset is None else onset
+        return replace(layout, threshold_counts=threshold, onset_counts=begin)
+    return layout if onset is None else replace(layout, onset_counts=onset)
+
+
+def _lacking(raw: Recordings, joints: bool) -> tuple[tuple[str, ...], dict[str, tuple[Path, ...]]]:
+    """The tasks that most recordings have a label for, and what a few lack."""
+    labels = [set(r.labels).union(*_each(r)) for r in raw.recordings]
+    keys = sorted(set().union(*labels))
+    tasks = tuple(
+        key for key in keys if 2 * sum(key in own for own in labels) > len(raw.recordings)
+    )
+    if not tasks:
         raise InputError(
             "the recordings share no label; give every one the same keys under meta.labels"
         )
-    return dataset
+    both = list(zip(raw.paths, raw.recordings, labels, strict=True))
+    lacking = {
+        f"a label for {task}": tuple(path for path, _, own in both if task not in own)
+        for task in tasks
+    }
+    if joints and raw.joints:
+        lacking["joint angles"] = tuple(path for path, r, _ in both if r.joints is None)
+    return tasks, {what: paths for what, paths in lacking.items() if paths}
 
 
-def _joint_angles(recordings: list[Recording], paths: list[Path]) -> int:
+def _joint_angles(kept: Sequence[tuple[Recording, Path]]) -> int:
     """How many every recording has."""
-    counts = [0 if r.joints is None else r.joints.shape[1] for r in recordings]
-    for count, path in zip(counts, paths, strict=True):
+    counts = [0 if r.joints is None else r.joints.shape[1] for r, _ in kept]
+    for count, (_, path) in zip(counts, kept, strict=True):
         if count == 0:
             raise InputError(f"{path}: has no joint angles; leave out the features made of them")
         if count != counts[0]:
-            raise InputError(f"{path}: has {count} joint angles, {paths[0]} has {counts[0]}")
+            raise InputError(f"{path}: has {count} joint angles, {kept[0][1]} has {counts[0]}")
     return counts[0]
 
 
-def _dead(recordings: list[Recording]) -> tuple[int, ...]:
+def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Taxels that no frame of any recording could read."""
     shape = recordings[0].frames.shape[1:]
     alive = np.zeros(shape, dtype=bool)

@@ -26,7 +26,7 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.crossval import first_equal, votes_right
 from train.pipeline import Choice, columns_of
-from train.projection import Spectrum, gains_of, on_grid
+from train.projection import Spectrum, gains_of, on_grid, widths_of
 
 FOLDS = 10
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
@@ -79,7 +79,7 @@ class Grid:
         shrinkages: of `lda`, the largest first.
         neighbours: values of k, rising.
         targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
-        name: what a table calls the features.
+        tasks: those it is a candidate for; all where empty.
     """
 
     scaling: str = "none"
@@ -89,14 +89,18 @@ class Grid:
     shrinkages: tuple[float, ...] = SHRINKAGES
     neighbours: tuple[int, ...] = NEIGHBOURS
     targets: tuple[str, ...] = ()
-    name: str = ""
+    tasks: tuple[str, ...] = ()
 
-    def choices(self, classes: int) -> list[Choice]:
-        """Every candidate, in the order of `_answers`."""
+    def choices(self, directions: int) -> list[Choice]:
+        """Every candidate, in the order of `_answers`.
+
+        Args:
+            directions: how many discriminants there are at most.
+        """
         if self.projection == "pca":
             cells = [(c, 0.01) for c in self.components]
         else:
-            cells = [(max(classes - 1, 1), shrinkage) for shrinkage in self.shrinkages]
+            cells = [(directions, shrinkage) for shrinkage in self.shrinkages]
         return [
             Choice(self.scaling, c, k, self.projection, s, self.features, self.targets)
             for c, s in cells
@@ -179,6 +183,7 @@ def _answers(
     test: NDArray[np.int64],
     grids: Sequence[Grid],
     features: Sequence[str],
+    widths: Sequence[int],
 ) -> dict[str, NDArray[np.bool_]]:
     """{task: (candidates, test)} whether each candidate, fitted on `train`, tells the tests."""
     found: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
@@ -188,9 +193,14 @@ def _answers(
         for grid in grids:
             key = grid.scaling, grid.features
             if key not in spectra:
-                names = [name for name in features if name in grid.features] or features
-                part = X[:, columns_of(grid.features, features, X.shape[1])]
-                gains = gains_of(part[train], grid.scaling, names)
+                part = X[:, columns_of(grid.features, features, widths)]
+                taken = [i for i, f in enumerate(features) if f in (grid.features or features)]
+                gains = gains_of(
+                    part[train],
+                    grid.scaling,
+                    [features[i] for i in taken],
+                    [widths[i] for i in taken],
+                )
                 d = (part - part[train].mean(axis=0)) * gains
                 spectra = {key: (Spectrum(d[train]), d)}
             spectrum, d = spectra[key]
@@ -201,6 +211,8 @@ def _answers(
                 else None
             )
             for task, labels in classes.items():
+                if grid.tasks and task not in grid.tasks:
+                    continue
                 near = shared
                 if near is None:
                     targets = np.stack([classes[t][train] for t in grid.targets or (task,)])
@@ -210,6 +222,10 @@ def _answers(
                     most = right.shape[1] - 1
                     found[task] += [right[:, min(j, most)] for j in pick]
     return {task: np.array(right) for task, right in found.items()}
+
+
+def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]) -> int:
+    return max(sum(int(classes[target].max()) for target in targets), 1)
 
 
 @dataclass(frozen=True)
@@ -232,31 +248,47 @@ class Table:
         right = self.right[task]
         return np.asarray(right[self.folds, :, np.arange(len(self.folds))].T)
 
-    def chosen(self, task: str, order: NDArray[np.int64] | None = None) -> int:
+    def chosen(
+        self,
+        task: str,
+        order: NDArray[np.int64] | None = None,
+        among: NDArray[np.int64] | None = None,
+    ) -> int:
         """The candidate chosen by all trials; see `choose`."""
-        return choose(self.held_out(task), order)
+        return choose(self.held_out(task), order, among)
 
-    def nested(self, task: str, order: NDArray[np.int64] | None = None, missed: int = 0) -> Result:
-        """The accuracy of the choice itself.
+    def without(
+        self,
+        task: str,
+        fold: int,
+        order: NDArray[np.int64] | None = None,
+        among: NDArray[np.int64] | None = None,
+    ) -> int:
+        """The candidate chosen without the trials of a fold."""
+        return choose(self.right[task][fold][:, self.folds != fold], order, among)
 
-        Args:
-            task: its name.
-            order: see `choose`.
-            missed: trials without a contact, which count as wrong.
-        """
+    def nested(
+        self,
+        task: str,
+        order: NDArray[np.int64] | None = None,
+        among: NDArray[np.int64] | None = None,
+    ) -> Result:
+        """The accuracy of the choice itself; see `choose`."""
         right, picked = 0, []
         for fold in range(int(self.folds.max()) + 1):
-            own = self.folds == fold
-            seen = self.right[task][fold]
-            cell = choose(seen[:, ~own], order)
-            right += int(seen[cell, own].sum())
+            cell = self.without(task, fold, order, among)
+            right += int(self.right[task][fold][cell, self.folds == fold].sum())
             picked.append(cell)
         cell = int(np.bincount(picked).argmax())
         choice = self.choices[task][cell]
-        return Result(right, len(self.folds) + missed, choice.components, choice.k)
+        return Result(right, len(self.folds), choice.components, choice.k)
 
 
-def choose(right: NDArray[np.bool_], order: NDArray[np.int64] | None = None) -> int:
+def choose(
+    right: NDArray[np.bool_],
+    order: NDArray[np.int64] | None = None,
+    among: NDArray[np.int64] | None = None,
+) -> int:
     """The best candidate; or the cheapest that is not worse by more than a standard error.
 
     The error is that of the difference to the best one on the same trials: two candidates that
@@ -266,13 +298,17 @@ def choose(right: NDArray[np.bool_], order: NDArray[np.int64] | None = None) -> 
         right: (candidates, n) answers of each.
         order: (candidates,) rising with cost; without it the best is taken, of equal ones the
             first.
+        among: the candidates to choose from; all where None.
     """
-    best = int(right.mean(axis=1).argmax())
+    places = np.arange(len(right)) if among is None else among
+    means = right[places].mean(axis=1)
     if order is None:
-        return best
-    worse = right[best].astype(np.int64) - right
+        return int(places[means.argmax()])
+    # Of equally good ones the cheapest is what others are measured against.
+    best = places[np.lexsort((order[places], -means))[0]]
+    worse = right[best].astype(np.int64) - right[places]
     within = worse.mean(axis=1) <= worse.std(axis=1) / np.sqrt(right.shape[1])
-    return int(np.flatnonzero(within)[order[within].argmin()])
+    return int(places[within][order[places[within]].argmin()])
 
 
 def evaluate(
@@ -282,6 +318,7 @@ def evaluate(
     grids: Sequence[Grid],
     *,
     features: Sequence[str] = FEATURES,
+    widths: Sequence[int] | None = None,
     jobs: int = 1,
     progress: str | None = None,
 ) -> Table:
@@ -293,6 +330,7 @@ def evaluate(
         folds: (n,) from 0.
         grids: the candidates.
         features: names of the types, in the order of X.
+        widths: columns of each; equal where None.
         jobs: processes.
         progress: what a bar on stderr is called; none without it.
 
@@ -311,15 +349,23 @@ def evaluate(
     pairs = [(i, j) for i in range(count) for j in range(i, count)]
     tests = [np.flatnonzero((folds == i) | (folds == j)) for i, j in pairs]
     everything = np.arange(len(X))
+    wide = widths_of(X.shape[1], features, widths)
     work = (
-        delayed(_answers)(X, classes, np.delete(everything, test), test, grids, tuple(features))
+        delayed(_answers)(
+            X, classes, np.delete(everything, test), test, grids, tuple(features), wide
+        )
         for test in tests
     )
     parts = Parallel(n_jobs=jobs, return_as="generator")(work)
     bar = tqdm(parts, total=len(pairs), desc=progress, unit=" fits", disable=progress is None)
     choices = {
-        task: [c for grid in grids for c in grid.choices(len(set(labels.tolist())))]
-        for task, labels in classes.items()
+        task: [
+            choice
+            for grid in grids
+            if not grid.tasks or task in grid.tasks
+            for choice in grid.choices(_directions(grid.targets or (task,), classes))
+        ]
+        for task in classes
     }
     right = {task: np.zeros((count, len(choices[task]), len(X)), dtype=bool) for task in classes}
     for (i, j), test, part in zip(pairs, tests, bar, strict=True):

@@ -17,7 +17,7 @@ from sklearn.utils.validation import check_is_fitted
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.distance import squared_distances
-from train.projection import Projection
+from train.projection import Projection, widths_of
 
 
 def vote(labels: NDArray[np.int64], classes: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -133,6 +133,7 @@ class ContactClassifier:
     Args:
         choices: {task: Choice}.
         features: names of the feature types, in the order of the vectors.
+        widths: columns of each; equal where None.
 
     Attributes:
         spaces_: {task: Space}.
@@ -143,9 +144,15 @@ class ContactClassifier:
         components_: {task: components kept}, at most as many as there are.
     """
 
-    def __init__(self, choices: Mapping[str, Choice], features: Sequence[str] = FEATURES) -> None:
+    def __init__(
+        self,
+        choices: Mapping[str, Choice],
+        features: Sequence[str] = FEATURES,
+        widths: Sequence[int] | None = None,
+    ) -> None:
         self.choices = choices
         self.features = tuple(features)
+        self.widths = widths
 
     def fit(self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]) -> ContactClassifier:
         """Fit every task on X (n, p) and its labels y[task] (n,)."""
@@ -161,11 +168,12 @@ class ContactClassifier:
             if choice.components < 1:
                 raise InputError(f"components must be at least 1, not {choice.components}")
         self.spaces_ = {task: choice.space(task) for task, choice in self.choices.items()}
+        widths = widths_of(X.shape[1], self.features, self.widths)
         self.columns_ = {
-            self.spaces_[task]: columns_of(choice.features, self.features, X.shape[1])
+            self.spaces_[task]: columns_of(choice.features, self.features, widths)
             for task, choice in self.choices.items()
         }
-        self.projections_ = projections(self.choices, self.features, X, y)
+        self.projections_ = projections(self.choices, self.features, widths, X, y)
         self.rows_ = {s: self.project(s, X) for s in self.projections_}
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
@@ -206,17 +214,18 @@ class ContactClassifier:
         return answers
 
 
-def columns_of(wanted: Sequence[str], features: Sequence[str], columns: int) -> NDArray[np.int64]:
+def columns_of(
+    wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
+) -> NDArray[np.int64]:
     """The columns of vectors of `features` that hold the `wanted` ones, rising; all of none."""
-    every = np.arange(columns).reshape(len(features), -1)
-    if not wanted:
-        return every.reshape(-1)
-    return every[sorted(list(features).index(name) for name in wanted)].reshape(-1)
+    taken = [not wanted or name in wanted for name in features]
+    return np.flatnonzero(np.repeat(taken, widths))
 
 
 def projections(
     choices: Mapping[str, Choice],
     features: Sequence[str],
+    widths: Sequence[int],
     X: NDArray[np.float64],
     y: Mapping[str, NDArray[np.str_]],
 ) -> dict[Space, Projection]:
@@ -227,15 +236,18 @@ def projections(
         tasks = [other for other, one in choices.items() if one.space(other) == space]
         if space not in found:
             targets = choice.targets or (task,)
-            names = [name for name in features if name in choice.features] or features
+            taken = [
+                i for i, f in enumerate(features) if not choice.features or f in choice.features
+            ]
             found[space] = Projection(
                 choice.scaling,
                 max(choices[other].components for other in tasks),
-                names,
+                [features[i] for i in taken],
                 choice.projection,
                 choice.shrinkage,
+                [widths[i] for i in taken],
             ).fit(
-                X[:, columns_of(choice.features, features, X.shape[1])],
+                X[:, columns_of(choice.features, features, widths)],
                 np.column_stack([y[target] for target in targets]),
             )
     return found

@@ -54,8 +54,30 @@ def _mean(X: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
 
 
+def widths_of(
+    columns: int, features: Sequence[str], widths: Sequence[int] | None = None
+) -> tuple[int, ...]:
+    """How many of so many columns each feature type has: `widths`, or an equal share.
+
+    Raises:
+        InputError: the columns are no whole number of samples a feature.
+    """
+    if widths is None:
+        if columns % len(features):
+            raise InputError(
+                f"{columns} columns are no whole number of samples of {len(features)} features"
+            )
+        return (columns // len(features),) * len(features)
+    if len(widths) != len(features) or sum(widths) != columns:
+        raise InputError(f"{columns} columns are not those of {len(features)} features")
+    return tuple(widths)
+
+
 def scale_of(
-    X: NDArray[np.float64], method: str, features: Sequence[str] = FEATURES
+    X: NDArray[np.float64],
+    method: str,
+    features: Sequence[str] = FEATURES,
+    widths: Sequence[int] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Offset and gain of each feature type: scaled = (x - offset) * gain.
 
@@ -64,27 +86,27 @@ def scale_of(
     it told nothing in training and must not dominate when it moves.
 
     Args:
-        X: (n, features * samples).
+        X: (n, p).
         method: one of `SCALINGS`. Method V brings contact_motion to the range of max_force and
             contact_area and leaves all else alone; without them it is no scaling.
         features: names of the types, in the order of X.
+        widths: columns of each; equal where None.
 
     Returns:
         (features,) and (features,).
 
     Raises:
-        InputError: the method is unknown, or X has no whole number of samples a feature.
+        InputError: the method is unknown, or the columns are not those of the features.
     """
     types = len(features)
-    if X.shape[1] % types:
-        raise InputError(f"{X.shape[1]} columns are no whole number of samples of {types} features")
+    ends = np.cumsum(widths_of(X.shape[1], features, widths))
     if method == "none":
         return np.zeros(types), np.ones(types)
-    blocks = X.reshape(X.shape[0], types, -1)
-    powers = _exponents(blocks, (0, 2))
-    small = np.ldexp(blocks, -powers[:, None])
-    mean = small.mean(axis=(0, 2))
-    largest = np.abs(small).max(axis=(0, 2))
+    blocks = np.split(X, ends[:-1], axis=1)
+    powers = np.array([_exponents(block, (0, 1)) for block in blocks], dtype=np.int32)
+    small = [np.ldexp(block, -power) for block, power in zip(blocks, powers, strict=True)]
+    mean = np.array([block.mean() for block in small])
+    largest = np.array([np.abs(block).max(initial=0.0) for block in small])
     ones, zeros = np.ones(types), np.zeros(types)
 
     def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -99,7 +121,8 @@ def scale_of(
     if method == "III":
         return np.ldexp(mean, powers), ones
     if method == "IV":
-        deviation = np.sqrt(((small - mean[:, None]) ** 2).mean(axis=(0, 2)))
+        squares = [((block - m) ** 2).mean() for block, m in zip(small, mean, strict=True)]
+        deviation = np.sqrt(squares)
         # A spread below the rounding of its own mean is no spread.
         deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
         return np.ldexp(mean, powers), inverse(deviation)
@@ -115,11 +138,14 @@ def scale_of(
 
 
 def gains_of(
-    X: NDArray[np.float64], method: str, features: Sequence[str] = FEATURES
+    X: NDArray[np.float64],
+    method: str,
+    features: Sequence[str] = FEATURES,
+    widths: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
     """(p,) the gain of each column of X (n, p); see `scale_of`."""
-    _, gain = scale_of(X, method, features)
-    return np.repeat(gain, X.shape[1] // len(features))
+    _, gain = scale_of(X, method, features, widths)
+    return np.repeat(gain, widths_of(X.shape[1], features, widths))
 
 
 def _centred(
@@ -311,6 +337,7 @@ class Projection(TransformerMixin, BaseEstimator):
         features: names of the feature types, in the order of X.
         kind: one of `KINDS`.
         shrinkage: of the within-class scatter; `lda` alone uses it.
+        widths: columns of each feature type; equal where None.
 
     Attributes:
         mean_: (p,) subtracted first.
@@ -328,12 +355,14 @@ class Projection(TransformerMixin, BaseEstimator):
         features: Sequence[str] = FEATURES,
         kind: str = "pca",
         shrinkage: float = 0.01,
+        widths: Sequence[int] | None = None,
     ) -> None:
         self.scaling = scaling
         self.components = components
         self.features = features
         self.kind = kind
         self.shrinkage = shrinkage
+        self.widths = widths
 
     def fit(self, X: NDArray[np.float64], y: NDArray[Any] | None = None) -> Projection:
         """Fit to X (n, p), and to the labels y (n,) or (n, tasks) where `kind` is `lda`.
@@ -351,7 +380,7 @@ class Projection(TransformerMixin, BaseEstimator):
             # Scaling shifts each type by a constant, which centring takes away again: the mean is
             # subtracted from the features themselves, where it loses nothing.
             self.mean_ = _mean(X)
-            self.gain_ = gains_of(X, self.scaling, self.features)
+            self.gain_ = gains_of(X, self.scaling, self.features, self.widths)
             d = (X - self.mean_) * self.gain_
         largest = float(np.abs(d).max(initial=0.0))
         if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):

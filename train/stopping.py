@@ -214,6 +214,7 @@ class SequentialClassifier:
         features: names of the feature types, in the order of the vectors.
         seed: of the folds, where none are given.
         jobs: processes.
+        widths: columns of each feature type; equal where None.
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
@@ -229,12 +230,14 @@ class SequentialClassifier:
         features: Sequence[str] = FEATURES,
         seed: int = 0,
         jobs: int = 1,
+        widths: Sequence[int] | None = None,
     ) -> None:
         self.choices = choices
         self.decision_points_s = tuple(decision_points_s)
         self.features = features
         self.seed = seed
         self.jobs = jobs
+        self.widths = widths
 
     def fit(
         self,
@@ -296,7 +299,7 @@ class SequentialClassifier:
     ) -> list[ContactClassifier]:
         # Decompositions this small are slower on several threads, and far slower where those wait.
         with threadpool_limits(1):
-            return [ContactClassifier(choices, self.features).fit(x, y) for x in X]
+            return [ContactClassifier(choices, self.features, self.widths).fit(x, y) for x in X]
 
     def _fold(
         self,

@@ -33,9 +33,13 @@ class Task:
     Attributes:
         labels: the answers, in the order of the scores.
         k: neighbours that vote.
-        components: principal components.
+        components: coordinates that distances are measured in.
         scaling: "none" or "I" to "V" (paper, Eqs. 1 to 5).
-        accuracy: leave-one-out accuracy at export, 0 to 1.
+        accuracy: nested accuracy of the whole choice at export, 0 to 1.
+        projection: "pca" (principal components) or "lda" (discriminants).
+        features: those that it takes, in the order of the model's; all where empty.
+        left_out: what the accuracy left out as a whole: "trial", or a label such as "object".
+        no_contact: the answer where a recording ends without a contact, or None.
     """
 
     labels: tuple[str, ...]
@@ -43,6 +47,10 @@ class Task:
     components: int
     scaling: str
     accuracy: float
+    projection: str = "pca"
+    features: tuple[str, ...] = ()
+    left_out: str = "trial"
+    no_contact: str | None = None
 
 
 @dataclass(frozen=True)
@@ -198,6 +206,10 @@ def _task(table: ConfigTable) -> Task:
         components=table.whole("components", allowed=range(1 << 31)),
         scaling=table.text("scaling"),
         accuracy=table.number("accuracy", low=0.0, high=1.0),
+        projection=table.text("projection"),
+        features=table.texts("features"),
+        left_out=table.text("left_out"),
+        no_contact=table.text("no_contact") if table.has("no_contact") else None,
     )
     table.done()
     return task

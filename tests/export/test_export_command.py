@@ -8,21 +8,33 @@ import pytest
 from edge.model.model import Model
 from export.__main__ import main
 
+PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
 
-def test_the_report_says_what_was_fitted(recordings, tmp_path, capsys):
-    assert main(["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1"]) == 0
+
+def test_the_report_says_what_was_chosen_among_and_what_was_chosen(recordings, tmp_path, capsys):
+    command = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1", "--quick"]
+    assert main(command) == 0
     out = capsys.readouterr()
-    table = [line.split() for line in out.err.splitlines() if line.startswith(("cat", "obj"))]
-    assert [row[:3] for row in table] == [["category", "2", "16"], ["object", "4", "16"]]
-    assert all(row[-1].endswith("%") for row in table)
-    assert "max_force in newton, contact_area in taxel, contact_motion in metre" in out.err
-    assert "motion in the world's frame" in out.err
+    lines = out.err.splitlines()
+    rows = [line for line in lines if line.startswith(("paper ", "contact ", "moments "))]
+    assert [row.split()[:2] for row in rows] == [
+        ["paper", "pca"],
+        ["contact", "lda"],
+        ["moments", "lda"],
+    ]
+    assert sum(row.count("*") for row in rows) == 2  # one a task
+    told = [line for line in lines if line.startswith(("category:", "object:"))]
+    assert all("% (" in line and "of 16 trials, nested" in line for line in told)
+    info = Model(tmp_path / "model.onnx").info
+    assert f"{info.tasks['category'].accuracy:.1%}" in told[0]
+    assert set(info.features) == {f for task in info.tasks.values() for f in task.features}
     assert "reading: 100%" in out.err
     assert out.out.splitlines()[1].endswith("golden.npz")
 
 
 def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
-    assert main(["--data", str(recordings), "--out", str(tmp_path), "--jobs", "2"]) == 0
+    command = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "2", *PAPER]
+    assert main(command) == 0
     for name in ("model.onnx", "golden.npz"):
         assert (tmp_path / name).read_bytes() == (exported / name).read_bytes()
 
@@ -38,13 +50,14 @@ def test_golden_holds_raw_frames_and_hard_vectors(exported):
 
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):
-    fixed = ["--scaling", "II", "--components", "3", "--k", "2", "--window", "0.8"]
+    fixed = ["--scaling", "II", "--components", "3", "--k", "2", "--window", "0.8", *PAPER]
     command = ["--data", str(recordings), "--out", str(tmp_path), "--tasks", "object", *fixed]
     assert main([*command, "--threshold", "120"]) == 0
     info = Model(tmp_path / "model.onnx").info
     assert list(info.tasks) == ["object"]
     task = info.tasks["object"]
     assert (task.scaling, task.components, task.k) == ("II", 3, 2)
+    assert (task.projection, task.features) == ("pca", info.features)
     assert (info.window_s, info.layout.threshold_counts) == (0.8, 120)
 
 
@@ -62,7 +75,8 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
 )
 def test_options_that_make_no_sense_are_one_sentence(options, word, recordings, tmp_path, capsys):
     out = tmp_path / "out"
-    assert main(["--data", str(recordings), "--out", str(out), "--jobs", "1", *options]) == 2
+    command = ["--data", str(recordings), "--out", str(out), "--jobs", "1", *PAPER]
+    assert main([*command, *options]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith("export: ")
     assert word in last
@@ -77,6 +91,6 @@ def test_a_folder_without_recordings_is_named(tmp_path, capsys):
 def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, capsys):
     few = [str(recordings / f"{kind}_{i}.npz") for kind in ("hard", "soft") for i in range(3)]
     command = ["--data", *few, "--out", str(tmp_path), "--components", "20", "--jobs", "1"]
-    assert main(command) == 0
+    assert main([*command, *PAPER]) == 0
     err = capsys.readouterr().err
     assert "span 5 components, 15 fewer than asked for" in err

@@ -15,7 +15,7 @@ SIX = ["skin_force", "right_length", "left_width", "skin_slant", "regions", "con
 def six(recordings, tmp_path_factory):
     out = tmp_path_factory.mktemp("six")
     given = ["--data", str(recordings), "--out", str(out), "--jobs", "1", "--samples", "20"]
-    assert main([*given, "--scaling", "IV", "--features", *SIX]) == 0
+    assert main([*given, "--scaling", "IV", "--projection", "pca", "--features", *SIX]) == 0
     return out
 
 
@@ -49,7 +49,6 @@ def test_replay_decides_with_it(six, recordings, capsys):
     ("given", "sentence"),
     [
         (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
-        (["--features", "regions", "regions"], "the feature regions is named twice"),
         (["--samples", "1"], "--samples must be 2 to 1000"),
         (["--features", *SIX, "--samples", "700"], "4200 values a trial are more than the 4096"),
     ],

@@ -20,7 +20,8 @@ def make(out: Path) -> None:
     golden.TRIALS, golden.VECTORS = 5, 40
     with TemporaryDirectory() as folder:
         train(["simulate", str(SCENE), "--trials", "3", "--out", folder])
-        fixed = ["--scaling", "IV", "--components", "7", "--k", "6", "--decision-points", "none"]
+        fixed = ["--features", "paper", "contact", "--projection", "lda", "--k", "6"]
+        fixed += ["--decision-points", "none"]
         export(["--data", folder, "--out", str(out), "--jobs", "1", *fixed])
 
 

@@ -7,7 +7,7 @@ from sklearn.pipeline import Pipeline
 
 from edge.errors import InputError
 from train import crossval
-from train.crossval import choose, leave_one_out, neighbours, split_neighbours, votes_right
+from train.crossval import leave_one_out, neighbours, split_neighbours, votes_right
 from train.dataset import load_trials
 from train.pipeline import NearestNeighbours, vote
 from train.projection import SCALINGS, Projection, Spectrum, principal_axes
@@ -122,30 +122,6 @@ def test_components_beyond_the_rank_add_nothing():
 def test_processes_do_not_change_the_result():
     X, _ = overlapping(20)
     assert (neighbours(X, jobs=2) == neighbours(X, jobs=1)).all()
-
-
-def test_the_smallest_of_the_best_models_is_chosen():
-    X, y = overlapping(seed=4)
-    found = choose(X, {"t": y})["t"]
-    tables = {s: leave_one_out(X, y, scaling=s) for s in SCALINGS}
-    best = max(table.max() for table in tables.values())
-    assert found.accuracy == pytest.approx(best)
-    cells = [
-        (c, k, SCALINGS.index(s))
-        for s, table in tables.items()
-        for c, k in np.argwhere(table >= best - 1e-12).tolist()
-    ]
-    c, k, s = min(cells)
-    assert (found.choice.components, found.choice.k) == (c + 1, k + 1)
-    assert found.choice.scaling == SCALINGS[s]
-
-
-def test_fixed_values_are_kept():
-    X, y = overlapping()
-    found = choose(X, {"t": y}, scalings=["II"], components=7, k=3)["t"]
-    assert (found.choice.scaling, found.choice.components, found.choice.k) == ("II", 7, 3)
-    table = leave_one_out(X, y, scaling="II")
-    assert found.accuracy == pytest.approx(table[6, 2])
 
 
 def test_too_few_trials_and_values_that_are_not_finite_are_named():

@@ -63,14 +63,79 @@ def test_recordings_that_are_never_touched_are_left_out_and_named(recordings, ma
     quiet = make_touch()
     save(tmp_path / "data" / "quiet.npz", replace(quiet, frames=np.zeros_like(quiet.frames)))
     data = load_trials([tmp_path / "data"])
-    assert [p.name for p in data.untouched] == ["quiet.npz"]
+    assert [path.name for path, _ in data.untouched] == ["quiet.npz"]
     assert len(data.trials) == 16
 
 
-def test_without_joints_in_every_trial_motion_is_on_the_skin(recordings, make_touch, tmp_path):
+def test_the_few_that_lack_joint_angles_do_not_take_them_from_the_others(
+    recordings, make_touch, tmp_path
+):
     shutil.copytree(recordings, tmp_path / "data")
     save(tmp_path / "data" / "bare.npz", make_touch(arm=False))
-    assert load_trials([tmp_path / "data"]).chain is None
+    data = load_trials([tmp_path / "data"])
+    assert data.chain is not None
+    assert [path.name for path in data.left_out["joint angles"]] == ["bare.npz"]
+    assert len(data.trials) == 16
+    assert load_trials([tmp_path / "data"], features=["max_force"]).left_out == {}
+
+
+def test_where_most_lack_joint_angles_motion_is_on_the_skin(make_touch, tmp_path):
+    for i in range(3):
+        save(tmp_path / f"{i}.npz", make_touch(seed=i, arm=i == 0))
+    data = load_trials([tmp_path])
+    assert (data.chain, len(data.trials), data.left_out) == (None, 3, {})
+
+
+def test_a_label_that_a_few_lack_stays_a_task_without_them(recordings, make_touch, tmp_path):
+    shutil.copytree(recordings, tmp_path / "data")
+    save(tmp_path / "data" / "odd.npz", labelled(make_touch(), category="rigid-fixed", mood="bad"))
+    data = load_trials([tmp_path / "data"])
+    assert data.tasks == ("category", "object")
+    assert [path.name for path in data.left_out["a label for object"]] == ["odd.npz"]
+
+
+def twice(recording):
+    """Two contacts, half a second apart."""
+    n = len(recording.t)
+    gap = np.zeros((50, *recording.frames.shape[1:]), dtype=np.uint16)
+    return replace(
+        recording,
+        t=np.arange(2 * n + 50) / 100.0,
+        frames=np.concatenate([recording.frames, gap, recording.frames]),
+        joints=None,
+    )
+
+
+def told(recording, contacts):
+    return replace(recording, meta={**recording.meta, "contacts": contacts})
+
+
+def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(make_touch, tmp_path):
+    two = twice(make_touch(seconds=0.6))
+    save(tmp_path / "two.npz", two)
+    data = load_trials([tmp_path])
+    assert (len(data.trials), [path.name for path in data.unused]) == (1, ["two.npz"])
+    save(tmp_path / "two.npz", told(two, "alike"))
+    data = load_trials([tmp_path])
+    assert (len(data.trials), data.unused) == (2, ())
+    assert data.trials[1].onset_s == data.trials[0].onset_s + 1.3
+    assert data.trials[1].labels == data.trials[0].labels
+    save(tmp_path / "two.npz", told(two, [{"object": "one"}, {"object": "other"}]))
+    assert load_trials([tmp_path]).labels("object").tolist() == ["one", "other"]
+
+
+@pytest.mark.parametrize(
+    ("contacts", "word"),
+    [
+        ([{"object": "one"}], "labels 1 contacts, 2 are found"),
+        ("both", 'must be "alike" or a list'),
+        ([1, 2], 'must be "alike" or a list'),
+    ],
+)
+def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, make_touch, tmp_path):
+    save(tmp_path / "two.npz", told(twice(make_touch(seconds=0.6)), contacts))
+    with pytest.raises(InputError, match=f"two.npz: meta.contacts .*{word}"):
+        load_trials([tmp_path])
 
 
 def labelled(recording, **labels):
@@ -84,7 +149,6 @@ def skinned(recording, **skin):
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        (lambda r: labelled(r), "share no label"),
         (lambda r: skinned(r, wraps=False), "odd.npz: this skin has wrap-around False"),
         (lambda r: skinned(r, counts_per_newton=None), "odd.npz: this skin measures count"),
         (
@@ -112,6 +176,14 @@ def test_recordings_that_do_not_belong_together_are_refused(
     save(tmp_path / "data" / "odd.npz", change(make_touch()))
     with pytest.raises(InputError, match=word):
         load_trials([tmp_path / "data"])
+
+
+def test_recordings_without_labels_are_refused(make_touch, tmp_path):
+    for i in range(3):
+        save(tmp_path / f"{i}.npz", labelled(make_touch(seed=i), **({"mood": "bad"} if i else {})))
+        save(tmp_path / f"bare{i}.npz", labelled(make_touch(seed=i)))
+    with pytest.raises(InputError, match="share no label"):
+        load_trials([tmp_path])
 
 
 def test_damaged_files_stop_the_fit_and_the_first_is_named(recordings, tmp_path):

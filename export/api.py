@@ -1,0 +1,266 @@
+"""What `train.fit` gives to files, and to a table that a person reads."""
+
+from __future__ import annotations
+
+import os
+import platform
+import statistics
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from edge import __version__
+from edge.files import write_whole
+from edge.model.model import Model, ModelInfo, Task
+from edge.touch import measures
+from edge.touch.features import feature_vector
+from export import golden
+from export.graph import to_onnx
+from train.candidates import Candidate
+from train.dataset import NO_CONTACT, DataSet
+from train.evaluate import Result
+from train.fitting import TRIAL, Chosen, Fitted
+from train.pipeline import Choice, ContactClassifier
+from train.projection import CLOSE_EIGENVALUES
+from train.stopping import SequentialClassifier
+
+MISSING_SHARE = 0.02
+"""Recordings without a contact above which the thresholds deserve a warning."""
+NAMED = 3
+"""Files that a sentence names before it counts the rest."""
+CALLS = 60
+
+
+def save(path: str | os.PathLike[str], fitted: Fitted) -> int:
+    """Write a model, and `golden.npz` with its outputs beside it; the model's size in bytes.
+
+    Args:
+        path: of the model, such as `build/model.onnx`.
+        fitted: what `train.fit` gave.
+
+    Raises:
+        InputError: the files cannot be written.
+    """
+    data = to_onnx(fitted.sequential or fitted.classifier, info_of(fitted))
+    target = Path(path)
+    with write_whole(target) as file:
+        file.write(data)
+    golden.write(target.with_name("golden.npz"), Model(target), fitted.dataset, fitted.X)
+    return len(data)
+
+
+def info_of(fitted: Fitted) -> ModelInfo:
+    """The metadata of a fitted model."""
+    return describe(
+        fitted.dataset,
+        fitted.classifier,
+        fitted.chosen,
+        fitted.window_s,
+        fitted.samples,
+        fitted.sequential,
+    )
+
+
+def describe(
+    dataset: DataSet,
+    classifier: ContactClassifier,
+    chosen: Mapping[str, Chosen],
+    window_s: float,
+    samples: int,
+    sequential: SequentialClassifier | None = None,
+) -> ModelInfo:
+    """The metadata that makes the model file describe itself.
+
+    Args:
+        dataset: measured for the features of the model.
+        classifier: fitted on it.
+        chosen: what its accuracy is; a task that lacks an entry has none, 0.
+        window_s: of the full decision.
+        samples: values of a feature.
+        sequential: of which `classifier` is the last.
+    """
+    return ModelInfo(
+        tasks={
+            task: Task(
+                labels=tuple(map(str, classifier.classes_[task])),
+                k=choice.k,
+                components=classifier.components_[task],
+                scaling=choice.scaling,
+                accuracy=chosen[task].accuracy.accuracy if task in chosen else 0.0,
+                projection=choice.projection,
+                features=choice.features,
+                left_out=chosen[task].left_out if task in chosen else TRIAL,
+                no_contact=NO_CONTACT if NO_CONTACT in _labels(dataset, task) else None,
+            )
+            for task, choice in classifier.choices.items()
+        },
+        layout=dataset.layout,
+        tracking=dataset.tracking,
+        window_s=window_s,
+        samples=samples,
+        features=dataset.names,
+        units=dataset.units,
+        motion_frame="skin" if dataset.chain is None else "world",
+        chain=dataset.chain,
+        joints=dataset.joints,
+        rows=len(dataset.trials),
+        data_digest=dataset.digest,
+        versions={
+            "edge-classify": __version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")},
+        },
+        decision_points_s=() if sequential is None else tuple(sequential.decision_points_s),
+        stopping={} if sequential is None else sequential.stopping_,
+        novelty=None if sequential is None else sequential.novelty_,
+    )
+
+
+def _labels(dataset: DataSet, task: str) -> set[str]:
+    return {*dataset.labels(task).tolist(), *dataset.untouched_labels(task)}
+
+
+def report(fitted: Fitted, prices: Sequence[tuple[float, float]] | None = None) -> str:
+    """What was chosen among, what was chosen, and what a user should know, in lines."""
+    lines = [*_table(fitted, prices), ""]
+    for task, one in fitted.chosen.items():
+        lines.append(f"{task}: {_told(one)}")
+        lines.append(f"  {_described(one.choice, fitted)}")
+    dataset = fitted.dataset
+    lines += ["", ", ".join(f"{name} in {unit}" for name, unit in dataset.units.items())]
+    if any(measures.feature(name).moves for name in dataset.names):
+        lines.append(f"motion in the {'skin' if dataset.chain is None else 'world'}'s frame")
+    return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
+
+
+def _told(one: Chosen) -> str:
+    """The number that a user is told."""
+    numbers = f"{_percent(one.accuracy)} of {one.accuracy.total} trials, nested"
+    if one.left_out == TRIAL:
+        return numbers
+    return (
+        f"trial left out {one.by_trial.accuracy:.1%}, {one.left_out} left out "
+        f"{_percent(one.accuracy)} of {one.accuracy.total} trials, nested"
+    )
+
+
+def _percent(result: Result) -> str:
+    low, high = result.interval
+    return f"{result.accuracy:.1%} ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def _described(choice: Choice, fitted: Fitted) -> str:
+    how = f"{choice.projection} of {_name(choice, fitted.candidates)}, scaling {choice.scaling}"
+    if choice.projection == "lda":
+        how += f", shrinkage {choice.shrinkage:g}"
+        if choice.targets:
+            how += f", of {' and '.join(choice.targets)} side by side"
+    return f"{how}, {choice.components} components, k = {choice.k}"
+
+
+def _name(choice: Choice, candidates: Sequence[Candidate]) -> str:
+    for one in candidates:
+        if any(grid.features == choice.features for grid in one.grids):
+            return one.name
+    return " ".join(choice.features)
+
+
+def _table(fitted: Fitted, prices: Sequence[tuple[float, float]] | None) -> list[str]:
+    """A row a candidate: nested accuracy of its own numbers, and its price; `*` where chosen."""
+    tasks = list(fitted.chosen)
+    wide = max(len(one.name) for one in fitted.candidates)
+    head = f"{'features':<{wide}}  how"
+    head += "".join(f"  {task:>22}" for task in tasks)
+    if prices is not None:
+        head += "  us a decision      kB"
+    lines = [head]
+    for i, one in enumerate(fitted.candidates):
+        line = f"{one.name:<{wide}}  {one.projection}"
+        for chosen in fitted.chosen.values():
+            mine = (chosen.choice.features, chosen.choice.projection)
+            star = "*" if mine in {(g.features, g.projection) for g in one.grids} else " "
+            line += f"  {_percent(chosen.candidates[i]):>21}{star}"
+        if prices is not None:
+            line += f"  {prices[i][0]:>13.0f}  {prices[i][1]:>6.0f}"
+        lines.append(line)
+    return lines
+
+
+def warnings(fitted: Fitted) -> list[str]:
+    """Sentences on what flatters or spoils a model."""
+    dataset, lines = fitted.dataset, []
+    some = [path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()]
+    if some:
+        share = len(some) / (len(dataset.trials) + len(dataset.untouched))
+        lines.append(
+            f"{'warning: ' if share > MISSING_SHARE else ''}{len(some)} recordings have no contact "
+            f"above {dataset.layout.onset} counts and count as wrong: {_files(some)}"
+        )
+        if share > MISSING_SHARE:
+            lines[-1] += "; `python -m train thresholds` proposes thresholds"
+    for what, paths in dataset.left_out.items():
+        lines.append(
+            f"warning: {len(paths)} recordings lack {what} and are left out: {_files(paths)}"
+        )
+    if dataset.unused:
+        lines.append(
+            f"warning: {len(dataset.unused)} recordings have further contacts, of which only the "
+            f"first is used: {_files(dataset.unused)}; `python -m train split` cuts them apart"
+        )
+    longest = max(float(t.recording.t[-1]) - t.onset_s for t in dataset.trials)
+    if fitted.window_s > longest + 1e-9:
+        lines.append(
+            f"warning: the window of {fitted.window_s:g} s is longer than any recording goes on "
+            f"after its onset ({longest:.2f} s)"
+        )
+    for task, one in fitted.chosen.items():
+        classifier = fitted.classifier
+        dropped = one.choice.components - classifier.components_[task]
+        if dropped > 0 and one.choice.projection == "pca":
+            lines.append(
+                f"warning: {task}: the trials span {classifier.components_[task]} components, "
+                f"{dropped} fewer than asked for"
+            )
+        gap = classifier.projections_[classifier.spaces_[task]].gap_
+        if gap < CLOSE_EIGENVALUES:
+            lines.append(
+                f"warning: {task}: two components explain the same variance to within {gap:.1e}; "
+                "which of them is kept is arbitrary"
+            )
+    return lines
+
+
+def _files(paths: Sequence[Path]) -> str:
+    rest = len(paths) - NAMED
+    return ", ".join(map(str, paths[:NAMED])) + (f" and {rest} more" if rest > 0 else "")
+
+
+def measure(fitted: Fitted) -> list[tuple[float, float]]:
+    """For each candidate, microseconds of a decision with its features here, and kilobytes."""
+    return [_measured(fitted, i) for i in range(len(fitted.candidates))]
+
+
+def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
+    full = fitted.measured
+    choices = {task: one.picks[candidate] for task, one in fitted.chosen.items()}
+    names = tuple(n for n in full.names if any(n in c.features for c in choices.values()))
+    y = {
+        task: full.labels(task)
+        for task in {*choices, *(t for c in choices.values() for t in c.targets)}
+    }
+    X = full.features(fitted.window_s, fitted.samples, names)
+    part = full.of(names)
+    classifier = ContactClassifier(choices, names, part.widths(fitted.samples)).fit(X, y)
+    data = to_onnx(classifier, describe(part, classifier, {}, fitted.window_s, fitted.samples))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.onnx"
+        path.write_bytes(data)
+        model = Model(path)
+    series, taken = full.trials[0].series, []
+    for _ in range(CALLS):
+        began = time.perf_counter()
+        model.decide(feature_vector(series, fitted.window_s, fitted.samples, names))
+        taken.append(time.perf_counter() - began)
+    return 1e6 * statistics.median(taken), len(data) / 1024

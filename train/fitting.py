@@ -1,0 +1,340 @@
+"""Recordings to a fitted model: the choice of what it is made of, and its honest accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.touch.arm import Chain
+from edge.touch.feature_sets import expand
+from edge.touch.features import SAMPLES, WINDOW_S
+from train.candidates import Candidate, candidates, groupable, order
+from train.crossval import jobs_here
+from train.dataset import NO_CONTACT, DataSet, load_trials, read
+from train.evaluate import Grid, Result, Table, evaluate, group_folds, stratified_folds
+from train.pipeline import Choice, ContactClassifier
+from train.stopping import FEWEST, SequentialClassifier
+
+LEAVE_OUT = "object"
+TRIAL = "trial"
+DECISION_POINTS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
+"""Twice as many decide no sooner on the simulated set, and take twice the memory."""
+MOST_TRIALS = 2000
+"""Beyond them calibration takes minutes, and must be asked for."""
+LARGEST_BYTES = 1 << 20
+"""Of a model whose decision points nobody asked for."""
+QUICK_FOLDS = 5
+GROUP_FOLDS, FEW = 20, 300
+"""Groups left out one at a time, as far as so many fit up to so many trials; ten parts beyond."""
+FEWEST_TRIALS = 3
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What a task is fitted with, and what was measured of it.
+
+    Attributes:
+        choice: the features, scaling, projection and numbers.
+        accuracy: nested accuracy of the whole choice, with whole groups left out where
+            `left_out` is not `trial`.
+        by_trial: the same with single trials left out.
+        left_out: `trial`, or the label of which whole groups were left out.
+        candidates: nested accuracy of each candidate's own choice of numbers.
+        picks: the best choice of each candidate.
+    """
+
+    choice: Choice
+    accuracy: Result
+    by_trial: Result
+    left_out: str
+    candidates: tuple[Result, ...] = ()
+    picks: tuple[Choice, ...] = ()
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fitted model, with all that its file says of it.
+
+    Attributes:
+        dataset: the trials it was fitted on, with the features that it takes.
+        measured: the same with those of every candidate.
+        window_s: of the full decision.
+        samples: values of a feature.
+        X: (n, p) feature vectors at the full window.
+        chosen: {task: what it is fitted with}.
+        candidates: what was chosen among.
+        classifier: at the full window.
+        sequential: at all decision points, where it was calibrated.
+        notes: sentences on what a user should know.
+    """
+
+    dataset: DataSet
+    measured: DataSet
+    window_s: float
+    samples: int
+    X: NDArray[np.float64] = field(repr=False)
+    chosen: dict[str, Chosen]
+    candidates: tuple[Candidate, ...]
+    classifier: ContactClassifier
+    sequential: SequentialClassifier | None = None
+    notes: tuple[str, ...] = ()
+
+
+def fit(
+    data: DataSet | str | Path | Sequence[str | Path],
+    *,
+    features: Sequence[str] | None = None,
+    projection: str | None = None,
+    scaling: str | None = None,
+    components: int | None = None,
+    k: int | None = None,
+    window_s: float = WINDOW_S,
+    samples: int = SAMPLES,
+    tasks: Sequence[str] | None = None,
+    leave_out: str = LEAVE_OUT,
+    decision_points_s: Sequence[float] | None = None,
+    threshold: int | None = None,
+    onset: int | None = None,
+    arm: Chain | None = None,
+    quick: bool = False,
+    jobs: int | None = None,
+    progress: bool = False,
+) -> Fitted:
+    """Choose and fit every task of some recordings.
+
+    What is None is chosen per task among `train.candidates`: the cheapest candidate that is not
+    worse than the best by more than a standard error, on trials that its fits had not seen.
+
+    Args:
+        data: recordings, folders of them, or a data set that was loaded for the features.
+        features: names of sets and of single features.
+        projection: `pca` or `lda`.
+        scaling: one of `train.projection.SCALINGS`.
+        components: principal components.
+        k: neighbours.
+        window_s: seconds from onset.
+        samples: values of a feature.
+        tasks: keys of the labels; all that the recordings share where None.
+        leave_out: label of which whole groups are left out to choose and to score a task, where
+            each of its classes has several of them; `trial` for none.
+        decision_points_s: windows at which decisions are calibrated, rising, the last of them
+            `window_s`; empty for none; `DECISION_POINTS_S` where None, and the number of trials
+            and the size of the model allow it.
+        threshold: counts above which a taxel is in contact.
+        onset: counts above which a contact begins.
+        arm: of recordings with joint angles that name none.
+        quick: fewer candidates and folds.
+        jobs: processes; all cores where None.
+        progress: show progress bars on stderr.
+
+    Raises:
+        InputError: the recordings cannot be used, or an argument is not possible with them.
+
+    Example:
+        >>> import train
+        >>> fitted = train.fit(touches, features=["paper"], quick=True)
+        >>> fitted.chosen["category"].accuracy.accuracy > 0.5
+        True
+    """
+    jobs = jobs or jobs_here()
+    if isinstance(data, DataSet):
+        dataset = data
+    else:
+        raw = read([data] if isinstance(data, str | Path) else data, progress=progress)
+        every = candidates({}, joints=raw.joints, features=features, quick=quick)
+        dataset = load_trials(
+            raw,
+            threshold=threshold,
+            onset=onset,
+            horizon_s=window_s,
+            features=expand([name for one in every for name in one.sets]),
+            arm=arm,
+            progress=progress,
+        )
+    y = {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
+    if len(dataset.trials) < FEWEST_TRIALS:
+        raise InputError(f"{len(dataset.trials)} trials are too few to fit; record more")
+    if k is not None and not 1 <= k <= len(dataset.trials) - 1:
+        raise InputError(
+            f"k must be 1 to {len(dataset.trials) - 1} with {len(dataset.trials)} trials, not {k}"
+        )
+    found = candidates(
+        y,
+        joints=dataset.joints > 0,
+        features=features,
+        projection=projection,
+        scaling=scaling,
+        components=components,
+        k=k,
+        quick=quick,
+    )
+    chosen, trials = _choose(
+        dataset, y, found, window_s, samples, leave_out, quick, jobs, progress
+    )
+    measured = dataset
+    dataset = dataset.of([name for one in chosen.values() for name in one.choice.features])
+    names = dataset.names
+    X = dataset.features(window_s, samples)
+    widths = dataset.widths(samples)
+    choices = {task: one.choice for task, one in chosen.items()}
+    notes: list[str] = []
+    points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes)
+    sequential = None
+    if points:
+        at_points = np.stack([dataset.features(s, samples) for s in points])
+        sequential = SequentialClassifier(choices, points, names, jobs=jobs, widths=widths)
+        sequential.fit(at_points, y, trials.folds, _without_folds(trials, dataset, samples))
+        classifier = sequential.decision_points_[-1]
+    else:
+        classifier = ContactClassifier(choices, names, widths).fit(X, y)
+    return Fitted(
+        dataset,
+        measured,
+        window_s,
+        samples,
+        X,
+        chosen,
+        tuple(found),
+        classifier,
+        sequential,
+        tuple(notes),
+    )
+
+
+def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
+    if wanted is None:
+        return dataset.tasks
+    missing = [task for task in wanted if task not in dataset.tasks]
+    if missing:
+        raise InputError(
+            f"not every recording has a label {missing[0]!r}; all have {', '.join(dataset.tasks)}"
+        )
+    return tuple(wanted)
+
+
+def _choose(
+    dataset: DataSet,
+    y: Mapping[str, NDArray[np.str_]],
+    found: Sequence[Candidate],
+    window_s: float,
+    samples: int,
+    leave_out: str,
+    quick: bool,
+    jobs: int,
+    progress: bool,
+) -> tuple[dict[str, Chosen], Table]:
+    """What the candidates' nested accuracies say of each task, and the table by single trials."""
+    X = dataset.features(window_s, samples)
+    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+    finest = max(y, key=lambda task: len(set(y[task].tolist())))
+    groups = dataset.groups(leave_out) if leave_out != TRIAL else None
+    by_group = {
+        task: labels
+        for task, labels in y.items()
+        if groups is not None and task != leave_out and groupable(labels, groups)
+    }
+    grids = [grid for one in found for grid in one.grids]
+
+    def table(part: Mapping[str, NDArray[np.str_]], folds: NDArray[np.int64], what: str) -> Table:
+        return evaluate(
+            X,
+            part,
+            folds,
+            grids,
+            features=dataset.names,
+            widths=tuple(widths.values()),
+            jobs=jobs,
+            progress=what if progress else None,
+        )
+
+    folds = stratified_folds(y[finest], QUICK_FOLDS if quick else 10)
+    trials = table(y, folds, "choosing")
+    whole = None
+    if by_group and groups is not None:
+        count = QUICK_FOLDS if quick else GROUP_FOLDS if len(X) <= FEW else 10
+        whole = table(y if _products(grids) else by_group, group_folds(groups, count), leave_out)
+    out: dict[str, Chosen] = {}
+    for task in y:
+        missed = partial(_with_untouched, dataset.untouched_labels(task))
+        apart = whole if whole is not None and task in by_group else trials
+        choices = apart.choices[task]
+        rank = order(choices, widths, len(X))
+        parts = [_of(one, choices) for one in found]
+        out[task] = Chosen(
+            choices[apart.chosen(task, rank)],
+            missed(apart.nested(task, rank)),
+            missed(trials.nested(task, rank)),
+            leave_out if apart is whole else TRIAL,
+            tuple(missed(apart.nested(task, rank, part)) for part in parts),
+            tuple(choices[apart.chosen(task, rank, part)] for part in parts),
+        )
+    return out, trials
+
+
+def _without_folds(trials: Table, dataset: DataSet, samples: int) -> list[dict[str, Choice]]:
+    """{task: what is chosen without it} of each fold, of the features that the model takes."""
+    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+    out: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
+    for task, choices in trials.choices.items():
+        among = np.flatnonzero([set(choice.features) <= set(widths) for choice in choices])
+        rank = np.zeros(len(choices), dtype=np.int64)
+        rank[among] = order([choices[i] for i in among], widths, len(trials.folds))
+        for fold, chosen in enumerate(out):
+            chosen[task] = choices[trials.without(task, fold, rank, among)]
+    return out
+
+
+def _with_untouched(labels: Sequence[str], found: Result) -> Result:
+    """Touches that were missed are wrong; recordings of none in which none was found are right."""
+    right = found.right + list(labels).count(NO_CONTACT)
+    return replace(found, right=right, total=found.total + len(labels))
+
+
+def _products(grids: Sequence[Grid]) -> bool:
+    return any(grid.targets for grid in grids)
+
+
+def _of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:
+    """The places of a candidate's own choices."""
+    names = {(grid.features, grid.projection) for grid in candidate.grids}
+    return np.flatnonzero([(c.features, c.projection) in names for c in choices])
+
+
+def _decision_points(
+    dataset: DataSet,
+    choices: Mapping[str, Choice],
+    wanted: Sequence[float] | None,
+    window_s: float,
+    samples: int,
+    notes: list[str],
+) -> tuple[float, ...]:
+    """The decision points asked for, or the default ones where they can be calibrated."""
+    if wanted is not None:
+        return tuple(wanted)
+    n = len(dataset.trials)
+    if not FEWEST <= n <= MOST_TRIALS:
+        notes.append(
+            f"no decision points before the full window: {n} trials are not the {FEWEST} "
+            f"to {MOST_TRIALS} that are calibrated by default"
+        )
+        return ()
+    points = (*(s for s in DECISION_POINTS_S if s < window_s), window_s)
+    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+    size = 0
+    for task, choice in choices.items():
+        columns = sum(widths[name] for name in choice.features)
+        c = min(choice.components, len(set(dataset.labels(task).tolist())) * 2, n)
+        size += len(points) * c * (4 * columns + 8 * n)
+    if size > LARGEST_BYTES:
+        notes.append(
+            f"no decision points before the full window: they would make the model about "
+            f"{size / 2**20:.1f} MB; --decision-points asks for them"
+        )
+        return ()
+    return points
