@@ -12,11 +12,11 @@ from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
 from edge.touch import measures
 from edge.touch.feature_sets import SETS
-from edge.touch.features import WINDOW_S
+from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import measure, report, save
 from train import operating_points
 from train.crossval import jobs_here
-from train.fitting import LEAVE_OUT, MOST_TRIALS, SAMPLES, TRIAL, fit
+from train.fitting import LEAVE_OUT, MOST_TRIALS, TRIAL, fit
 from train.projection import KINDS, SCALINGS
 from train.stopping import FEWEST
 

@@ -174,9 +174,7 @@ def fit(
         k=k,
         quick=quick,
     )
-    chosen, trials = _choose(
-        dataset, y, found, window_s, samples, leave_out, quick, jobs, progress
-    )
+    chosen, trials = _choose(dataset, y, found, window_s, samples, leave_out, quick, jobs, progress)
     measured = dataset
     dataset = dataset.of([name for one in chosen.values() for name in one.choice.features])
     names = dataset.names

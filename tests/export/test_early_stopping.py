@@ -10,6 +10,7 @@ from export.__main__ import main as export
 from train.dataset import load_trials
 
 POINTS = "0.3,0.6,1.2"
+PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def early(make_touch, tmp_path_factory):
     for kind in ("hard", "soft"):
         for seed in range(15):
             save(folder / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
-    given = ["--data", str(folder / "data"), "--out", str(folder / "out"), "--jobs", "1"]
+    given = ["--data", str(folder / "data"), "--out", str(folder / "out"), *PAPER]
     assert export([*given, "--decision-points", POINTS, "--scaling", "IV"]) == 0
     return Model(folder / "out" / "model.onnx"), folder
 
