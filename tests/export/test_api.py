@@ -1,0 +1,71 @@
+"""Fit and export from Python, and the sentences that go with a model."""
+
+from dataclasses import replace
+
+import pytest
+
+import export
+import train
+from edge.model.model import Model
+from edge.model.verify import verify
+from edge.recording import save
+from export.api import measure, report
+
+
+@pytest.fixture(scope="module")
+def fitted(recordings):
+    return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
+
+
+def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
+    path = tmp_path / "model.onnx"
+    assert export.save(path, fitted) == path.stat().st_size
+    model = Model(path)
+    assert all(check.passed for check in verify(model, tmp_path / "golden.npz"))
+    assert model.info.tasks["object"].projection == "pca"
+    assert model.info.tasks["object"].left_out == "trial"
+    assert model.info.tasks["object"].accuracy == fitted.chosen["object"].accuracy.accuracy
+
+
+def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
+    fitted = train.fit(str(recordings), features=["paper", "contact"], jobs=1, k=1)
+    own = {
+        "category": replace(fitted.chosen["category"].choice, features=("log_max_force@5",)),
+        "object": fitted.chosen["object"].choice,
+    }
+    names, widths = fitted.dataset.names, fitted.dataset.widths(fitted.samples)
+    classifier = train.fitting.ContactClassifier(own, names, widths)
+    y = {task: fitted.dataset.labels(task) for task in own}
+    export.save(
+        tmp_path / "model.onnx",
+        replace(fitted, classifier=classifier.fit(fitted.X, y), sequential=None),
+    )
+    model = Model(tmp_path / "model.onnx")
+    seen = model.run(1.01 * fitted.X)
+    for task in own:
+        _, rows = classifier.neighbours(task, 1.01 * fitted.X)
+        assert (seen[f"{task}_neighbours"] == rows).all()
+
+
+def test_a_row_a_candidate_says_what_it_gives_and_costs(fitted):
+    prices = measure(fitted)
+    assert all(us > 0 and kilobytes > 1 for us, kilobytes in prices)
+    lines = report(fitted, prices).splitlines()
+    assert lines[0].split()[-5:] == ["us", "a", "decision", "kB"] or lines[0].endswith("kB")
+    assert lines[1].startswith("paper  ")
+
+
+def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
+    still = make_touch(seconds=0.0)
+    save(tmp_path / "still.npz", still)
+    odd = make_touch()
+    save(
+        tmp_path / "odd.npz", replace(odd, meta={**odd.meta, "labels": {"category": "soft-fixed"}})
+    )
+    paths = [str(recordings), str(tmp_path)]
+    fitted = train.fit(paths, features=["paper"], projection="pca", window_s=9.0, jobs=1)
+    text = report(fitted)
+    assert "warning: 1 recordings have no contact above 150 counts and count as wrong: " in text
+    assert "python -m train thresholds" in text
+    assert "warning: 1 recordings lack a label for object and are left out: " in text
+    assert "the window of 9 s is longer than any recording goes on after its onset" in text

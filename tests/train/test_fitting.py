@@ -1,0 +1,82 @@
+"""From recordings to a fitted model, from Python."""
+
+from dataclasses import replace
+
+import pytest
+
+import train
+from edge.errors import InputError
+from edge.recording import save
+from train.dataset import load_trials
+
+
+@pytest.fixture(scope="module")
+def fitted(recordings):
+    return train.fit(str(recordings), quick=True, jobs=1)
+
+
+def test_each_task_has_its_own_choice_and_the_model_measures_what_they_take(fitted):
+    assert set(fitted.chosen) == {"category", "object"}
+    taken = {name for one in fitted.chosen.values() for name in one.choice.features}
+    assert set(fitted.dataset.names) == taken
+    assert fitted.X.shape == (16, sum(fitted.dataset.widths(fitted.samples)))
+    assert len(fitted.measured.names) > len(fitted.dataset.names)
+
+
+def test_the_number_that_is_told_is_that_of_the_whole_choice(fitted):
+    for one in fitted.chosen.values():
+        assert one.accuracy.total == 16
+        assert len(one.candidates) == len(fitted.candidates) == 3
+    assert fitted.chosen["category"].accuracy.accuracy == 1.0
+
+
+def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
+    data = load_trials([recordings], features=["max_force", "contact_area"])
+    given = {"features": ["max_force", "contact_area"], "projection": "pca", "scaling": "IV"}
+    fitted = train.fit(data, **given, leave_out="trial", decision_points_s=(), jobs=1)
+    assert fitted.chosen["category"].left_out == "trial"
+    assert fitted.sequential is None
+    assert (fitted.classifier.predict(fitted.X)["category"] == data.labels("category")).all()
+
+
+def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_path):
+    for kind in ("hard", "soft"):
+        for seed in range(9):
+            one = make_touch(kind=kind, seed=seed)
+            labels = {"category": kind, "object": f"{kind} {seed % 3}"}
+            save(tmp_path / f"{kind}{seed}.npz", replace(one, meta={**one.meta, "labels": labels}))
+    fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
+    assert fitted.chosen["category"].left_out == "object"
+    assert fitted.chosen["object"].left_out == "trial"
+
+
+def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
+    recordings, make_touch, tmp_path
+):
+    still = make_touch(seconds=0.0)
+    for name, label in (("missed", "rigid-fixed"), ("empty", "none")):
+        labels = {"category": label, "object": "hard 0"}
+        save(tmp_path / f"{name}.npz", replace(still, meta={**still.meta, "labels": labels}))
+    paths = [str(recordings), str(tmp_path)]
+    both = train.fit(paths, features=["paper"], projection="pca", scaling="IV", jobs=1)
+    alone = train.fit(paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1)
+    seen, before = (f.chosen["category"].accuracy for f in (both, alone))
+    assert (seen.right, seen.total) == (before.right + 1, before.total + 2)
+
+
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        ({"k": 99}, "k must be 1 to 15"),
+        ({"tasks": ["colour"]}, "label 'colour'"),
+    ],
+)
+def test_what_cannot_be_fitted_is_one_sentence(given, word, recordings):
+    with pytest.raises(InputError, match=word):
+        train.fit(str(recordings), features=["paper"], quick=True, jobs=1, **given)
+
+
+def test_names_of_train_are_loaded_when_they_are_asked_for():
+    assert train.fit.__module__ == "train.fitting"
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = train.nothing
