@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.touch.feature_sets import SETS, expand
-from train.evaluate import NEIGHBOURS, SHRINKAGES, Grid, Labels
+from train.evaluate import NEIGHBOURS, SHRINKAGES, Labels, SearchGrid
 from train.pipeline import Choice
 from train.projection import KINDS, SCALINGS
 
@@ -49,7 +49,7 @@ class Candidate:
 
     sets: tuple[str, ...]
     projection: str
-    grids: tuple[Grid, ...]
+    grids: tuple[SearchGrid, ...]
 
     @property
     def name(self) -> str:
@@ -87,7 +87,7 @@ def candidates(
                 continue
             scalings = ("none", "I", "IV", "V") if paper and kind == "pca" else ("IV",)
             neighbours = NEIGHBOURS if kind == "pca" else DISCRIMINANT_NEIGHBOURS
-            grid = Grid(
+            grid = SearchGrid(
                 projection=kind,
                 features=names,
                 components=COMPONENTS if components is None else (components,),

@@ -69,13 +69,6 @@ def split_neighbours(
     return rows
 
 
-def first_equal(X: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) for each row of X the first row that is equal to it."""
-    seen: dict[bytes, int] = {}
-    whole = np.ascontiguousarray(X, dtype=np.float64) + 0.0  # -0 becomes 0
-    return np.array([seen.setdefault(row.tobytes(), i) for i, row in enumerate(whole)])
-
-
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
     """(components, k) places of the k smallest of each row, by value and then by place."""
     m = squares.shape[1]

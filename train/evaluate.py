@@ -24,9 +24,9 @@ from tqdm import tqdm
 from edge.commands.summary import wilson
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.crossval import first_equal, votes_right
+from train.crossval import votes_right
 from train.pipeline import Choice, columns_of
-from train.projection import Spectrum, gains_of, on_grid, widths_of
+from train.projection import Grid, Spectrum, gains_of, on_grid, widths_of
 
 FOLDS = 10
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
@@ -68,7 +68,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Grid:
+class SearchGrid:
     """Candidates that share a decomposition of the features.
 
     Attributes:
@@ -152,17 +152,17 @@ def _squares(
 def _neighbours(
     spectrum: Spectrum,
     d: NDArray[np.float64],
-    first: NDArray[np.int64],
     labels: NDArray[np.int64] | None,
     train: NDArray[np.int64],
     test: NDArray[np.int64],
-    grid: Grid,
+    grid: SearchGrid,
 ) -> Iterator[NDArray[np.int64]]:
     """(test, k) places among `train` of each projection of the grid."""
     k = min(grid.neighbours[-1], len(train))
+    exact = Grid(float(np.abs(d[train]).max(initial=0.0)))
     if grid.projection == "pca":
         axes = spectrum.leading(grid.components[-1])
-        z = (d @ on_grid(axes.T))[first]
+        z = exact.project(d, on_grid(axes.T))
         squares, done = np.zeros((len(test), len(train))), 0
         for count in grid.components:
             squares += _squares(z, train, test, range(done, min(count, len(axes))))
@@ -172,7 +172,7 @@ def _neighbours(
     assert labels is not None
     for shrinkage in grid.shrinkages:
         weights = np.hstack([spectrum.discriminants(one, shrinkage) for one in labels])
-        z = (d @ on_grid(weights))[first]
+        z = exact.project(d, on_grid(weights))
         yield _nearest(_squares(z, train, test, range(z.shape[1])), k)
 
 
@@ -181,14 +181,13 @@ def _answers(
     classes: Mapping[str, NDArray[np.int64]],
     train: NDArray[np.int64],
     test: NDArray[np.int64],
-    grids: Sequence[Grid],
+    grids: Sequence[SearchGrid],
     features: Sequence[str],
     widths: Sequence[int],
 ) -> dict[str, NDArray[np.bool_]]:
     """{task: (candidates, test)} whether each candidate, fitted on `train`, tells the tests."""
     found: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
     spectra: dict[tuple[str, tuple[str, ...]], tuple[Spectrum, NDArray[np.float64]]] = {}
-    first = first_equal(X)
     with threadpool_limits(1):
         for grid in grids:
             key = grid.scaling, grid.features
@@ -206,7 +205,7 @@ def _answers(
             spectrum, d = spectra[key]
             pick = [k - 1 for k in grid.neighbours]
             shared = (
-                list(_neighbours(spectrum, d, first, None, train, test, grid))
+                list(_neighbours(spectrum, d, None, train, test, grid))
                 if grid.projection == "pca"
                 else None
             )
@@ -216,7 +215,7 @@ def _answers(
                 near = shared
                 if near is None:
                     targets = np.stack([classes[t][train] for t in grid.targets or (task,)])
-                    near = list(_neighbours(spectrum, d, first, targets, train, test, grid))
+                    near = list(_neighbours(spectrum, d, targets, train, test, grid))
                 for places in near:
                     right = votes_right(places, labels[train], labels[test])
                     most = right.shape[1] - 1
@@ -315,7 +314,7 @@ def evaluate(
     X: NDArray[np.float64],
     y: Labels,
     folds: NDArray[np.int64],
-    grids: Sequence[Grid],
+    grids: Sequence[SearchGrid],
     *,
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,

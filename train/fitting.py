@@ -17,7 +17,7 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import Candidate, candidates, groupable, order
 from train.crossval import jobs_here
 from train.dataset import NO_CONTACT, DataSet, load_trials, read
-from train.evaluate import Grid, Result, Table, evaluate, group_folds, stratified_folds
+from train.evaluate import Result, SearchGrid, Table, evaluate, group_folds, stratified_folds
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
@@ -294,7 +294,7 @@ def _with_untouched(labels: Sequence[str], found: Result) -> Result:
     return replace(found, right=right, total=found.total + len(labels))
 
 
-def _products(grids: Sequence[Grid]) -> bool:
+def _products(grids: Sequence[SearchGrid]) -> bool:
     return any(grid.targets for grid in grids)
 
 

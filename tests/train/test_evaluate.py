@@ -5,15 +5,15 @@ import pytest
 from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
-from train.evaluate import Grid, choose, evaluate, group_folds, stratified_folds
+from train.evaluate import SearchGrid, choose, evaluate, group_folds, stratified_folds
 from train.pipeline import NearestNeighbours
 from train.projection import Projection
 
 TWO = ("max_force", "contact_area")
 GRIDS = (
-    Grid("IV", "lda", shrinkages=(1.0, 0.01), neighbours=(1, 3)),
-    Grid("none", "pca", components=(1, 4, 30), neighbours=(1, 3)),
-    Grid("IV", "pca", ("contact_area",), components=(2,), neighbours=(5,)),
+    SearchGrid("IV", "lda", shrinkages=(1.0, 0.01), neighbours=(1, 3)),
+    SearchGrid("none", "pca", components=(1, 4, 30), neighbours=(1, 3)),
+    SearchGrid("IV", "pca", ("contact_area",), components=(2,), neighbours=(5,)),
 )
 
 
@@ -90,7 +90,7 @@ def test_twins_of_a_group_do_not_tell_each_other():
     objects = np.repeat([f"{i}" for i in range(12)], 4)
     X = np.repeat(rng.normal(size=(12, 12)), 4, axis=0)
     y = np.repeat(np.tile(["a", "b"], 6), 4)
-    grids = [Grid("none", "pca", components=(6,), neighbours=(1,))]
+    grids = [SearchGrid("none", "pca", components=(6,), neighbours=(1,))]
     apart = evaluate(X, {"t": y}, group_folds(objects), grids, features=TWO)
     mixed = evaluate(X, {"t": y}, stratified_folds(y), grids, features=TWO)
     assert mixed.nested("t").accuracy == 1.0
@@ -103,7 +103,7 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side():
     X, y = trials()
     two = np.where(y == "a", "yes", "no")
     labels = {"t": y, "u": two}
-    grid = Grid("IV", "lda", shrinkages=(0.1,), neighbours=(1,), targets=("t", "u"))
+    grid = SearchGrid("IV", "lda", shrinkages=(0.1,), neighbours=(1,), targets=("t", "u"))
     table = evaluate(X, labels, stratified_folds(y, 4), [grid], features=TWO)
     train, test = np.flatnonzero(table.folds), np.flatnonzero(table.folds == 0)
     projection = Projection("IV", 5, TWO, "lda", 0.1)

@@ -14,7 +14,7 @@ from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 from edge.touch.contact import FeatureSeries
 from edge.touch.feature_sets import SETS, expand
 from edge.touch.features import WINDOW_S, feature_vector
-from train.evaluate import Grid, Labels, Result, evaluate, group_folds, stratified_folds
+from train.evaluate import Labels, Result, SearchGrid, evaluate, group_folds, stratified_folds
 from train.report import figures
 from train.report.tables import Figure, Section, Table, percent
 from train.study.context import Context
@@ -106,7 +106,7 @@ def vectors(series: Sequence[FeatureSeries | None], name: str) -> NDArray[np.flo
 def _ours(
     X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64], name: str, projection: str
 ) -> dict[str, Result]:
-    grid = Grid(SCALING, projection)
+    grid = SearchGrid(SCALING, projection)
     table = evaluate(X, y, folds, [grid], features=SETS[name].features)
     return {task: table.nested(task) for task in y}
 

@@ -13,7 +13,15 @@ from edge.recording import Recording
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from train.crossval import MAX_COMPONENTS, MAX_K
-from train.evaluate import FOLDS, Grid, Labels, Result, evaluate, group_folds, stratified_folds
+from train.evaluate import (
+    FOLDS,
+    Labels,
+    Result,
+    SearchGrid,
+    evaluate,
+    group_folds,
+    stratified_folds,
+)
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
 from train.study.context import Context
@@ -51,7 +59,7 @@ def _evaluated(
     features: Sequence[str],
     what: str,
 ) -> dict[str, Result]:
-    grid = Grid(
+    grid = SearchGrid(
         scaling,
         components=tuple(range(1, MAX_COMPONENTS + 1)),
         neighbours=tuple(range(1, MAX_K + 1)),

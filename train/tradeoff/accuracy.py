@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.touch.features import FEATURES
-from train.evaluate import Grid, Labels, Result, evaluate, stratified_folds
+from train.evaluate import Labels, Result, SearchGrid, evaluate, stratified_folds
 from train.pipeline import Choice
 from train.stopping import finest
 
@@ -36,7 +36,7 @@ def nested(
     """
     k = tuple(range(1, NEIGHBOURS + 1))
     kind = "lda" if len(features) > len(FEATURES) else "pca"
-    grid = Grid(scaling, kind, components=COMPONENTS, neighbours=k)
+    grid = SearchGrid(scaling, kind, components=COMPONENTS, neighbours=k)
     table = evaluate(X, y, stratified_folds(y[finest(y)]), [grid], features=features)
     return {task: table.nested(task) for task in y}
 
@@ -54,7 +54,7 @@ class Chooser:
 
     X: NDArray[np.float64]
     y: Labels
-    grids: tuple[Grid, ...]
+    grids: tuple[SearchGrid, ...]
     features: tuple[str, ...]
 
     def __call__(self, rows: NDArray[np.int64]) -> dict[str, Choice]:

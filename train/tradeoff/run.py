@@ -19,7 +19,7 @@ from edge.touch.feature_sets import SETS, expand
 from edge.touch.features import FEATURES, SAMPLES, feature_vector
 from edge.touch.layout import SkinLayout
 from train.dataset import DataSet, load_trials
-from train.evaluate import Grid, Labels
+from train.evaluate import Labels, SearchGrid
 from train.pipeline import Choice
 from train.report.html import write
 from train.simulate import scene as scenes
@@ -38,7 +38,7 @@ PAPER = ("none", 1.2)
 FEWEST = 40
 CONTACT = SETS["contact"].features
 NAMES = expand(["paper", "contact"])
-GRIDS = (Grid("IV", features=FEATURES), Grid("IV", "lda", features=CONTACT))
+GRIDS = (SearchGrid("IV", features=FEATURES), SearchGrid("IV", "lda", features=CONTACT))
 """Candidates for every task's decision: the paper's way, and the discriminants of `contact`."""
 Case = tuple[str, int, tuple[str, ...], str, float, int]
 """Skin's name, taxels, features, scaling, window, and n where only every n-th frame arrives."""
