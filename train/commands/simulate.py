@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         from train.simulate.run import total_trials, write
 
         with tqdm(total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr) as bar:
-            paths = write(
+            written = write(
                 scene,
                 arguments.out,
                 batch=arguments.batch,
@@ -64,5 +64,10 @@ def run(arguments: argparse.Namespace) -> int:
                 address=arguments.address,
                 progress=bar.update,
             )
-        print(f"{len(paths)} recordings in {arguments.out}", file=sys.stderr)
+        print(f"{len(written.paths)} recordings in {arguments.out}", file=sys.stderr)
+        if written.redrawn:
+            print(
+                f"{written.redrawn} of them were drawn again until they did as their labels say",
+                file=sys.stderr,
+            )
     return 0

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from edge.touch.arm import Chain
 from train.simulate.arm import cross, dot
 from train.simulate.contact import (
     Array,
@@ -23,7 +24,7 @@ from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 
 # Ranks within the stages; effects put themselves between.
-SPRINGS, WINDOW, BED, ORDER = 10, 30, 40, 60
+SWING, PLACE, SPRINGS, WINDOW, BED, ORDER = 0, 5, 10, 30, 40, 60
 LOCATE, LAYOUT = 10, 20
 PREDICT, PRESS, SETTLE = 10, 30, 60
 BEAR, IMAGE = 10, 30
@@ -32,7 +33,8 @@ BEAR, IMAGE = 10, 30
 def add(build: Build) -> None:
     """Put the base's functions into the plan."""
     build.wrap(solve)
-    build.put("setup", 0, place)
+    build.put("setup", SWING, swing)
+    build.put("setup", PLACE, place)
     build.put("setup", SPRINGS, springs)
     build.put("setup", WINDOW, window)
     build.put("setup", BED, lay_bed)
@@ -43,6 +45,7 @@ def add(build: Build) -> None:
     build.put("step", SETTLE, settle)
     build.put("sample", BEAR, bear)
     build.put("sample", IMAGE, image)
+    build.trace("depth_m", lambda state: state.depth[0])
 
 
 def solve(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
@@ -55,51 +58,65 @@ def equilibrium(state: State, t: float | Array) -> Array:
     return np.asarray(state.start + state.rate * np.minimum(t, state.travel_s))
 
 
-def place(state: State) -> None:
-    """Set the arm in its steady sweep and the object where the sweep meets it after the lead.
+def limits(chain: Chain) -> tuple[Array, Array]:
+    """(dof, 1) radians, the lower and upper limit of each joint; without limits infinite."""
+    none = (-math.inf, math.inf)
+    both = [pair if pair is not None else none for pair in chain.limits]
+    return np.array([b[0] for b in both])[:, None], np.array([b[1] for b in both])[:, None]
+
+
+def swing(state: State) -> None:
+    """Set the arm in its steady sweep.
 
     Before the contact each joint lags its equilibrium point by d/k of its speed: the steady
     answer of d q' + k (q - q_eq) = 0 to a ramp.
     """
-    p, scene, kinematics = state.values, state.scene, state.kinematics
-    n = state.n
+    scene = state.scene
     k = np.array(scene.stiffness)[:, None]
     d = np.array(scene.damping)[:, None]
-    start = np.repeat(np.array(scene.start)[:, None], n, axis=1)
-    start[-1] += np.radians(p["roll_deg"])
-    state.start = start
+    low, high = limits(scene.arm)
+    start = np.repeat(np.array(scene.start)[:, None], state.n, axis=1)
+    start[-1] += np.radians(state.values["roll_deg"])
+    state.start = np.clip(start, low, high)
     state.rate = np.array(scene.rate)[:, None]
-    state.travel_s = scene.travel_s
-    lag = d / k * state.rate
-    h = state.h
-    state.held = d / h
-    state.give = 1.0 / (d / h + k)
+    # Each joint's equilibrium point stops at the joint's limit.
+    way = np.abs(np.where(state.rate > 0.0, high, low) - state.start)
+    moves = state.rate != 0.0
+    reached = np.where(moves, way / np.where(moves, np.abs(state.rate), 1.0), np.inf)
+    state.travel_s = np.minimum(scene.travel_s, reached)
+    state.held = d / state.h
+    state.give = 1.0 / (d / state.h + k)
     state.joint_k = k
-    state.q = equilibrium(state, 0.0) - lag
+    state.lag = d / k * state.rate
+    state.q = equilibrium(state, 0.0) - state.lag
     state.t = 0.0
-    skin = state.skin
+
+
+def place(state: State) -> None:
+    """Put the object where the sweep meets it after the lead."""
+    p, skin = state.values, state.skin
     state.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
     low, high = float(state.row_z.min()), float(state.row_z.max())
-    state.z = np.clip(scene.place_m + p["place_m"], low, high)
-    pose = kinematics.pose(equilibrium(state, p["lead_s"]) - lag)
+    state.z = np.clip(state.scene.place_m + p["place_m"], low, high)
+    pose = state.kinematics.pose(equilibrium(state, p["lead_s"]) - state.lag)
     along = pose.rotation[:, 2]
     point = pose.origin + along * state.z
     arms = cross(pose.axes, (point[:, None] - pose.origins))
-    speed = dot(np.moveaxis(arms, 1, 0), np.broadcast_to(state.rate[:, :, None], (len(k), 1, n)))
+    rate = np.broadcast_to(state.rate[:, :, None], (len(state.rate), 1, state.n))
+    speed = dot(np.moveaxis(arms, 1, 0), rate)
     speed = speed - along * dot(speed, along)
     size = np.sqrt(dot(speed, speed))
     state.approach = size
     normal = speed / size
     yaw = np.radians(p["yaw_deg"])
-    normal = normal * np.cos(yaw) + along * np.sin(yaw)
-    state.normal = normal
-    state.face = point + skin.radius_m * (speed / size)
-    state.along_face = along * np.cos(yaw) - (speed / size) * np.sin(yaw)
+    state.normal = normal * np.cos(yaw) + along * np.sin(yaw)
+    state.face = point + skin.radius_m * normal
+    state.along_face = along * np.cos(yaw) - normal * np.sin(yaw)
     state.meeting_angle = np.arctan2(
         dot(speed, pose.rotation[:, 1]), dot(speed, pose.rotation[:, 0])
     )
-    state.force = np.zeros(n)
-    state.loads = (np.zeros(n),)
+    state.force = np.zeros(state.n)
+    state.loads = (np.zeros(state.n),)
 
 
 def springs(state: State) -> None:
@@ -178,6 +195,7 @@ def locate(state: State) -> None:
     state.pose = pose
     along = pose.rotation[:, 2]
     point = pose.origin + along * state.z
+    state.point = point
     normal = state.normal
     crossed = cross(normal[:, None], pose.axes)
     jacobian = dot(point[:, None] - pose.origins, crossed)

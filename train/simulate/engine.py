@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.errors import EdgeError
 from train.simulate import streams
 from train.simulate.arm import Array, Kinematics
 from train.simulate.assemble import make_plan
+from train.simulate.base import equilibrium
 from train.simulate.plan import Plan
 from train.simulate.required_effects import required_effects
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
@@ -70,27 +73,28 @@ def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
 
     Where an object has no such value (a fixed one its mass), it is NaN and nothing reads it.
     """
-    groups: dict[str, list[int]] = {}
+    groups: dict[tuple[str, int], list[int]] = {}
     for i, trial in enumerate(trials):
-        groups.setdefault(trial.key, []).append(i)
+        groups.setdefault((trial.key, trial.attempt), []).append(i)
     out: dict[str, Array] = {}
-    for key, members in groups.items():
+    for (key, attempt), members in groups.items():
         where = np.array(members)
         numbers = np.array([trials[i].number for i in members], dtype=np.int64)
         item = trials[members[0]].object
 
-        def spread(name: str, key: str = key, numbers: Any = numbers) -> Any:
+        def draw(name: str, kind: str, attempt: int = attempt, rest: Any = (key, numbers)) -> Array:
+            again = f".{attempt}" if attempt else ""
+            return streams.draws(scene.seed, name + again, rest[0], rest[1], kind)
+
+        def spread(name: str, draw: Callable[[str, str], Array] = draw) -> Any:
             amount = scene.spread[name]
-            if amount == 0.0:
-                return 0.0
-            return amount * streams.draws(scene.seed, f"spread.{name}", key, numbers, "normal")
+            return 0.0 if amount == 0.0 else amount * draw(f"spread.{name}", "normal")
 
         own = {**item.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m}
         for name, value in own.items():
             drawn: Any = value.low
             if value.varies:
-                part = streams.draws(scene.seed, f"value.{name}", key, numbers, "uniform")
-                drawn = value.low + (value.high - value.low) * part
+                drawn = value.low + (value.high - value.low) * draw(f"value.{name}", "uniform")
             if name in STIFFNESSES:
                 drawn = drawn * np.exp(spread("stiffness"))
             elif name in ("friction_static", "friction_kinetic"):
@@ -213,14 +217,50 @@ def run_physics(
             traces[name][k] = quantity(state)
         if images:
             seen.take(k, state)
+    t = np.arange(frames) / rate_hz
+    check_energy(scene, state, joints, t)
     return PhysicsRun(
         frames=seen,
-        t=np.arange(frames) / rate_hz,
+        t=t,
         joints=np.ascontiguousarray(joints.transpose(2, 0, 1)),
         force=np.ascontiguousarray(force.T),
         traces={name: np.ascontiguousarray(kept.T) for name, kept in traces.items()},
         state=state,
     )
+
+
+ENERGY_MADE = 0.05
+"""Share of the work put in that the arm may hold beyond it: what sampling at frames leaves open."""
+
+
+def check_energy(scene: Scene, state: State, joints: Array, t: Array) -> None:
+    """Refuse a batch in which energy came out of nothing.
+
+    The equilibrium point's motion is all that puts energy in, W = int k (q_eq - q) dq_eq, so the
+    arm's springs hold at most that, and what the arm brought as speed. A step that makes energy breaks the bound at once.
+
+    Args:
+        joints: (frames, dof, n) radians.
+        t: (frames,) seconds.
+
+    Raises:
+        EdgeError: names the first trial that broke it.
+    """
+    target = equilibrium(state, t[:, None, None])
+    torque = state.joint_k * (target - joints)
+    stored = 0.5 * (torque * (target - joints)).sum(axis=1)
+    put_in = (0.5 * (torque[1:] + torque[:-1]) * np.diff(target, axis=0)).sum(axis=1)
+    work = np.cumsum(np.abs(put_in), axis=0)
+    moving = 0.5 * sum(i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False))
+    made = ~(stored[1:] <= stored[0] + moving + (1.0 + ENERGY_MADE) * work + 1e-9)
+    if made.any():
+        i = int(np.argmax(made.any(axis=0)))
+        k = int(np.argmax(made[:, i]))
+        raise EdgeError(
+            f"{scene.name}: trial {state.trials[i].number} of {state.trials[i].key} makes energy: "
+            f"at {t[k + 1]:g} s the arm holds {stored[k + 1, i]:.3g} J, and {work[k, i]:.3g} J "
+            "have been put in; give [step_s] a smaller step, or the object less extreme values"
+        )
 
 
 def read_out(physics: PhysicsRun, plan: Plan) -> Batch:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from train.simulate.contact import Array, Coordinates
 from train.simulate.state import State
 
+GRAVITY = 9.80665
+
 
 @dataclass
 class Mover:
@@ -17,17 +19,28 @@ class Mover:
 
     Attributes:
         inertia: kilograms, as the contact feels it.
-        hold: newtons up to which it stays at rest.
-        drag: newtons against its motion.
+        static, kinetic: coefficients of its friction on the floor.
+        weight: newtons with which it stands on the floor.
         speed: m/s.
         slide: metres that it has moved.
     """
 
     inertia: Array
-    hold: Array
-    drag: Array
+    static: Array
+    kinetic: Array
+    weight: Array
     speed: Array
     slide: Array
+
+    @property
+    def hold(self) -> Array:
+        """Newtons up to which it stays at rest."""
+        return self.static * self.weight
+
+    @property
+    def drag(self) -> Array:
+        """Newtons against its motion."""
+        return self.kinetic * self.weight
 
 
 def give_way(state: State, mover: Mover, drag: Array, inertia: Array) -> tuple[Array, Coordinates]:

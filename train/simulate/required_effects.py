@@ -47,6 +47,10 @@ def check_supported(scene: Scene, where: str) -> None:
         InputError: the sentence says what the effect needs.
     """
     found = [required_effects(scene, o, c) for o in scene.objects for c in o.conditions]
+    if not scene.inertia and any("inertia" in required for required in found):
+        raise InputError(
+            f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one number a joint"
+        )
     for name in scene.add:
         if any(name in required for required in found):
             continue

@@ -4,23 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge import recording
 from edge.errors import InputError
 from edge.recording import Recording
+from train.simulate.assemble import make_plan
 from train.simulate.convergence import choose_step
-from train.simulate.engine import Batch, Kind, kind_of, run_batch
+from train.simulate.engine import Batch, Kind, kind_of, read_out
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SOFT_FAMILIES
+from train.simulate.truth import true_runs
 
 BATCH = 256
 """Trials in a batch: enough to spread numpy's cost a call, few enough to stay in the cache."""
-Named = tuple[str, Recording | None]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """One trial's recording: its file's name, how often it was drawn again, and itself where it
+    has not been written yet."""
+
+    name: str
+    redrawn: int
+    recording: Recording | None
+
+
+@dataclass(frozen=True)
+class Written:
+    """What `write` has done: the files, and how many of the trials were drawn again."""
+
+    paths: list[Path]
+    redrawn: int
 
 
 def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
@@ -44,11 +65,15 @@ def steps(scene: Scene) -> dict[Kind, float]:
     }
 
 
-def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial of a batch."""
+def recordings(
+    batch: Batch, scene: Scene, step_s: float, wanted: NDArray[np.bool_] | None = None
+) -> Iterator[tuple[str, Recording]]:
+    """(file name, recording) of each trial of a batch, or of those `wanted` (n,)."""
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
     values = batch.state.values
     for i, trial in enumerate(batch.trials):
+        if wanted is not None and not wanted[i]:
+            continue
         kept = slice(None) if batch.kept is None else batch.kept[i]
         t = batch.t if batch.times is None else batch.times[i]
         soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
@@ -57,6 +82,7 @@ def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str,
             "labels": {
                 "category": f"{soft}-{trial.condition}",
                 "mobility": trial.condition,
+                "softness": soft,
                 "object": trial.object.name,
             },
             "skin": skin,
@@ -67,6 +93,7 @@ def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str,
                 "seed": scene.seed,
                 "step_s": step_s,
                 "family": trial.object.family,
+                "redrawn": trial.attempt,
                 "effects": list(kind_of(scene, trial.object, trial.condition).effects),
                 "values": {k: float(v[i]) for k, v in values.items() if np.isfinite(v[i])},
             },
@@ -83,18 +110,27 @@ def recordings(batch: Batch, scene: Scene, step_s: float) -> Iterator[tuple[str,
         )
 
 
+def simulate_trials(
+    scene: Scene, trials: tuple[TrialSpec, ...], step_s: float
+) -> Iterator[tuple[str, Recording]]:
+    """(file name, recording) of trials of one kind, each drawn until it does as its label says."""
+    first = trials[0]
+    plan = make_plan(scene, kind_of(scene, first.object, first.condition).effects)
+    for physics, true in true_runs(scene, trials, step_s, plan):
+        if true.any():
+            yield from recordings(read_out(physics, plan), scene, step_s, true)
+
+
 def simulate_part(
     scene: Scene, trials: tuple[TrialSpec, ...], step_s: float, folder: str | None
-) -> list[Named]:
+) -> list[Simulated]:
     """Simulate one batch; write it where `folder` is given, else give the recordings back."""
-    batch = run_batch(scene, trials, step_s)
-    out: list[Named] = []
-    for name, trial in recordings(batch, scene, step_s):
-        if folder is None:
-            out.append((name, trial))
-        else:
+    out: list[Simulated] = []
+    for name, trial in simulate_trials(scene, trials, step_s):
+        if folder is not None:
             recording.save(Path(folder) / name, trial)
-            out.append((name, None))
+        redrawn = int(trial.meta["simulation"]["redrawn"])
+        out.append(Simulated(name, redrawn, trial if folder is None else None))
     return out
 
 
@@ -113,7 +149,7 @@ def parts(scene: Scene, batch: int = BATCH) -> list[tuple[tuple[TrialSpec, ...],
 def simulate(scene: Scene, batch: int = BATCH) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial, simulated here, in the order of the batches."""
     for trials, step_s in parts(scene, batch):
-        yield from recordings(run_batch(scene, trials, step_s), scene, step_s)
+        yield from simulate_trials(scene, trials, step_s)
 
 
 def write(
@@ -125,7 +161,7 @@ def write(
     backend: str = "local",
     address: str | None = None,
     progress: Callable[[int], Any] = lambda done: None,
-) -> list[Path]:
+) -> Written:
     """Simulate a scene into a folder of recordings.
 
     The files' bytes depend on the scene and its seed alone.
@@ -146,32 +182,34 @@ def write(
     except OSError as error:
         raise InputError(f"{target}: cannot be made: {error.strerror or error}") from None
     work = parts(scene, batch)
-    done: Iterable[list[Named]]
+    done: Iterable[list[Simulated]]
     if backend == "dask":
         done = _on_dask(scene, work, address)
     elif backend == "local":
         done = _on_cores(scene, work, str(target), jobs)
     else:
         raise InputError(f"--backend must be local or dask, not {backend!r}")
-    written: list[Path] = []
-    for named in done:
-        for name, trial in named:
-            if trial is not None:
-                recording.save(target / name, trial)
-            written.append(target / name)
-        progress(len(named))
-    return sorted(written)
+    found: list[Simulated] = []
+    for part in done:
+        for trial in part:
+            if trial.recording is not None:
+                recording.save(target / trial.name, trial.recording)
+            found.append(replace(trial, recording=None))
+        progress(len(part))
+    return Written(
+        sorted(target / trial.name for trial in found), sum(1 for trial in found if trial.redrawn)
+    )
 
 
 def _on_cores(
     scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], folder: str, jobs: int
-) -> Iterable[list[Named]]:
+) -> Iterable[list[Simulated]]:
     if jobs == 1:
         return (simulate_part(scene, trials, step_s, folder) for trials, step_s in work)
     from joblib import Parallel, delayed
 
     run = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    found: Iterable[list[Named]] = run(
+    found: Iterable[list[Simulated]] = run(
         delayed(simulate_part)(scene, trials, step_s, folder) for trials, step_s in work
     )
     return found
@@ -179,7 +217,7 @@ def _on_cores(
 
 def _on_dask(
     scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], address: str | None
-) -> Iterator[list[Named]]:
+) -> Iterator[list[Simulated]]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:

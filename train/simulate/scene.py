@@ -21,6 +21,9 @@ from train.simulate.schema import EFFECTS, Field
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
 """Nm/rad and Nms/rad of j0 to j4: the gains of the lab's impedance controller."""
+CODY_INERTIA = (0.36, 0.33, 0.03, 0.047, 0.003)
+"""kg m^2 about j0 to j4: rods of 2 kg for upper arm and forearm, the elbow bent as below (the
+arm's masses are not published)."""
 CODY_START_DEG = (-44.0, 5.0, 0.0, 42.0, 0.0)
 CODY_RATE_DEG_S = (20.0, 0.0, 0.0, 0.0, 0.0)
 """A swing of the shoulder at the lab's 20 deg/s with the elbow bent to 42 degrees: there the
@@ -62,7 +65,10 @@ def load(
     return from_dict(table, where=name)
 
 
-TOP = ("name", "seed", "trials", "step_s", "arm", "motion", "skin", "spread", "effects", "object")
+TOP = (
+    *("name", "seed", "trials", "labels", "step_s", "arm", "motion", "skin", "spread", "effects"),
+    "object",
+)
 
 
 def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
@@ -78,12 +84,13 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         raise read.fail("seed", f"must be a whole number of 0 to 2^63 - 1, not {seed!r}")
     trials, lead = _trials(read, read.table(table.get("trials", {}), "trials"))
     step_s = _steps(read, read.table(table.get("step_s", {}), "step_s"), trials["rate_hz"])
-    chain, stiffness, damping = _arm(read, read.table(table.get("arm", {}), "arm"))
+    chain, stiffness, damping, inertia = _arm(read, read.table(table.get("arm", {}), "arm"))
     start, rate, travel_s, place = _motion(
         read, read.table(table.get("motion", {}), "motion"), chain
     )
     skin, taxel = _skin(read, read.table(table.get("skin", {}), "skin"))
     spread = _fields(read, table.get("spread", {}), "spread", schema.SPREAD)
+    labels = _fields(read, table.get("labels", {}), "labels", schema.LABELS)
     objects = _objects(read, table.get("object"))
     add, leave_out, settings = _effects(read, table.get("effects", {}))
     scene = Scene(
@@ -95,6 +102,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         arm=chain,
         stiffness=stiffness,
         damping=damping,
+        inertia=inertia,
         start=start,
         rate=rate,
         travel_s=travel_s,
@@ -102,11 +110,18 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         taxel_n_m=taxel,
         place_m=place,
         spread=spread,
+        labels=labels,
         objects=objects,
         add=add,
         leave_out=leave_out,
         settings=settings,
     )
+    rows = [skin.row0_z_m, skin.row0_z_m - scene.cylinder.row_pitch_m * (skin.rows - 1)]
+    if not min(rows) <= place <= max(rows):
+        raise read.fail(
+            "motion.place_m",
+            f"must lie on the skin, {min(rows):g} to {max(rows):g} m from the wrist, not {place:g}",
+        )
     check_supported(scene, where)
     return scene
 
@@ -152,22 +167,42 @@ def _steps(read: Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, 
     return out
 
 
+def _chain(read: Reader, name: str, table: Mapping[str, Any]) -> Chain:
+    if name == "cody":
+        return Chain.cody()
+    path = Path(read.where).parent / name
+    if path.suffix != ".urdf":
+        return Chain.from_toml(path)
+    if "base" not in table or "tip" not in table:
+        raise read.fail(
+            "arm", "takes a URDF from a base to a tip: name both links (the tip wears the skin)"
+        )
+    links = (read.text(table[key], f"arm.{key}") for key in ("base", "tip"))
+    return Chain.from_urdf(path, *links)
+
+
 def _arm(
     read: Reader, table: Mapping[str, Any]
-) -> tuple[Chain, tuple[float, ...], tuple[float, ...]]:
-    read.known(table, "arm", ("chain", "stiffness_nm_rad", "damping_nms_rad"))
+) -> tuple[Chain, tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    keys = ("stiffness_nm_rad", "damping_nms_rad", "inertia_kg_m2")
+    read.known(table, "arm", ("chain", "base", "tip", *keys))
     name = read.text(table.get("chain", "cody"), "arm.chain")
-    chain = Chain.cody() if name == "cody" else Chain.from_toml(Path(read.where).parent / name)
+    chain = _chain(read, name, table)
     positive = Field(0.0, math.inf, None, "", open_low=True)
     gains: list[tuple[float, ...]] = []
+    at_least_0 = Field(0.0, math.inf, None, "")
     for key, cody, limits in (
         ("stiffness_nm_rad", CODY_STIFFNESS, positive),
-        ("damping_nms_rad", CODY_DAMPING, Field(0.0, math.inf, None, "")),
+        ("damping_nms_rad", CODY_DAMPING, at_least_0),
+        ("inertia_kg_m2", CODY_INERTIA, at_least_0),
     ):
+        if key == "inertia_kg_m2" and key not in table and name != "cody":
+            gains.append(())
+            continue
         if key not in table and name != "cody":
             raise read.fail(f"arm.{key}", "is missing: one number a joint of arm.chain")
         gains.append(read.numbers(table.get(key, list(cody)), f"arm.{key}", chain.dof, limits))
-    return chain, gains[0], gains[1]
+    return chain, gains[0], gains[1], gains[2]
 
 
 def _motion(

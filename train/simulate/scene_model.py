@@ -53,6 +53,8 @@ class TrialSpec:
     object: SceneObject
     condition: str
     number: int
+    attempt: int = 0
+    """How often the trial was drawn before, and contradicted its label."""
 
     @property
     def key(self) -> str:
@@ -73,6 +75,8 @@ class Scene:
     arm: Chain
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
+    inertia: tuple[float, ...]
+    """(dof,) kg m^2 of each joint."""
     start: tuple[float, ...]
     """(dof,) radians, the equilibrium point at t = 0."""
     rate: tuple[float, ...]
@@ -84,6 +88,8 @@ class Scene:
     place_m: float
     """z in the skin's link of the point that meets the object."""
     spread: dict[str, float]
+    labels: dict[str, float]
+    """When a label must show, and how."""
     objects: tuple[SceneObject, ...]
     add: tuple[str, ...]
     leave_out: tuple[str, ...]

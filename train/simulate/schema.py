@@ -60,6 +60,11 @@ SKIN = {
     "release_s": Field(0.0, 60.0, RELEASE_S, "a contact ends after so long without", open_low=True),
     "taxel_n_m": Field(0.0, 1e18, 10_000.0, "stiffness of a taxel", open_low=True),
 }
+LABELS = {
+    "window_s": Field(0.01, 60.0, 1.2, "time after the first touch within which a label shows"),
+    "slides_m": Field(0.0, 1.0, 0.02, "what is called movable moves at least this far by then"),
+    "yields": Field(0.0, 1.0, 0.05, "what is soft yields by then, as a part of its thickness"),
+}
 SPREAD = {
     "place_m": Field(0.0, 0.08, 0.0, "where along the forearm the object is met"),
     "yaw_deg": Field(0.0, 30.0, 0.0, "angle between the object's face and the forearm"),
@@ -73,6 +78,7 @@ OBJECT = {
     "mass_kg": Field(0.0, 1e12, None, "kilograms", open_low=True),
     "friction_static": Field(0.0, 5.0, None, "mu_s"),
     "friction_kinetic": Field(0.0, 5.0, None, "mu_k, at most friction_static"),
+    "skin_friction": Field(0.0, 5.0, None, "mu between the skin and the object's face"),
     "width_m": Field(0.0, 10.0, 1.0, "the face along the forearm", open_low=True),
     "breadth_m": Field(0.0, 10.0, 10.0, "the face across the forearm", open_low=True),
     "radius_m": Field(0.0, 1e6, 1e6, "how the face curves along the forearm", open_low=True),
@@ -113,10 +119,22 @@ FAMILY_KEYS: dict[str, dict[str, float]] = {
 """Keys that belong to one family alone, with what they are where the object is silent (the
 middle of the ranges in the notes on physics, derived there)."""
 
+THICKNESS = {FOAM: "depth_m", PILLOW: "depth_m", BUBBLES: "bubble_m", FOLIAGE: "stem_slip_m"}
+"""How far each soft family could yield."""
 ELASTIC = (FOAM, PILLOW)
 EFFECTS: dict[str, EffectInfo] = {
     # In the order in which they take their place in the step and on the frames.
     "foundation": EffectInfo("elastic foundation under each taxel", "contact", 1, families=ELASTIC),
+    "lateral": EffectInfo(
+        "foam that pulls its neighbourhood along: an elastic layer",
+        "contact",
+        2,
+        needs=("foundation",),
+        families=ELASTIC,
+    ),
+    "bottoming": EffectInfo(
+        "foam that is pressed flat", "contact", 1, needs=("foundation",), families=ELASTIC
+    ),
     "cover": EffectInfo(
         "a sleeve over the skin, in series and spreading the load",
         "contact",
@@ -135,16 +153,19 @@ EFFECTS: dict[str, EffectInfo] = {
         2,
         families=(RIGID, FOAM, PILLOW, BUBBLES),
     ),
-    "relaxation": EffectInfo("standard linear solid", "contact", 2, families=ELASTIC),
-    "impact": EffectInfo(
-        "the arm's inertia when it meets the object, in closed form",
+    "relaxation": EffectInfo("standard linear solid", "contact", 1, families=ELASTIC),
+    "inertia": EffectInfo(
+        "the arm's inertia: it hits, lifts off and comes down again",
         "contact",
-        3,
-        {
-            "mass_kg": Field(0.0, 1e6, 1.5, "the arm's, as the contact feels it", open_low=True),
-            "damping": Field(0.0, 10.0, 0.3, "damping ratio of the rebound"),
-        },
-        excludes=("stems",),
+        4,
+        {"loss_s": Field(0.0, 1.0, 0.0015, "the skin's dashpot, as a part of its stiffness")},
+    ),
+    "friction": EffectInfo(
+        "the object's face holds the skin until it slides along it",
+        "contact",
+        4,
+        {"shear_n_m": Field(0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True)},
+        keys=("skin_friction",),
     ),
     "sliding": EffectInfo("sticks, then slides on the floor", "contact", 3),
     "stribeck": EffectInfo(
@@ -223,8 +244,8 @@ EFFECTS: dict[str, EffectInfo] = {
 }
 STEP = Field(1e-6, 1.0, None, "the physics' step")
 IMPLIED_BY_FAMILY = {
-    FOAM: ("foundation", "relaxation"),
-    PILLOW: ("foundation", "relaxation"),
+    FOAM: ("foundation", "lateral", "bottoming", "relaxation"),
+    PILLOW: ("foundation", "lateral", "bottoming", "relaxation"),
     BUBBLES: ("pop",),
     FOLIAGE: ("stems",),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Self, TypeVar, cast
 
 import numpy as np
@@ -51,11 +51,10 @@ class Bed:
     def take(self, where: NDArray[np.intp]) -> Self:
         """The bed of some of the trials."""
         part = object.__new__(type(self))
-        for item in fields(self):
-            value = getattr(self, item.name, None)
-            if isinstance(value, np.ndarray):
-                value = value[..., where] if value.shape[-1] > 1 else value
-            setattr(part, item.name, value)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray) and value.shape[-1] > 1:
+                value = value[..., where]
+            setattr(part, name, value)
         return part
 
 
@@ -72,9 +71,12 @@ class State:
         solve: (state, y, C) -> the loads at which arm and bed agree.
         own: {class: instance}, the called effects' own state.
         start, rate: (dof, n) and (dof, 1), the equilibrium point at t = 0 and its speed.
+        lag: (dof, 1) radians by which a joint trails its equilibrium point in free motion.
+        travel_s: (dof, n) seconds for which the equilibrium point moves.
         held, give, joint_k: (dof, 1) of a joint's step: what damping holds, the compliance
             of the whole, the spring.
         q, q_free, q_frame: (dof, n) radians: now, after the step without load, at the frame.
+        point: (3, n) metres on the forearm's axis, beside the middle of the contact.
         approach: (n,) m/s along the push before the contact.
         normal, face, along_face: (3, n) the object's face: its normal, a point, the direction
             along the forearm.
@@ -95,8 +97,9 @@ class State:
     own: dict[type, Any] = field(default_factory=dict)
 
     t: float | Array = 0.0
-    travel_s: float = field(init=False)
+    travel_s: Array = field(init=False)
     start: Array = field(init=False)
+    lag: Array = field(init=False)
     rate: Array = field(init=False)
     held: Array = field(init=False)
     give: Array = field(init=False)
@@ -105,6 +108,7 @@ class State:
     q_free: Array = field(init=False)
     q_frame: Array = field(init=False)
     pose: Pose = field(init=False)
+    point: Array = field(init=False)
 
     row_z: Array = field(init=False)
     z: Array = field(init=False)

@@ -15,10 +15,11 @@ from edge.touch.track import TrackSettings
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
 from train.simulate.assemble import make_plan
-from train.simulate.engine import kind_of, read_out, run_physics
+from train.simulate.engine import kind_of, read_out
 from train.simulate.run import parts, recordings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
+from train.simulate.truth import true_runs
 from train.study.context import Context
 from train.study.score import grid_search, transfer
 from train.study.skins import Remembering, follow, vectors
@@ -103,14 +104,14 @@ def measured(
         for name, scene in scenes.items()
     }
     shown = next(iter(scenes))
-    physics = run_physics(scenes[shown], trials, step_s, plan=plans[shown])
-    found: dict[str, dict[str, FeatureSeries | None]] = {}
+    found: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
     chain = None if chain is None else Remembering(chain)
-    for name, scene in scenes.items():
-        batch = recordings(read_out(physics, plans[name]), scene, step_s)
-        kept = {file: recording for file, recording in batch if file in wanted}
-        contacts = follow(list(kept.values()), layout, tracking, chain)
-        found[name] = dict(zip(kept, contacts, strict=True))
+    for physics, true in true_runs(scenes[shown], trials, step_s, plans[shown]):
+        for name, scene in scenes.items():
+            batch = recordings(read_out(physics, plans[name]), scene, step_s, true)
+            kept = {file: recording for file, recording in batch if file in wanted}
+            contacts = follow(list(kept.values()), layout, tracking, chain)
+            found[name].update(zip(kept, contacts, strict=True))
     return found
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from train.simulate import base
+from train.simulate import base, viscous
 from train.simulate.arm import Kinematics
 from train.simulate.effects import relaxation, sliding
 from train.simulate.motion import Mover
@@ -86,14 +86,14 @@ class Rig:
         state.bed.intercepts = np.broadcast_to(intercepts, (len(intercepts), n))
         self.state = state
         for s, _, f in sorted(plan.entries, key=lambda e: e[1]):
-            if s == "setup" and f in (sliding.stand, relaxation.begin):
+            if s == "setup" and f in (sliding.stand, viscous.begin, relaxation.relax):
                 f(self.state)
 
     def run(self, steps: int) -> Trace:
         seen = {name: [] for name in ("t", "force", "q", "target", "slide", "speed", "depth")}
         state = self.state
         n = state.n
-        still = Mover(*(np.zeros(n) for _ in range(5)))
+        still = Mover(*(np.zeros(n) for _ in range(6)))
         for _ in range(steps):
             for function in self.steps:
                 function(state)

@@ -44,7 +44,14 @@ def scene(*add, leave_out=(), objects=None, seed=3, **trials):
 
 def everything():
     """One object of each family, with every key that calls for an effect."""
-    full = {**MOVES, "cover_n_m": 3000.0, "stribeck_m_s": 0.05, "base_m": 0.1, "height_m": 0.3}
+    full = {
+        **MOVES,
+        "skin_friction": 0.3,
+        "cover_n_m": 3000.0,
+        "stribeck_m_s": 0.05,
+        "base_m": 0.1,
+        "height_m": 0.3,
+    }
     return [
         {"name": family, "family": family, "conditions": ["fixed", "movable"], **full}
         for family in ("rigid", "foam", "pillow", "bubbles", "foliage")
@@ -92,8 +99,9 @@ OWN = {
     "sliding": {"Mover"},
     "tipping": {"Tipping"},
     "tilt": {"Tilt"},
-    "impact": {"Impact"},
-    "relaxation": {"Relaxation"},
+    "inertia": {"Momentum", "Branches"},
+    "friction": {"Shear"},
+    "relaxation": {"Branches"},
     "stems": {"Stems"},
 }
 
@@ -101,7 +109,7 @@ OWN = {
 def test_3_only_the_called_effects_state_exists():
     one = scene(
         "tilt",
-        "impact",
+        "inertia",
         "noise",
         "dead_taxels",
         "jitter",
@@ -112,12 +120,12 @@ def test_3_only_the_called_effects_state_exists():
         batch = batch_of(one, i)[0]
         expected = set().union(*(OWN.get(name, set()) for name in kind.effects))
         assert {own.__name__ for own in batch.state.own} == expected, kind.effects
-        assert set(batch.traces) == ({"slide_m"} if "sliding" in kind.effects else set())
-        assert (type(batch.state.bed).__name__ == "BubbleBed") is ("pop" in kind.effects)
+        assert set(batch.traces) == {"depth_m", *(["slide_m"] if "sliding" in kind.effects else [])}
+        assert ("BubbleBed" in type(batch.state.bed).__name__) is ("pop" in kind.effects)
         assert batch.kept is not None
         assert batch.valid is not None
     bare = batch_of(scene(leave_out=["sliding"]))[0]
-    assert (bare.state.own, bare.traces) == ({}, {})
+    assert (bare.state.own, set(bare.traces)) == ({}, {"depth_m"})
     assert bare.times is bare.kept is bare.valid is None
 
 
@@ -156,15 +164,16 @@ def test_4_streams_go_by_name_not_by_place():
 def test_5_the_number_of_functions_is_exact():
     bare = make_plan(scene(), ())
     assert {s: len(getattr(bare, s)) for s in STAGES} == {
-        "setup": 5,
+        "setup": 6,
         "frame": 1,
         "step": 3,
         "sample": 2,
         "clock": 0,
         "sensor": 0,
     }
+    implied = ("foundation", "lateral", "bottoming", "relaxation", "pop", "stems")
     one = scene(
-        *[n for n in EFFECTS if n not in ("foundation", "relaxation", "pop", "stems")],
+        *[n for n in EFFECTS if n not in implied],
         objects=everything(),
     )
     seen = set()
@@ -172,7 +181,11 @@ def test_5_the_number_of_functions_is_exact():
         plan = make_plan(one, kind.effects)
         extra = sum(EFFECTS[name].functions for name in kind.effects)
         if "pop" in kind.effects and "tilt" not in kind.effects:
-            extra += 1
+            extra += 1  # the bed's law without the burst bubbles
+        if {"relaxation", "inertia"} & set(kind.effects):
+            extra += 3 if "tilt" in kind.effects else 2  # what the two share
+        if {"friction", "sliding"} <= set(kind.effects):
+            extra += 1  # the shear loads the floor
         assert len(plan) == len(bare) + extra, kind.effects
         seen |= set(kind.effects)
     assert seen == set(EFFECTS)
@@ -180,7 +193,7 @@ def test_5_the_number_of_functions_is_exact():
 
 @pytest.mark.parametrize("sensor", [False, True])
 def test_6_results_depend_on_neither_batch_nor_chunk(sensor):
-    add = ["tilt", "impact"]
+    add = ["tilt", "inertia"]
     if sensor:
         add += [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
     one = scene(*add, objects=everything(), after_s=0.4)

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from copy import copy
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import solve, toeplitz
 
 from edge.touch.arm import Chain
 from train.simulate import arm, base, contact
 from train.simulate.convergence import measure
-from train.simulate.effects import impact
-from train.simulate.effects.sliding import GRAVITY
+from train.simulate.effects import lateral
+from train.simulate.effects.friction import Shear
 from train.simulate.effects.tipping import Tipping
 from train.simulate.engine import run_batch
+from train.simulate.motion import GRAVITY, Mover
 from train.simulate.run import kinds
-from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, Scene, from_dict
+from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, Scene, from_dict, load
 
 ARM_K = 115.0
 RADIUS = 0.04604
@@ -319,49 +322,169 @@ class TestBed:
             assert force[0] == pytest.approx(float(best), rel=1e-14, abs=1e-300)
 
 
-class TestImpact:
-    def test_the_rebound_is_the_oscillators(self):
-        scene = make(one_object(width_m=0.08), "impact", rate_hz=1000, after_s=0.3)
-        batch = run(scene, 0.001)
-        quiet = run(make(one_object(width_m=0.08), rate_hz=1000, after_s=0.3), 0.001)
-        pulse = batch.force[0] - quiet.force[0]
-        state = batch.state
-        mass, zeta, v = 1.5, 0.3, state.approach[0]
-        k = impact.rebound_stiffness(state, 0.5 * mass * state.approach**2)[0]
-        t = batch.t - state.of(impact.Impact).touched[0]
-        omega = math.sqrt(k / mass)
-        want = solve_ivp(
-            lambda _, y: [y[1], -2 * zeta * omega * y[1] - omega**2 * y[0]],
-            (0.0, 0.3),
-            [0.0, v],
-            rtol=1e-10,
-            atol=1e-13,
-            dense_output=True,
+class TestInertia:
+    """One joint that swings a bar of 0.3 m against a narrow post."""
+
+    INERTIA, STIFFNESS, DAMPING = 0.09, 12.0, 0.4
+
+    def scene(self, tmp_path, h, **inertia):
+        (tmp_path / "arm.toml").write_text(
+            '[[joint]]\nname = "a"\naxis = [0, -1, 0]\ntranslate = [0, 0, -0.4]\n'
         )
-        held = (t > 0.0) & (batch.force[0] > 0.0) & (t < 0.29)
-        np.testing.assert_allclose(pulse[held], k * want.sol(t[held])[0], atol=1e-6 * k * v / omega)
+        path = tmp_path / "one.toml"
+        path.write_text(
+            f"""
+            trials = {{ count = 1, lead_s = 0.05, after_s = 0.6 }}
+            step_s = {{ base = {h} }}
+            motion = {{ start_deg = [0.0], rate_deg_s = [30.0] }}
+            effects = {{ inertia = {{ loss_s = {inertia["loss_s"]} }} }}
+            [arm]
+            chain = "arm.toml"
+            stiffness_nm_rad = [{self.STIFFNESS}]
+            damping_nms_rad = [{self.DAMPING}]
+            inertia_kg_m2 = [{self.INERTIA}]
+            [[object]]
+            name = "post"
+            family = "rigid"
+            conditions = ["fixed"]
+            width_m = 0.01
+            """
+        )
+        return load(path)
 
-    def test_its_peak_does_not_depend_on_the_step(self):
-        def peak(step_s):
-            with_, without = (
-                run(make(one_object(width_m=0.08), *add, after_s=0.3), step_s).force[0]
-                for add in (("impact",), ())
-            )
-            return (with_ - without).max()
+    def oracle(self, batch, loss_s):
+        """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never pulling."""
+        state, rate = batch.state, math.radians(30.0)
+        kinematics = arm.Kinematics(state.scene.arm)
+        slopes, intercepts = state.bed.slopes[:, 0], state.bed.intercepts[:, 0]
 
-        assert peak(0.01) == pytest.approx(peak(0.0005), rel=2e-3)
-        # The trap: an arm with its mass in the step shows a spike that the step sets.
-        assert stepped_spike(1e-4) / stepped_spike(1e-2) > 2.0
+        def contact_at(q, speed):
+            pose = kinematics.pose(np.array([[q]]))
+            axis = pose.origin[:, 0] + pose.rotation[:, 2, 0] * state.z[0]
+            normal = state.normal[:, 0]
+            depth = (axis - state.face[:, 0]) @ normal + RADIUS
+            lever = np.cross(pose.axes[:, 0, 0], axis) @ normal
+            elastic = max((slopes * depth - intercepts).max(), 0.0)
+            stiffness = slopes[np.argmax(slopes * depth - intercepts)] if elastic > 0.0 else 0.0
+            return max(elastic + loss_s * stiffness * lever * speed, 0.0), lever
+
+        def rates(t, y):
+            force, lever = contact_at(*y)
+            torque = self.STIFFNESS * (rate * t - y[0]) - self.DAMPING * y[1] - lever * force
+            return [y[1], torque / self.INERTIA]
+
+        start = [-self.DAMPING / self.STIFFNESS * rate, rate]
+        found = solve_ivp(rates, (0, 0.6), start, max_step=2e-4, rtol=1e-8, dense_output=True)
+        return np.array([contact_at(*found.sol(t))[0] for t in batch.t[:60]])
+
+    @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
+    def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
+        errors = []
+        for h in (1e-4, 5e-5):
+            batch = run(self.scene(tmp_path, h, loss_s=loss_s), h)
+            want = self.oracle(batch, loss_s)
+            errors.append(np.sqrt(np.mean((batch.force[0, :60] - want) ** 2)) / want.max())
+        assert errors[1] < 0.1
+        assert errors[1] < 0.75 * errors[0]
+
+    def test_less_loss_bounces_longer(self, tmp_path):
+        aloft = []
+        for loss_s in (0.0002, 0.02):
+            force = run(self.scene(tmp_path, 2.5e-4, loss_s=loss_s), 2.5e-4).force[0]
+            aloft.append(int((force[np.argmax(force > 0.0) :] == 0.0).sum()))
+        assert aloft[0] >= 5
+        assert aloft[1] == 0
 
 
-def stepped_spike(h, mass=1.5, k=4e4, speed=0.15):
-    """Largest force of backward Euler on a mass that runs into a spring."""
-    x, v, worst = 0.0, speed, 0.0
-    for _ in range(round(0.1 / h)):
-        v = (v - h * k / mass * x) / (1.0 + h * h * k / mass)
-        x += h * v
-        worst = max(worst, k * x)
-    return worst
+class TestFriction:
+    def test_a_sliding_skin_bears_less_by_the_arms_compliance(self):
+        # Quasi-static and stiff: a = c_nn F + c_nt T with T = mu F, so F falls by
+        # c_nn / (c_nn + mu c_nt).
+        mu = 0.4
+        plain = run(make(one_object(width_m=0.05)))
+        held = run(make(one_object(width_m=0.05, skin_friction=mu)))
+        shear = held.state.of(Shear)
+        force = held.force[0, -1]
+        assert abs(shear.pull[0]) == pytest.approx(mu * force, rel=0.02)
+        c_nn, c_nt = held.state.compliance[0][0], shear.coupled[0][0]
+        want = plain.force[0, -1] * c_nn / (c_nn + mu * np.sign(shear.pull[0]) * c_nt)
+        assert force == pytest.approx(want, rel=0.05)
+        assert force < 0.95 * plain.force[0, -1]
+
+    def test_a_face_that_sticks_holds_the_skin_where_it_touched(self):
+        held = run(make(one_object(width_m=0.05, skin_friction=5.0)))
+        shear = held.state.of(Shear)
+        assert abs(shear.pull[0]) < 5.0 * held.force[0, -1]
+        # What the skin has moved along the face is the stretch of its own spring.
+        assert abs(shear.stretch[0]) == pytest.approx(abs(shear.pull[0]) / 1e4, rel=0.05)
+
+    def test_the_shear_presses_a_pushed_box_to_the_floor(self):
+        box = {"mass_kg": 1.0, "friction_static": 0.56, "friction_kinetic": 0.5, "width_m": 0.2}
+        plain, held = (
+            run(make(one_object(conditions=["movable"], **box, **more)), 0.005)
+            for more in ({}, {"skin_friction": 0.5})
+        )
+        assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
+        shear, mover = held.state.of(Shear), held.state.of(Mover)
+        assert mover.weight[0] == pytest.approx(
+            GRAVITY - shear.pull[0] * held.state.along_face[2, 0], rel=0.01
+        )
+        assert held.force[0].max() > 1.2 * plain.force[0].max()
+
+
+def layer_solution(half_width, step=1 / 200):
+    """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer of E = 1
+    and H = 1 without lateral strain, by its Green's function (Fourier), half_width a."""
+    n, length = 8192, 8192 * step
+    w = 2.0 * np.pi * np.fft.rfftfreq(n, step)
+    v = np.clip(w, 1e-9, 20.0)
+    bonded = (6.0 * np.sinh(2 * v) - 4.0 * v) / (6.0 * np.cosh(2 * v) + 4.0 * v**2 + 10.0)
+    u = 2.0 * np.where(w > 20.0, 1.0, bonded) / np.maximum(w, 1e-9)
+    u[0] = 1.0
+    assert length > 30.0
+    green = np.fft.irfft(u, n) / step
+    points = 2 * round(half_width / step) + 1
+    x = (np.arange(points) - points // 2) * step
+    flat, curved = solve(toeplitz(green[:points]), np.stack([np.ones(points), x * x / 2.0]).T).T
+    depth = curved[0] / flat[0]  # no pressure at the edge
+    pressure = depth * flat - curved
+    return pressure.sum(), depth, pressure.max() / pressure.mean()
+
+
+class TestLateral:
+    @pytest.mark.parametrize(("part", "bound"), [(0.1, 0.2), (0.3, 0.1), (0.6, 0.1), (1.0, 0.1)])
+    def test_load_and_width_are_the_elastic_layers(self, part, bound):
+        load, depth, peak = layer_solution(part)
+        # Columns so fine that the sum is the integral; E = H = R = 1.
+        x = np.linspace(0.0, 2.0, 4001)
+        gaps = x * x / 2.0 + lateral.delay(x, np.array(1.0))
+        inside = np.maximum(depth - gaps, 0.0)
+        force = 2.0 * inside.sum() * (x[1] - x[0]) + 2.0 * lateral.MARGIN * depth
+        assert force == pytest.approx(load, rel=bound)
+        assert x[inside > 0.0].max() == pytest.approx(part, rel=bound)
+        shape = np.sqrt(inside[inside > 0.0])
+        assert shape.max() / shape.mean() == pytest.approx(peak, rel=0.05)
+        # Independent springs are as wide as the square root of the depth says, and too soft.
+        assert math.sqrt(2.0 * depth) > 1.15 * part
+
+    def test_the_bed_of_taxels_keeps_to_it(self):
+        foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
+        batch = run(make(foam))
+        depth = batch.traces["depth_m"][0, -1] / 0.1
+        widths = np.array([layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)])
+        scale = RADIUS / 0.1
+        want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
+        length = batch.state.skin.row_pitch_m * batch.state.bed.weight[:, 0].sum()
+        assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
+
+
+class TestBottoming:
+    def test_thin_foam_ends(self):
+        foam = {"family": "foam", "modulus_pa": 2e3, "depth_m": 0.02, "relax_ratio": 0.0}
+        scene = make(one_object(**foam))
+        assert run(scene).traces["depth_m"][0].max() < 0.021
+        endless = replace(scene, leave_out=("bottoming",))
+        assert run(endless).traces["depth_m"][0].max() > 0.021
 
 
 class TestTilt:

@@ -42,7 +42,7 @@ def test_eighteen_objects_ten_in_both_conditions(cody18):
 def test_each_trial_is_felt_and_long_enough(dataset):
     assert dataset.untouched == ()
     assert len(dataset.trials) == 140
-    assert dataset.tasks == ("category", "mobility", "object")
+    assert dataset.tasks == ("category", "mobility", "object", "softness")
     assert dataset.chain is not None
     assert all(trial.onset_s > 0.1 for trial in dataset.trials)
     # What is light and stands on something smooth may be felt so late that its window is short.

@@ -30,7 +30,7 @@ def demo():
 @pytest.fixture(scope="module")
 def written(demo, tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
-    return folder, write(demo, folder)
+    return folder, write(demo, folder).paths
 
 
 def test_a_recording_is_as_the_contract_says(demo, written):
@@ -40,6 +40,7 @@ def test_a_recording_is_as_the_contract_says(demo, written):
     assert trial.labels == {
         "category": "rigid-movable",
         "mobility": "movable",
+        "softness": "rigid",
         "object": "cardboard box",
     }
     assert trial.frames.shape[1:] == (16, 24)

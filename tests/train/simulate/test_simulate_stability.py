@@ -9,7 +9,7 @@ import pytest
 
 from train.simulate import contact
 from train.simulate.effects import tilt
-from train.simulate.effects.sliding import GRAVITY
+from train.simulate.motion import GRAVITY
 from train.simulate.state import Bed
 
 MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.motion import Mover, advance, give_way
+from train.simulate.motion import GRAVITY, Mover, advance, give_way
 from train.simulate.plan import Build
 from train.simulate.state import State
-
-GRAVITY = 9.80665
 
 
 def add(build: Build) -> None:
@@ -23,12 +21,12 @@ def add(build: Build) -> None:
 def stand(state: State) -> None:
     """At rest, with what holds it and what drags on it."""
     values = state.values
-    weight = values["mass_kg"] * GRAVITY
     state.keep(
         Mover(
             inertia=values["mass_kg"],
-            hold=values["friction_static"] * weight,
-            drag=values["friction_kinetic"] * weight,
+            static=values["friction_static"],
+            kinetic=values["friction_kinetic"],
+            weight=values["mass_kg"] * GRAVITY,
             speed=np.zeros(state.n),
             slide=np.zeros(state.n),
         )

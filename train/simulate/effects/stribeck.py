@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.effects.sliding import GRAVITY
 from train.simulate.motion import Mover
 from train.simulate.plan import Build
 from train.simulate.state import State
@@ -22,5 +21,4 @@ def ease(state: State) -> None:
     kinetic, static = values["friction_kinetic"], values["friction_static"]
     mover = state.of(Mover)
     part = mover.speed / values["stribeck_m_s"]
-    mu = kinetic + (static - kinetic) * np.exp(-(part * part))
-    mover.drag = mu * (values["mass_kg"] * GRAVITY)
+    mover.kinetic = kinetic + (static - kinetic) * np.exp(-(part * part))

@@ -78,10 +78,11 @@ def pivot(state: State) -> None:
     state.bed.weight = weight[lines]
     state.bed.line_gap = base.curve_gap(on_face[lines], state)
     state.of(Tilt).lever = row_z[lines] - z
+    state.point = pose.origin + along * z
     depth = dot(away + along * z, normal) + skin.radius_m * upright
     crossed = cross(normal[:, None], pose.axes)
     turn = dot(along[:, None], crossed)
-    push = dot((pose.origin + along * z)[:, None] - pose.origins, crossed)
+    push = dot(state.point[:, None] - pose.origins, crossed)
     push = push - (skin.radius_m * tilt / upright) * turn
     give = state.give
     state.q_frame = state.q
@@ -94,11 +95,16 @@ def pivot(state: State) -> None:
     )
 
 
+def line_depths(state: State) -> Array:
+    """(L, n) each line's depth."""
+    depth, tilt = state.depth
+    return np.asarray(depth + state.of(Tilt).lever * tilt - state.bed.line_gap)
+
+
 def bear(state: State) -> None:
     """The force that the skin bears, and each line's depth."""
     state.force = state.loads[0]
-    depth, tilt = state.depth
-    state.line_depth = depth + state.of(Tilt).lever * tilt - state.bed.line_gap
+    state.line_depth = line_depths(state)
 
 
 def remember(state: State) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from train.simulate import base
 from train.simulate.contact import Array
 from train.simulate.effects import sliding
-from train.simulate.motion import Mover, advance, give_way
+from train.simulate.motion import GRAVITY, Mover, advance, give_way
 from train.simulate.plan import Build
 from train.simulate.state import State
 
@@ -46,22 +46,22 @@ def balance(state: State) -> None:
     foot, height = values["base_m"], values["height_m"]
     own = Tipping(
         tips=values["friction_static"] > foot / (2.0 * height),
-        force=values["mass_kg"] * sliding.GRAVITY * foot / (2.0 * height),
+        force=values["mass_kg"] * GRAVITY * foot / (2.0 * height),
         travel=height * np.arctan2(foot, 2.0 * height),
     )
     state.keep(own)
     mover = state.of(Mover)
     turned = values["mass_kg"] * (foot * foot / (height * height) + 4.0) / 3.0
     mover.inertia = np.where(own.tips, turned, values["mass_kg"])
-    mover.hold = np.where(own.tips, own.force, mover.hold)
 
 
 def topple(state: State) -> None:
     """As `sliding.slip`, but a leaning object moves either way and rests on its foot alone."""
     own, mover = state.of(Tipping), state.of(Mover)
     slide = mover.slide
+    hold = np.where(own.tips, own.force, mover.hold)
     leans = own.tips & (slide > 0.0)
-    moving = leans | (mover.speed > 0.0) | (state.loads[0] > mover.hold)
+    moving = leans | (mover.speed > 0.0) | (state.loads[0] > hold)
     if not moving.any():
         return
     left = np.maximum(1.0 - slide / own.travel, 0.0)
