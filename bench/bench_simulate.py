@@ -146,7 +146,13 @@ def bench_write(benchmark, note, tmp_path):
     note("simulating the same", mine / statistics.median(simulated), "at most 1")
 
 
-FULL = {"cover_n_m": 2600.0, "stribeck_m_s": 0.05, "base_m": 0.1, "height_m": 0.3}
+FULL = {
+    "skin_friction": 0.4,
+    "cover_n_m": 2600.0,
+    "stribeck_m_s": 0.05,
+    "base_m": 0.1,
+    "height_m": 0.3,
+}
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.errors import EdgeError
+from edge.errors import EdgeError, InputError
 from train.simulate import streams
 from train.simulate.arm import Array, Kinematics
 from train.simulate.assemble import make_plan
@@ -218,6 +218,7 @@ def run_physics(
         if images:
             seen.take(k, state)
     t = np.arange(frames) / rate_hz
+    check_start(scene, state, force[1])
     check_energy(scene, state, joints, t)
     return PhysicsRun(
         frames=seen,
@@ -233,11 +234,26 @@ ENERGY_MADE = 0.05
 """Share of the work put in that the arm may hold beyond it: what sampling at frames leaves open."""
 
 
+def check_start(scene: Scene, state: State, force: Array) -> None:
+    """Refuse a batch in which an object bears force (n,) before the arm has moved.
+
+    Raises:
+        InputError: names the first such object.
+    """
+    if (force > 0.0).any():
+        item = state.trials[int(np.argmax(force > 0.0))].object
+        raise InputError(
+            f"{scene.name}: object {item.name!r} touches the arm before it moves; give "
+            "trials.lead_s more time, or spread.yaw_deg or the object's width_m less"
+        )
+
+
 def check_energy(scene: Scene, state: State, joints: Array, t: Array) -> None:
     """Refuse a batch in which energy came out of nothing.
 
     The equilibrium point's motion is all that puts energy in, W = int k (q_eq - q) dq_eq, so the
-    arm's springs hold at most that, and what the arm brought as speed. A step that makes energy breaks the bound at once.
+    arm's springs hold at most that, and what the arm brought as speed. A step that makes energy
+    breaks the bound at once.
 
     Args:
         joints: (frames, dof, n) radians.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from edge.errors import InputError
 from train.simulate.scene_model import Scene, SceneObject
-from train.simulate.schema import EFFECTS, IMPLIED_BY_CONDITION, IMPLIED_BY_FAMILY
+from train.simulate.schema import EFFECTS, IMPLIED_BY_CONDITION, IMPLIED_BY_FAMILY, LABELLED_BY
 
 
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
@@ -46,6 +46,15 @@ def check_supported(scene: Scene, where: str) -> None:
     Raises:
         InputError: the sentence says what the effect needs.
     """
+    for name in scene.leave_out:
+        for item in scene.objects:
+            label = LABELLED_BY.get(name, {}).get(item.family, "")
+            moves = name == "sliding" and "movable" in item.conditions
+            if label or moves:
+                raise InputError(
+                    f"{where}: effects.leave_out leaves out {name}, without which object "
+                    f"{item.name!r} would not be {label or 'movable'}, as its label says"
+                )
     found = [required_effects(scene, o, c) for o in scene.objects for c in o.conditions]
     if not scene.inertia and any("inertia" in required for required in found):
         raise InputError(

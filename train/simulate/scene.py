@@ -13,6 +13,7 @@ from edge.files import parsing, read_bytes
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.simulate import schema
+from train.simulate.families import draw_family
 from train.simulate.reader import Reader, Value
 from train.simulate.required_effects import check_supported
 from train.simulate.scene_model import Scene, SceneObject
@@ -67,7 +68,7 @@ def load(
 
 TOP = (
     *("name", "seed", "trials", "labels", "step_s", "arm", "motion", "skin", "spread", "effects"),
-    "object",
+    *("object", "family"),
 )
 
 
@@ -91,7 +92,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     skin, taxel = _skin(read, read.table(table.get("skin", {}), "skin"))
     spread = _fields(read, table.get("spread", {}), "spread", schema.SPREAD)
     labels = _fields(read, table.get("labels", {}), "labels", schema.LABELS)
-    objects = _objects(read, table.get("object"))
+    objects = _objects(read, table, seed, labels["push_n"])
     add, leave_out, settings = _effects(read, table.get("effects", {}))
     scene = Scene(
         name=read.text(table.get("name", Path(where).stem or "scene"), "name"),
@@ -258,10 +259,30 @@ def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     return skin, taxel
 
 
-def _objects(read: Reader, value: object) -> tuple[SceneObject, ...]:
-    if not isinstance(value, list) or not value:
-        raise read.fail("object", "is missing: give at least one [[object]]")
-    objects = tuple(_object(read, entry, i) for i, entry in enumerate(value))
+def _objects(
+    read: Reader, table: Mapping[str, Any], seed: int, push_n: float
+) -> tuple[SceneObject, ...]:
+    entries: dict[str, list[object]] = {}
+    for key in ("object", "family"):
+        value = table.get(key, [])
+        if not isinstance(value, list):
+            raise read.fail(key, f"must be tables [[{key}]], not {value!r}")
+        entries[key] = value
+    if not entries["object"] and not entries["family"]:
+        raise read.fail("object", "is missing: give at least one [[object]] or [[family]]")
+    objects = tuple(
+        _object(read, read.table(entry, f"object {i}"), i)
+        for i, entry in enumerate(
+            [
+                *entries["object"],
+                *(
+                    member
+                    for i, entry in enumerate(entries["family"])
+                    for member in draw_family(read, read.table(entry, f"family {i}"), seed, push_n)
+                ),
+            ]
+        )
+    )
     slugs = [o.slug for o in objects]
     for o, slug in zip(objects, slugs, strict=True):
         if slugs.count(slug) > 1:
@@ -269,8 +290,7 @@ def _objects(read: Reader, value: object) -> tuple[SceneObject, ...]:
     return objects
 
 
-def _object(read: Reader, entry: object, index: int) -> SceneObject:
-    table = read.table(entry, f"object {index}")
+def _object(read: Reader, table: Mapping[str, Any], index: int) -> SceneObject:
     name = read.text(table.get("name", ""), f"object {index}: name")
     key = f"object {name!r}:"
     if not any(c.isalnum() for c in name):

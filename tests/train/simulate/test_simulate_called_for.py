@@ -124,7 +124,7 @@ def test_3_only_the_called_effects_state_exists():
         assert ("BubbleBed" in type(batch.state.bed).__name__) is ("pop" in kind.effects)
         assert batch.kept is not None
         assert batch.valid is not None
-    bare = batch_of(scene(leave_out=["sliding"]))[0]
+    bare = batch_of(scene(), 0)[0]
     assert (bare.state.own, set(bare.traces)) == ({}, {"depth_m"})
     assert bare.times is bare.kept is bare.valid is None
 
