@@ -25,6 +25,7 @@ TOPICS = {
     # The simulator against laws of physics, whichever effects they need.
     "train/simulate/test_simulate_oracles.py",
     "train/simulate/test_simulate_stability.py",
+    "train/simulate/test_simulate_truth.py",
     "train/simulate/test_simulate_called_for.py",
     "train/simulate/test_simulate_run.py",
     "train/simulate/test_simulate_scene.py",
@@ -51,6 +52,8 @@ THROUGH = {
     "train/importers/mcap.py": "train/importers/test_log_importers.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
+    "train/simulate/families.py": "train/simulate/test_simulate_truth.py",
+    "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
     "train/simulate/explain.py": "train/simulate/test_simulate_called_for.py",
     "train/simulate/reader.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/scene_model.py": "train/simulate/test_simulate_scene.py",

@@ -181,7 +181,7 @@ class TestCommand:
         [
             {"values": {"width_m": "wide", "mass_kg": "x", "radius_m": [1]}, "effects": 5},
             {"values": [1], "effects": [1, 2], "family": 3},
-            {"values": {"width_m": -1, "mass_kg": 10**400}},
+            {"values": {"width_m": -1, "mass_kg": 1e300}},
             "a scene",
         ],
     )
