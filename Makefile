@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants fuzz bench docs faults soak clean
+  board-test hard-cases hard-cases-versions mutants fuzz bench transfer docs faults soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types and tests"
@@ -24,6 +24,7 @@ help:
 	@echo "make demo-data    renews the model and the touches that the wheel carries"
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make docs     the documentation as a site: build/site/index.html"
+	@echo "make transfer a model of SCENE on trials that another engine (MuJoCo) makes: accuracies, curves"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
@@ -111,6 +112,13 @@ bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
 	  --benchmark-columns=median,iqr,rounds
+
+transfer: SCENE := train/scenes/household.toml
+transfer: $(BENCHVENV)
+	$(BIN)/python -m train simulate $(SCENE) --out $(OUT)/transfer/simulated
+	$(BIN)/python -m export --data $(OUT)/transfer/simulated --out $(OUT)/transfer $(EXPORT)
+	$(BIN)/python -m bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer \
+	  --ours $(OUT)/transfer/simulated
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made

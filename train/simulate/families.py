@@ -11,7 +11,7 @@ import numpy as np
 from train.simulate import streams
 from train.simulate.motion import GRAVITY
 from train.simulate.reader import Reader
-from train.simulate.schema import OBJECT, Field
+from train.simulate.schema import LABELS, OBJECT, Field
 
 PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
 WHOLE = ("stem_count",)
@@ -25,7 +25,8 @@ def draw_family(
 
     Each range of the family is drawn once an object, evenly in its logarithm (evenly where it
     begins at 0), by a stream of the family's name; its `kinetic_part` gives `friction_kinetic`.
-    An object that can be movable is drawn until `push_n` newtons move it.
+    An object that can be movable is drawn until `push_n` newtons move it; a family that is too soft
+    to pass that on gives a `push_n` of its own.
 
     Raises:
         InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
@@ -37,7 +38,9 @@ def draw_family(
         raise read.fail(f"{key} count", f"must be a whole number, not {count:g}")
     ranges = {k: read.value(v, f"{key} {k}", OBJECT[k]) for k, v in table.items() if k in OBJECT}
     part = read.value(table.get("kinetic_part", [0.8, 0.95]), f"{key} kinetic_part", PART)
-    others = {k: v for k, v in table.items() if k not in (*OBJECT, "count", "kinetic_part", "name")}
+    push_n = read.number(table.get("push_n", push_n), f"{key} push_n", LABELS["push_n"])
+    own = (*OBJECT, "count", "kinetic_part", "push_n", "name")
+    others = {k: v for k, v in table.items() if k not in own}
     generator = streams.stream(seed, "family", name)
     movable = "movable" in (table.get("conditions") or ())
     for number in range(int(count)):
