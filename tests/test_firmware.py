@@ -143,4 +143,4 @@ def test_the_sketch_says_what_the_example_skin_says():
     assert "kRows = 10, kCols = 10, kAddress = 0x28" in sketch
     assert "taxels::Registers<kRows * kCols, 12>" in sketch
     assert (len(chip.taxels), chip.bits) == (100, 12)
-    assert f"Serial.begin({bus.clock_hz});" in sketch
+    assert f"Serial.begin({bus.clock_hz})" in sketch

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from edge.config import read_json
 from edge.errors import InputError
 from edge.recording import Recording
+from edge.runtime.joint_stream import OLDEST_S
 from edge.touch.arm import Chain, joint_columns
 
 LOG = logging.getLogger(__name__)
@@ -216,6 +217,17 @@ class Log:
             raise InputError(
                 f"{self.path}: {topic} has {len(found)} angles without names, but the arm has "
                 f"{self.arm.dof} joints"
+            )
+        first = max(min(series[name])[0] for name in wanted)
+        last = min(max(series[name])[0] for name in wanted)
+        apart = max(first - t[0], t[-1] - last)
+        if apart > OLDEST_S:
+            LOG.warning(
+                "%s: %s leaves up to %.2f s of the frames without joint angles; the nearest are "
+                "held there",
+                self.path,
+                topic,
+                apart,
             )
         return np.stack([_at(t, series[name]) for name in wanted], axis=1), (
             wanted if named else None

@@ -37,7 +37,7 @@ void setup() {
   Wire.begin(kAddress);
   Wire.onReceive(onPointer);
   Wire.onRequest(onRequest);
-  Serial.begin(115200);
+  Serial.begin(2000000);  // over USB any number will do
 }
 
 void loop() {
