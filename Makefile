@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants fuzz bench transfer docs faults soak clean
+  board-test hard-cases hard-cases-versions mutants fuzz bench transfer docs faults risk soak clean
 
 help:
 	@echo "make test     what CI runs: lint, types and tests"
@@ -26,6 +26,7 @@ help:
 	@echo "make docs     the documentation as a site: build/site/index.html"
 	@echo "make transfer a model of SCENE on trials that another engine (MuJoCo) makes: accuracies, curves"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
+	@echo "make risk     how often a certified error rate is exceeded, over 200 simulated data sets"
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
 	@echo "make mutants  removes each guard in turn, and makes 200 random changes: do tests fail?"
@@ -148,6 +149,9 @@ $(VENV)/.docs: $(READY)
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
+
+risk: $(READY)
+	$(BIN)/python -m bench.risk $(RISK)
 
 faults: $(READY)
 	$(BIN)/python -m bench.faults

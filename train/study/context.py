@@ -31,6 +31,7 @@ class Context:
         jobs: processes.
         cluster: a joblib backend that is not this machine's, or None.
         ours: {(table, setting, task): accuracy in percent}, beside the paper's numbers.
+        seeds: how many simulated data sets `ours` is the mean of.
     """
 
     dataset: DataSet
@@ -38,6 +39,12 @@ class Context:
     jobs: int
     cluster: str | None = None
     ours: dict[tuple[str, str, str], float] = field(default_factory=dict)
+    seeds: int = 1
+
+    @property
+    def tested(self) -> int:
+        """Trials behind each number of `ours`."""
+        return self.seeds * len(self.dataset.trials)
 
     @property
     def labels(self) -> Labels:

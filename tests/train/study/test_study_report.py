@@ -7,6 +7,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from edge.recording import save
@@ -15,7 +16,7 @@ from train.__main__ import main
 from train.report.html import page, table_csv
 from train.report.tables import Figure, Section, Table
 from train.study import beyond
-from train.study.paper import entries, section
+from train.study.paper import difference, entries, mean_of, section
 
 
 def test_the_papers_numbers_are_46_and_whole_trials_of_140():
@@ -38,7 +39,7 @@ def test_numbers_that_a_scene_was_held_to_are_told_apart_from_predictions():
     assert {e.percent for e in headlines} == {80.0, 91.43, 72.14}
     ours = {(e.table, e.setting, e.task): 100.0 for e in entries()}
     ours |= {(e.table, e.setting, e.task): e.percent for e in headlines}
-    found = section(SimpleNamespace(ours=ours))
+    found = section(SimpleNamespace(ours=ours, tested=140, seeds=1))
     assert found.text[0].startswith("8 of 46 numbers lie within")
     assert "Of the other 38, 0 lie within" in found.text[0]
     side = found.tables[0]
@@ -72,6 +73,22 @@ def test_the_page_needs_no_other_file_and_escapes_what_it_shows():
     assert "a &amp; b" in text
     assert "One &amp; &lt;all&gt;" in text
     assert list(csv.reader(table_csv(table)["t.csv"].splitlines()))[2] == ["c,d", "2.5"]
+
+
+def test_a_perfect_copy_differs_by_the_chance_of_both_samples():
+    """Of pairs of samples of one accuracy one in twenty lies outside."""
+    rng = np.random.default_rng(0)
+    paper, ours = rng.binomial(140, 0.8, (2, 2000)) / 1.4
+    out = np.mean(
+        [not low <= 0.0 <= high for low, high in map(difference, paper, ours, [140] * 2000)]
+    )
+    assert 0.03 < out < 0.07
+
+
+def test_more_seeds_narrow_the_interval_of_the_difference():
+    one, eight = difference(80.0, 85.0, 140), difference(80.0, 85.0, 8 * 140)
+    assert one[0] < eight[0] < 5.0 < eight[1] < one[1]
+    assert mean_of([{("I", "1", "t"): 80.0}, {("I", "1", "t"): 90.0}]) == {("I", "1", "t"): 85.0}
 
 
 def test_what_a_clock_measured_is_in_a_file_of_its_own():
