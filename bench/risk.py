@@ -41,11 +41,14 @@ POOL = 50
 
 
 def realised(
-    X: NDArray[np.float64], labels: NDArray[np.str_], rows: NDArray[np.int64]
+    X: NDArray[np.float64],
+    labels: NDArray[np.str_],
+    rows: NDArray[np.int64],
+    widths: tuple[int, ...],
 ) -> list[tuple[float, float]]:
     """(share wrong, mean seconds) at each of `ERRORS`, trained on some rows; NaN if refused."""
     rest = np.setdiff1d(np.arange(len(labels)), rows)
-    model = SequentialClassifier({"task": CHOICE}, POINTS_S, NAMES).fit(
+    model = SequentialClassifier({"task": CHOICE}, POINTS_S, NAMES, widths=widths).fit(
         X[:, rows], {"task": labels[rows]}
     )
     with threadpool_limits(1):
@@ -79,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     draws = [
         np.sort(rng.permutation(len(labels))[: arguments.trials]) for _ in range(arguments.sets)
     ]
-    work = (delayed(realised)(X, labels, rows) for rows in draws)
+    work = (delayed(realised)(X, labels, rows, dataset.widths(SAMPLES)) for rows in draws)
     parts = Parallel(n_jobs=arguments.jobs, return_as="generator")(work)
     found = np.array(list(tqdm(parts, total=len(draws), desc="data sets")))
     allowed = int(binom.ppf(0.99, len(draws), RISK))

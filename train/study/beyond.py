@@ -13,7 +13,8 @@ from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
 from edge.touch.contact import FeatureSeries
 from edge.touch.feature_sets import SETS, expand
-from edge.touch.features import WINDOW_S, feature_vector
+from edge.touch.features import WINDOW_S, feature_vector, widths
+from edge.touch.layout import SkinLayout
 from train.evaluate import Labels, Result, SearchGrid, evaluate, group_folds, stratified_folds
 from train.report import figures
 from train.report.tables import Figure, Section, Table, percent
@@ -104,10 +105,17 @@ def vectors(series: Sequence[FeatureSeries | None], name: str) -> NDArray[np.flo
 
 
 def _ours(
-    X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64], name: str, projection: str
+    X: NDArray[np.float64],
+    y: Labels,
+    folds: NDArray[np.int64],
+    layout: SkinLayout,
+    name: str,
+    projection: str,
 ) -> dict[str, Result]:
+    names = SETS[name].features
+    columns = widths(names, SAMPLES, layout)
     grid = SearchGrid(SCALING, projection)
-    table = evaluate(X, y, folds, [grid], features=SETS[name].features)
+    table = evaluate(X, y, folds, [grid], features=names, widths=columns)
     return {task: table.nested(task) for task in y}
 
 
@@ -126,10 +134,10 @@ def _theirs(
 
 def section(context: Context) -> Section:
     """Sets of features, discriminants and peers; what they cost; how many trials they need."""
-    y = context.labels
+    y, layout = context.labels, context.dataset.layout
     finest = max(sorted(y), key=lambda task: len(set(y[task])))
     sets = list(dict.fromkeys(name for name, _ in OURS))
-    view = View(context.dataset.layout, names=expand(sets))
+    view = View(layout, names=expand(sets))
     (series,) = context.follow_again("every feature", [view])
     X = {name: vectors(series, name) for name in sets}
     raw = taxels(context)
@@ -142,7 +150,7 @@ def section(context: Context) -> Section:
         asked = y if how == "trials" else others
         for name, projection in OURS:
             words = f"`{name}` ({len(SETS[name].features)} features), {projection.upper()} + k-NN"
-            cases.append((words, how, _ours, (X[name], asked, fold, name, projection)))
+            cases.append((words, how, _ours, (X[name], asked, fold, layout, name, projection)))
         for words, peer in peers().items():
             cases.append((words, how, _theirs, (raw, asked, fold, peer)))
     answers = context.map("sets and peers", _call, [(f, given) for _, _, f, given in cases])
@@ -212,6 +220,7 @@ def _best(results: dict[str, dict[str, dict[str, Result]]], y: Labels) -> str:
 
 def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels, finest: str) -> Table:
     """Accuracy against the number of trials: how many touches are worth recording."""
+    layout = context.dataset.layout
     parts = stratified_folds(y[finest], len(SHARES))
     cases, heads = [], []
     for count in range(1, len(SHARES) + 1):
@@ -222,7 +231,7 @@ def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels, fi
         for name, projection in CURVE:
             folds = stratified_folds(y[finest][some])
             heads.append((len(some), name, projection))
-            cases.append((_ours, (X[name][some], labels, folds, name, projection)))
+            cases.append((_ours, (X[name][some], labels, folds, layout, name, projection)))
     table = Table(
         "learning",
         "More trials: nested accuracy among so many",

@@ -22,7 +22,11 @@ CHOICE_FOLDS = 5
 
 
 def nested(
-    X: NDArray[np.float64], y: Labels, scaling: str, features: Sequence[str]
+    X: NDArray[np.float64],
+    y: Labels,
+    scaling: str,
+    features: Sequence[str],
+    widths: Sequence[int] | None = None,
 ) -> dict[str, Result]:
     """Each task's nested accuracy, in ten folds; see `train.evaluate`.
 
@@ -33,11 +37,12 @@ def nested(
         y: {task: (n,) labels}.
         scaling: one of `train.projection.SCALINGS`.
         features: names of the types in X.
+        widths: columns of each; equal where None.
     """
     k = tuple(range(1, NEIGHBOURS + 1))
     kind = "lda" if len(features) > len(FEATURES) else "pca"
     grid = SearchGrid(scaling, kind, components=COMPONENTS, neighbours=k)
-    table = evaluate(X, y, stratified_folds(y[finest(y)]), [grid], features=features)
+    table = evaluate(X, y, stratified_folds(y[finest(y)]), [grid], features=features, widths=widths)
     return {task: table.nested(task) for task in y}
 
 
@@ -50,18 +55,22 @@ class Chooser:
         y: {task: (n,) labels}.
         grids: the candidates.
         features: names of the types in X.
+        widths: columns of each; equal where None.
     """
 
     X: NDArray[np.float64]
     y: Labels
     grids: tuple[SearchGrid, ...]
     features: tuple[str, ...]
+    widths: tuple[int, ...] | None = None
 
     def __call__(self, rows: NDArray[np.int64]) -> dict[str, Choice]:
         """{task: the candidate that is best in a cross-validation among the rows}."""
         y = {task: labels[rows] for task, labels in self.y.items()}
         folds = stratified_folds(y[finest(y)], CHOICE_FOLDS)
-        table = evaluate(self.X[rows], y, folds, self.grids, features=self.features)
+        table = evaluate(
+            self.X[rows], y, folds, self.grids, features=self.features, widths=self.widths
+        )
         return {task: table.choices[task][table.chosen(task)] for task in y}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.feature_sets import SETS, expand
+from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.dataset import DataSet
 from train.evaluate import stratified_folds
@@ -14,7 +14,6 @@ from train.report.tables import Section, Table
 from train.tradeoff.board import Board
 from train.tradeoff.prices import Prices
 
-NAMES = expand(["paper", "contact"])
 LEVELS = 255
 
 
@@ -30,18 +29,29 @@ def rounded(X: NDArray[np.float64], widths: list[NDArray[np.int64]]) -> NDArray[
 
 
 def accuracy(
-    X: NDArray[np.float64], y: NDArray[np.str_], choice: Choice, *, plain: bool = False
+    X: NDArray[np.float64],
+    y: NDArray[np.str_],
+    choice: Choice,
+    dataset: DataSet,
+    *,
+    plain: bool = False,
 ) -> float:
     """In ten folds, of a choice made once: the changes are compared, not the choice.
 
     Args:
+        X: (n, p).
+        y: (n,) labels.
+        choice: of features, projection and neighbours.
+        dataset: whose features X holds.
         plain: project by weights that are not on the exact grid, in float32.
     """
     folds = stratified_folds(y)
     right = 0
     for fold in range(int(folds.max()) + 1):
         own = folds == fold
-        model = ContactClassifier({"task": choice}, NAMES).fit(X[~own], {"task": y[~own]})
+        model = ContactClassifier({"task": choice}, dataset.names, dataset.widths(SAMPLES)).fit(
+            X[~own], {"task": y[~own]}
+        )
         if plain:
             for projection in model.projections_.values():
                 projection.weights_ = projection.weights_.astype(np.float32).astype(np.float64)
@@ -62,16 +72,16 @@ def section(
     """One row a change: what it saves, and what it costs.
 
     Args:
-        dataset: measured for `NAMES`.
+        dataset: measured for what the choice is made of.
         y: labels of the task.
         task: its name.
         choice: of all trials.
         board: whose figures they are.
         sizes: of `python -m export.prices`, where they were measured.
     """
-    X = dataset.features(WINDOW_S, SAMPLES, NAMES)
-    types = [columns_of((name,), NAMES, X.shape[1]) for name in NAMES]
-    base = accuracy(X, y, choice)
+    X = dataset.features(WINDOW_S, SAMPLES)
+    types = [columns_of((name,), dataset.names, dataset.widths(SAMPLES)) for name in dataset.names]
+    base = accuracy(X, y, choice, dataset)
     stages = {name: median for name, (median, _) in board.stages_us.items()}
     whole = sum(stages[name] for name in ("track", "features", "decision"))
     decision = stages["decision"]
@@ -105,27 +115,32 @@ def section(
             add(
                 "float32 and no exactness",
                 ours.us - usual.us,
-                accuracy(X.astype(np.float32).astype(np.float64), y, choice, plain=True),
+                accuracy(X.astype(np.float32).astype(np.float64), y, choice, dataset, plain=True),
                 f"skl2onnx's own graph takes {usual.us:.0f} us, ours {ours.us:.0f} us",
             )
     if usual is None:
-        reached = accuracy(X.astype(np.float32).astype(np.float64), y, choice, plain=True)
+        reached = accuracy(X.astype(np.float32).astype(np.float64), y, choice, dataset, plain=True)
         add("float32 and no exactness", 0.5 * decision, reached, "at most half of the decision")
-    add("int8 features", 0.9 * decision, accuracy(rounded(X, types), y, choice), "at most 90 %")
+    add(
+        "int8 features",
+        0.9 * decision,
+        accuracy(rounded(X, types), y, choice, dataset),
+        "at most 90 %",
+    )
     few = max(choice.components // 2, 1)
     fewer = Choice(**{**vars(choice), "components": few})
     how = "at most that share of the decision"
     add(
         f"{few} coordinates in place of {choice.components}",
         decision * (1 - few / choice.components),
-        accuracy(X, y, fewer),
+        accuracy(X, y, fewer, dataset),
         how,
     )
     paper = Choice("IV", 5, min(3, choice.k + 2), features=SETS["paper"].features)
     add(
         "the paper's three features alone",
-        stages["features"] * (1 - 3 / len(NAMES)),
-        accuracy(X, y, paper),
+        stages["features"] * (1 - 3 / len(dataset.names)),
+        accuracy(X, y, paper, dataset),
         "their share of the features",
     )
     return Section(

@@ -130,6 +130,7 @@ def compare_stopping(
     features: Sequence[str],
     choose: Choose,
     *,
+    widths: Sequence[int] | None = None,
     jobs: int = 1,
 ) -> dict[str, StoppingComparison]:
     """{task: comparison}. Folds are held out in turn; the others choose, train and calibrate.
@@ -140,6 +141,7 @@ def compare_stopping(
         decision_points_s: windows in seconds.
         features: names of the types.
         choose: by the training rows alone.
+        widths: columns of each type; equal where None.
         jobs: processes.
     """
     points, n = X.shape[:2]
@@ -147,7 +149,8 @@ def compare_stopping(
     seconds = np.array(decision_points_s)
     tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
     work = (
-        delayed(_held_out)(X, y, test, decision_points_s, tuple(features), choose) for test in tests
+        delayed(_held_out)(X, y, test, decision_points_s, tuple(features), choose, widths)
+        for test in tests
     )
     parts = Parallel(n_jobs=jobs, return_as="generator")(work)
     found = list(tqdm(parts, total=FOLDS, desc="deciding when sure"))
@@ -191,9 +194,10 @@ def _held_out(
     decision_points_s: Sequence[float],
     features: Sequence[str],
     choose: Choose,
+    widths: Sequence[int] | None,
 ) -> _Fold:
     train = np.setdiff1d(np.arange(X.shape[1]), test)
-    model = SequentialClassifier(choose(train), decision_points_s, features).fit(
+    model = SequentialClassifier(choose(train), decision_points_s, features, widths=widths).fit(
         X[:, train], {task: labels[train] for task, labels in y.items()}
     )
     named, confidence = {}, {}
@@ -244,6 +248,7 @@ def novelty(
     labels: NDArray[np.str_],
     choice: Choice,
     features: Sequence[str],
+    widths: Sequence[int] | None = None,
     rates: Sequence[float] = RATES,
 ) -> list[Novelty]:
     """A third of the labels is left out whole, in turn; of the others a fold at a time is known.
@@ -253,6 +258,7 @@ def novelty(
         labels: (n,) of the task with most labels.
         choice: of that task.
         features: names of the types.
+        widths: columns of each; equal where None.
         rates: of false alarms.
 
     Returns:
@@ -269,7 +275,7 @@ def novelty(
                 train = np.flatnonzero(~left_out & (folds != fold))
                 if len(np.unique(labels[train])) < 2 or len(train) <= choice.k:
                     continue
-                model = ContactClassifier({"task": choice}, features).fit(
+                model = ContactClassifier({"task": choice}, features, widths).fit(
                     X[train], {"task": labels[train]}
                 )
                 for rows, trials in ((known, ~left_out), (strange, left_out)):

@@ -16,7 +16,7 @@ from edge.errors import InputError
 from edge.files import write_whole
 from edge.touch.contact import FeatureSeries
 from edge.touch.feature_sets import SETS, expand
-from edge.touch.features import FEATURES, SAMPLES, feature_vector
+from edge.touch.features import FEATURES, SAMPLES, feature_vector, widths
 from edge.touch.layout import SkinLayout
 from train.dataset import DataSet, load_trials
 from train.evaluate import Labels, SearchGrid
@@ -135,7 +135,16 @@ def measured(dataset: DataSet, board: boards.Board, jobs: int) -> list[MeasuredP
             for features, scaling in sets if every == 1 else sets[:1]:
                 cases += [(name, taxels, features, scaling, w, every) for w in WINDOWS]
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    work = (delayed(nested)(_vectors(series[case[0]], case), y, case[3], case[2]) for case in cases)
+    work = (
+        delayed(nested)(
+            _vectors(series[case[0]], case, layouts[case[0]]),
+            y,
+            case[3],
+            case[2],
+            widths(case[2], SAMPLES, layouts[case[0]]),
+        )
+        for case in cases
+    )
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
     points: list[MeasuredPoint] = []
     for case, found in zip(cases, tqdm(results, total=len(cases), desc="settings"), strict=True):
@@ -168,9 +177,11 @@ def _wire_s(wire: Wire, rate_hz: float) -> float:
     return 0.5 * wire.every(rate_hz) / rate_hz + wire.frame_s
 
 
-def _vectors(series: Sequence[FeatureSeries | None], case: Case) -> NDArray[np.float64]:
+def _vectors(
+    series: Sequence[FeatureSeries | None], case: Case, layout: SkinLayout
+) -> NDArray[np.float64]:
     _, _, features, _, window, every = case
-    X = np.zeros((len(series), len(features) * SAMPLES))
+    X = np.zeros((len(series), sum(widths(features, SAMPLES, layout))))
     for row, one in zip(X, series, strict=True):
         if one is not None:
             row[:] = feature_vector(one.thinned(every), window, SAMPLES, features)
@@ -182,11 +193,14 @@ def _early(
 ) -> tuple[dict[str, early.StoppingComparison], dict[str, Choice], list[early.Novelty]]:
     """Early stopping of every task, what all trials choose, and things left out whole."""
     X = np.stack([dataset.features(window, SAMPLES, NAMES) for window in DECISION_POINTS_S])
-    choose = Chooser(X[-1], y, GRIDS, NAMES)
-    found = early.compare_stopping(X, y, DECISION_POINTS_S, NAMES, choose, jobs=jobs)
+    columns = dataset.widths(SAMPLES)
+    choose = Chooser(X[-1], y, GRIDS, dataset.names, columns)
+    found = early.compare_stopping(
+        X, y, DECISION_POINTS_S, dataset.names, choose, widths=columns, jobs=jobs
+    )
     choices = choose(np.arange(X.shape[1]))
     most = finest(y)
-    return found, choices, early.novelty(X[-1], y[most], choices[most], NAMES)
+    return found, choices, early.novelty(X[-1], y[most], choices[most], dataset.names, columns)
 
 
 def is_paper(point: MeasuredPoint) -> bool:

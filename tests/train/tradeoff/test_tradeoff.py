@@ -249,10 +249,10 @@ class TestEarly:
         labels = np.repeat(["a", "b", "c", "d", "e", "f"], 20)
         X = rng.normal(size=(120, 12))
         choice = Choice("none", 3, 1)
-        alike = early.novelty(X, labels, choice, ("max_force",), (0.1,))[0]
+        alike = early.novelty(X, labels, choice, ("max_force",), rates=(0.1,))[0]
         assert alike.strange[1] / alike.strange[0] < 0.3
         X[:, 0] += 100.0 * np.repeat(np.arange(6), 20)
-        apart = early.novelty(X, labels, choice, ("max_force",), (0.1,))[0]
+        apart = early.novelty(X, labels, choice, ("max_force",), rates=(0.1,))[0]
         assert apart.strange[1] == apart.strange[0]
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
