@@ -8,7 +8,8 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants fuzz bench transfer docs faults risk soak clean
+  board-test hard-cases hard-cases-versions mutants fuzz bench transfer docs faults risk soak \
+  soak-day clean
 
 help:
 	@echo "make test     what CI runs: lint, types and tests"
@@ -32,6 +33,8 @@ help:
 	@echo "make mutants  removes each guard in turn, and makes 200 random changes: do tests fail?"
 	@echo "make fuzz     reads 5,000 hostile files of each kind: every one must end in an answer or a sentence"
 	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
+	@echo "make soak-day the same for 24 hours, with decisions, map and UDP"
+	@echo "make requirements-board.txt   the board's packages, pinned with hashes"
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -158,6 +161,12 @@ faults: $(READY)
 
 soak: $(READY)
 	$(BIN)/python -m bench.soak
+
+soak-day: $(READY)
+	$(BIN)/python -m bench.soak --minutes 1440 --every 60
+
+requirements-board.txt: $(READY) pyproject.toml constraints.txt
+	$(BIN)/python -m board.requirements
 
 # Stale copies of modules would go into the wheel.
 wheel: $(READY)

@@ -1,7 +1,10 @@
-"""Ten minutes of the loop at 100 Hz in virtual time: memory must stay flat, the schedule true.
+"""The loop at 100 Hz in virtual time, for hours: memory and descriptors must stay flat.
 
 `python -m bench.soak` reads Cody's skin over the fake, timed by the bits on the wire, with 0.1 %
-of all transactions failing, and prints memory and schedule once a minute.
+of all transactions failing, decides on each contact with the model that comes with the program,
+writes events, map and datagrams as `edge-classify run` does, and prints memory, descriptors,
+schedule and lost lines. The exit status is 1 where memory has grown after the first tenth of the
+time, a descriptor or a line was lost, or a tick left out.
 """
 
 from __future__ import annotations
@@ -9,17 +12,28 @@ from __future__ import annotations
 import argparse
 import errno
 import gc
+import os
+import socket
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from edge import demo
+from edge.classifier import Classifier
 from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
+from edge.model.model import Model
+from edge.runtime.event_writer import Lines
+from edge.runtime.touch_map import events_on_map, load, map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
+from edge.touch.track import MAX_CONTACTS
 
-PAGE_KB = 4
+PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
+GROWTH_KB = 2048
+"""Allowed after the first tenth: pages that the allocator keeps, no more with more hours."""
 
 
 def resident_kb() -> int:
@@ -27,32 +41,78 @@ def resident_kb() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_KB
 
 
-def main() -> None:
-    """Run and print."""
+def descriptors() -> int:
+    """Files that this process has open."""
+    return len(os.listdir("/proc/self/fd"))
+
+
+def main() -> int:
+    """Run and print; 1 where something was not flat."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--every", type=float, default=1.0, help="minutes between two lines")
     arguments = parser.parse_args()
-    draw = np.random.default_rng(0)
-    patches = draw.integers(0, 3000, (50, 16, 24)).astype(np.uint16)
+    model = Model(demo.MODEL)
+    touches = np.random.default_rng(0).integers(0, 3000, (50, 16, 24)).astype(np.uint16)
+    touches[::2] = 0  # a second of contact, a second without
     faults = [Fault(code=code, rate=0.0005) for code in (errno.EREMOTEIO, errno.EIO)]
     file = skinfile.load(skinfile.shipped("cody"))
-    print("| minute | frames | worst offset from the grid, us | ticks left out | blocks | kB |")
-    print("|---|---|---|---|---|---|")
-    worst = 0.0
-    with fake_skin(file, lambda t: patches[int(t) % 50], timed=True, faults=faults) as skin:
+    every = round(arguments.every * 6000)
+    before: tuple[int, int] | None = None
+    largest = written = 0
+    print("| minute | frames | events | ticks left out | lines lost | descriptors | kB |")
+    print("|---|---|---|---|---|---|---|", flush=True)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener,
+        open(os.devnull, "w") as out,
+        fake_skin(file, lambda t: touches[int(t) % 50], timed=True, faults=faults) as skin,
+    ):
+        listener.bind(("127.0.0.1", 0))
+        place = Path(folder) / "map.jsonl"
+        port = listener.getsockname()[1]
+        lines = Lines(out, f"127.0.0.1:{port}", patient=lambda: True)
+        writer = map_writer(place, model.info)
+        lines.add(writer)
+        classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * arguments.minutes)
-        start = skin.clock.now()
+        pose = np.zeros(model.info.chain.dof if model.info.chain else 0)
         for frames, frame in enumerate(loop.frames(), 1):
-            offset = (frame.t - start) / 0.01
-            worst = max(worst, abs(offset - round(offset)) * 0.01)
-            if frames % 6000 == 0:
+            frame = type(frame)(frame.t, frame.counts, frame.valid, frame.times, pose)
+            events = [event.to_dict() for event in classifier.push(frame)]
+            written += len(events)
+            lines.write(events)
+            for line in events_on_map(events):
+                writer.put(line, lambda: True)
+            if frames % 100 == 0:
+                listener.setblocking(False)
+                while _received(listener):
+                    pass
+            if frames % every == 0:
                 gc.collect()
+                now = resident_kb(), descriptors()
+                largest = max(largest, now[0])
+                if before is None or frames <= arguments.minutes * 600:
+                    before = now
                 print(
-                    f"| {frames // 6000} | {frames} | {worst * 1e6:.3f} | {loop.schedule.missed} "
-                    f"| {sys.getallocatedblocks()} | {resident_kb()} |",
+                    f"| {frames / 6000:g} | {frames} | {written} | {loop.schedule.missed} "
+                    f"| {sum(lines.lost.values())} | {now[1]} | {now[0]} |",
                     flush=True,
                 )
+        lines.close()
+        placed = sum(1 for _ in load(place))
+    print(f"{placed} contacts on the map")
+    lost = sum(lines.lost.values()) + loop.schedule.missed
+    flat = before is not None and largest - before[0] <= GROWTH_KB and now[1] == before[1]
+    return 0 if flat and lost == 0 and placed else 1
+
+
+def _received(listener: socket.socket) -> bool:
+    try:
+        return bool(listener.recv(65536))
+    except BlockingIOError:
+        return False
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -99,6 +99,14 @@ def test_the_unit_waits_for_word_watches_and_restarts(unit):
     assert service["Restart"] == "always"
 
 
+def test_the_unit_tries_for_ever_less_and_less_often(unit):
+    """A robot whose buses appear a minute after boot must not stay without decisions."""
+    assert unit["Unit"]["StartLimitIntervalSec"] == "0"
+    service = unit["Service"]
+    assert int(service["RestartSec"]) < int(service["RestartMaxDelaySec"]) <= 60
+    assert int(service["RestartSteps"]) > 0
+
+
 def test_the_unit_runs_as_nobody_in_particular_who_may_use_i2c(unit):
     service = unit["Service"]
     assert service["DynamicUser"] == "yes"
