@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import onnx
 from numpy.typing import NDArray
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
@@ -339,7 +339,8 @@ def _in_order(nodes: list[onnx.NodeProto], known: set[str]) -> list[onnx.NodePro
 def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
-    A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), and for each task
+    A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), which is the last
+    where it is not given, and for each task
     the output `<task>_label_distances` (n, labels); see `edge.model.stopping`.
     """
     kind = type(model)
@@ -355,6 +356,11 @@ def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) ->
     nodes = _in_order(list(proto.graph.node), {name for name, _ in inputs})
     del proto.graph.node[:]
     proto.graph.node.extend(nodes)
+    if isinstance(model, SequentialClassifier):
+        # An initializer of an input's name is its default: whoever gives `features` alone is
+        # answered at the full window.
+        full = np.array([len(model.decision_points_) - 1], dtype=np.int64)
+        proto.graph.initializer.append(numpy_helper.from_array(full, "decision_point"))
     proto.ir_version = IR_VERSION
     proto.producer_name = "edge-classify"
     proto.doc_string = "scaler, PCA and k-NN of a touch; see the metadata"

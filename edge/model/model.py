@@ -342,8 +342,9 @@ class Model:
         shape = inputs[0].shape if inputs else []
         if not inputs or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
             raise InputError(f"{name}: has no float64 input `features`; export it again")
-        more = [(i.name, i.type, list(i.shape)) for i in inputs[1:]]
-        if more != (
+        optional = self._session.get_overridable_initializers()
+        more = [(i.name, i.type, list(i.shape)) for i in optional]
+        if len(inputs) > 1 or more != (
             [("decision_point", "tensor(int64)", [1])] if self.info.decision_points_s else []
         ):
             raise InputError(

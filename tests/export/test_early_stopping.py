@@ -1,5 +1,6 @@
 """The graph's distances to each label, and the board's stopping, against the estimators."""
 
+import onnxruntime
 import pytest
 
 from edge.classifier import Classifier, stopping_rules
@@ -58,3 +59,19 @@ def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
     model, _ = early
     with pytest.raises(InputError, match="cannot be certified; category: the smallest error that"):
         Classifier(model, error=0.001)
+
+
+def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early):
+    """At every level of optimisation: the default is no constant to be folded."""
+    model, folder = early
+    X = load_trials([folder / "data"]).features(model.info.window_s)
+    expected = model.run(X)
+    for level in ("ORT_DISABLE_ALL", "ORT_ENABLE_ALL"):
+        options = onnxruntime.SessionOptions()
+        options.graph_optimization_level = getattr(onnxruntime.GraphOptimizationLevel, level)
+        session = onnxruntime.InferenceSession(model.path, options)
+        names = [output.name for output in session.get_outputs()]
+        seen = dict(zip(names, session.run(None, {"features": X}), strict=True))
+        assert {name: values.tolist() for name, values in seen.items()} == {
+            name: values.tolist() for name, values in expected.items()
+        }
