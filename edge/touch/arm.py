@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +35,16 @@ class Joint:
     origin_rpy: Vector = ZERO
     translate: Vector = ZERO
     limits: tuple[float, float] | None = None
+
+
+class _Link(NamedTuple):
+    """A moving joint in plain numbers: the fixed step before it, and its axis."""
+
+    slides: bool
+    direction: Vector
+    turn: tuple[float, ...] | None
+    """(9,) rows of the fixed step's rotation; None where it does not turn."""
+    shift: tuple[float, ...]
 
 
 class Chain:
@@ -76,6 +86,16 @@ class Chain:
             np.array(steps).reshape(-1, 4, 4) for steps in (still, sway, swing)
         )
         self._after = fixed
+        self._tip = tuple(fixed[:3].ravel().tolist())
+        self._links = tuple(
+            _Link(
+                j.kind == "prismatic",
+                _direction(j),
+                None if (step[:3, :3] == np.eye(3)).all() else tuple(step[:3, :3].ravel().tolist()),
+                tuple(step[:3, 3].tolist()),
+            )
+            for j, step in zip(self._moving, still, strict=True)
+        )
         self._slides = np.array([j.kind == "prismatic" for j in self._moving], dtype=bool)
         self._any_slide = bool(self._slides.any())
 
@@ -133,6 +153,47 @@ class Chain:
         if self.dof == 0:
             pose = np.broadcast_to(pose, (*angles.shape[:-1], 4, 4))
         return pose
+
+    def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
+        """Where a point of the tip lies in the base's frame: `pose(q)` times it, in plain floats.
+
+        One point turned joint by joint takes a fraction of what the whole pose takes, and rounds
+        no more than it.
+
+        Args:
+            q: (dof,) as for `pose`.
+            position: (3,) in the tip's frame, metres.
+
+        Raises:
+            InputError: as `pose`.
+        """
+        angles = np.asarray(q).tolist()
+        if len(angles) != self.dof or not math.isfinite(math.fsum(map(abs, angles))):
+            self.pose(q)  # says what is wrong
+        x, y, z = position
+        a, b, c, tx, d, e, h, ty, i, j, k, tz = self._tip
+        x, y, z = (
+            a * x + b * y + c * z + tx,
+            d * x + e * y + h * z + ty,
+            i * x + j * y + k * z + tz,
+        )
+        for angle, link in zip(reversed(angles), reversed(self._links), strict=True):
+            kx, ky, kz = link.direction
+            if link.slides:
+                x, y, z = x + angle * kx, y + angle * ky, z + angle * kz
+            else:
+                half = math.sin(0.5 * angle)
+                f, g = math.sin(angle), 2.0 * half * half
+                ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
+                x += f * ax + g * (ky * az - kz * ay)
+                y += f * ay + g * (kz * ax - kx * az)
+                z += f * az + g * (kx * ay - ky * ax)
+            if link.turn is not None:
+                a, b, c, d, e, h, i, j, k = link.turn
+                x, y, z = a * x + b * y + c * z, d * x + e * y + h * z, i * x + j * y + k * z
+            tx, ty, tz = link.shift
+            x, y, z = x + tx, y + ty, z + tz
+        return x, y, z
 
     def to_dict(self) -> dict[str, Any]:
         """The chain as plain numbers, exact in JSON."""
@@ -251,12 +312,18 @@ def _check_joint(joint: Joint) -> None:
         )
 
 
+def _direction(joint: Joint) -> Vector:
+    """The joint's axis at length 1."""
+    # A power of two brings the axis near that length, whose square neither over- nor underflows.
+    power = -math.frexp(max(map(abs, joint.axis)))[1]
+    x, y, z = (math.ldexp(part, power) for part in joint.axis)
+    length = math.hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
 def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """K and K^2 of a turn about the joint's axis; of a slide its direction and nothing."""
-    # A power of two brings the axis near length 1, whose square neither over- nor underflows.
-    power = -math.frexp(max(map(abs, joint.axis)))[1]
-    near = [math.ldexp(part, power) for part in joint.axis]
-    x, y, z = (part / math.hypot(*near) for part in near)
+    x, y, z = _direction(joint)
     first = np.zeros((4, 4))
     if joint.kind == "prismatic":
         first[:3, 3] = x, y, z

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch.arm import Chain
+from edge.touch.arm import Chain, Vector
 from edge.touch.frame import Frame
 from edge.touch.layout import RELEASE_S, SkinLayout
 from edge.touch.measurer import COLS, FORCE, ROWS, Measurer
@@ -167,7 +167,7 @@ class Contact:
             ],
         )
         self._n = 0
-        self._starts: dict[str, NDArray[np.float64]] = {}
+        self._starts: dict[str, Vector] = {}
 
     def add(self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float) -> None:
         """Take in a frame.
@@ -230,37 +230,36 @@ class Contact:
         called = self._measurer
         if not (called.motion or called.force_motion):
             return (0.0, 0.0), (0, 0)
-        pose = self._pose(frame)
+        if self.chain is not None and frame.joints is None:
+            self.missing_pose = True
         motion = force_motion = 0.0
         sums = (0, 0)
         if called.motion:
             sums = region.sums
-            motion = self._distance("motion", region.centroid, pose)
+            motion = self._distance("motion", region.centroid, frame.joints)
         if called.force_motion:
             # The contact's zone comes first.
             centroid = more[ROWS] / more[FORCE], more[COLS] / more[FORCE] % self.layout.cols
-            force_motion = self._distance("force_motion", centroid, pose)
+            force_motion = self._distance("force_motion", centroid, frame.joints)
         return (motion, force_motion), sums
 
-    def _pose(self, frame: Frame) -> NDArray[np.float64] | None:
-        """The link's pose; None where the skin's own frame is used or joint angles lack."""
-        if self.chain is None:
-            return None
-        if frame.joints is None:
-            self.missing_pose = True
-            return None
-        return self.chain.pose(frame.joints)
-
     def _distance(
-        self, which: str, centroid: tuple[float, float], pose: NDArray[np.float64] | None
+        self, which: str, centroid: tuple[float, float], joints: NDArray[np.float64] | None
     ) -> float:
         """From where this centroid was first seen; NaN where the pose is not known."""
-        if self.chain is not None and pose is None:
+        position = self._located(centroid, joints)
+        if position is None:
             return math.nan
-        position = self.layout.position(*centroid)
-        if pose is not None:
-            position = pose[:3, :3] @ position + pose[:3, 3]
         return math.dist(position, self._starts.setdefault(which, position))
+
+    def _located(
+        self, centroid: tuple[float, float], joints: NDArray[np.float64] | None
+    ) -> Vector | None:
+        """Where a point of the skin lies; None where an arm's joint angles are not known."""
+        point = self.layout.point(*centroid)
+        if self.chain is None:
+            return point
+        return None if joints is None else self.chain.point(joints, point)
 
     def position(self) -> NDArray[np.float64] | None:
         """(3,) where the region's centroid was last seen.
@@ -268,13 +267,10 @@ class Contact:
         Metres (taxels where the pitch is unknown), in the frame of the arm's base; without an
         arm in that of the link that carries the skin. None where joint angles were not known.
         """
-        if self.region is None or (self.chain is not None and self.joints is None):
+        if self.region is None:
             return None
-        position = self.layout.position(*self.region.centroid)
-        if self.chain is not None and self.joints is not None:
-            pose = self.chain.pose(self.joints)
-            position = pose[:3, :3] @ position + pose[:3, 3]
-        return position
+        position = self._located(self.region.centroid, self.joints)
+        return None if position is None else np.array(position)
 
     def series(self) -> FeatureSeries:
         """What was measured so far; later frames leave it as it is."""

@@ -105,25 +105,27 @@ class SkinLayout:
         return self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
 
     def position(self, row: float, col: float) -> NDArray[np.float64]:
-        """Place of a point of the surface in the link's frame.
+        """As `point`, (3,)."""
+        return np.array(self.point(row, col))
+
+    def point(self, row: float, col: float) -> tuple[float, float, float]:
+        """Where a point of the surface lies in the link's frame.
 
         Args:
             row: 0 to rows - 1, fractions allowed.
             col: 0 to cols (cols is column 0 again where the skin wraps), fractions allowed.
 
         Returns:
-            (3,) metres, or taxels where the pitch is unknown.
+            Metres, or taxels where the pitch is unknown.
         """
         along, around = self.pitch
         if self.radius_m is None:
-            return np.array([col * around, row * along, 0.0])
+            return col * around, row * along, 0.0
         angle = self._angle(col)
-        return np.array(
-            [
-                self.radius_m * math.cos(angle),
-                self.radius_m * math.sin(angle),
-                self.row0_z_m - row * along,
-            ]
+        return (
+            self.radius_m * math.cos(angle),
+            self.radius_m * math.sin(angle),
+            self.row0_z_m - row * along,
         )
 
     def _angle(self, col: float) -> float:

@@ -22,7 +22,7 @@ from train.simulate.schema import EFFECTS
 from train.simulate.truth import true_runs
 from train.study.context import Context
 from train.study.score import grid_search, transfer
-from train.study.skins import Remembering, follow, vectors
+from train.study.skins import follow, vectors
 
 FACTORS = (0.5, 2.0)
 SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
@@ -105,7 +105,6 @@ def measured(
     }
     shown = next(iter(scenes))
     found: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
-    chain = None if chain is None else Remembering(chain)
     for physics, true in true_runs(scenes[shown], trials, step_s, plans[shown]):
         for name, scene in scenes.items():
             batch = recordings(read_out(physics, plans[name]), scene, step_s, true)

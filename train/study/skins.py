@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from edge.recording import Recording
 from edge.touch.arm import Chain
@@ -38,22 +38,6 @@ def follow(
     return found
 
 
-class Remembering(Chain):
-    """A chain that keeps the poses it has worked out: many views show the same joint angles."""
-
-    def __init__(self, chain: Chain) -> None:
-        self.__dict__.update(chain.__dict__)
-        self._known: dict[tuple[tuple[int, ...], bytes], NDArray[np.float64]] = {}
-
-    def pose(self, q: ArrayLike) -> NDArray[np.float64]:
-        """As `Chain.pose`."""
-        angles = np.asarray(q, dtype=np.float64)
-        key = angles.shape, angles.tobytes()
-        if key not in self._known:
-            self._known[key] = super().pose(angles)
-        return self._known[key]
-
-
 @dataclass(frozen=True)
 class View:
     """Another way to see the same recordings.
@@ -79,7 +63,6 @@ def follow_views(
 ) -> list[dict[int, FeatureSeries | None]]:
     """The first contact of some recordings, by their number, as each of the views shows it."""
     found: list[dict[int, FeatureSeries | None]] = []
-    chain = None if chain is None else Remembering(chain)
     for view in views:
         seen = {
             i: recording if view.change is None else view.change(recording)

@@ -165,3 +165,35 @@ def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
 def test_an_axis_of_any_length_is_a_direction(axis):
     expected = Chain([Joint("j", (1.0, 1.0, 0.0))]).pose([1.0])
     assert Chain([Joint("j", axis)]).pose([1.0]) == pytest.approx(expected, abs=4e-16)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_point_is_where_the_pose_takes_it(seed):
+    """Turned joint by joint, it rounds no more than the whole pose does."""
+    rng = np.random.default_rng(seed)
+    kinds = rng.choice(["revolute", "prismatic", "fixed", "continuous"], 6)
+    joints = [
+        Joint(
+            f"j{i}",
+            tuple(rng.normal(size=3)),
+            kind=kind,
+            origin_xyz=tuple(rng.normal(size=3)),
+            origin_rpy=tuple(rng.normal(size=3)) if i % 2 else (0.0, 0.0, 0.0),
+            translate=tuple(rng.normal(size=3)),
+        )
+        for i, kind in enumerate(kinds)
+    ]
+    for chain in (Chain(joints), Chain.cody(), Chain([])):
+        q, at = rng.normal(size=chain.dof), rng.normal(size=3)
+        pose = chain.pose(q)
+        seen = chain.point(q, tuple(at))
+        assert seen == pytest.approx(pose[:3, :3] @ at + pose[:3, 3], abs=1e-14)
+
+
+def test_a_point_refuses_what_the_pose_refuses():
+    chain = Chain.cody()
+    with pytest.raises(InputError, match="takes 5 joint angles"):
+        chain.point([0.0] * 4, (0.0, 0.0, 0.0))
+    for bad in (np.nan, np.inf):
+        with pytest.raises(InputError, match="is not finite"):
+            chain.point([0.0, bad, 0.0, 0.0, 0.0], (0.0, 0.0, 0.0))

@@ -297,7 +297,7 @@ def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
     frames = [Frame(t, counts, joints=np.zeros(5)) for t in (0.0, 0.5)]
     monkeypatch.setattr(ActiveTaxels, "regions", refuse)
     series_of(FLAT, frames, ["skin_force", "left_length"])
-    monkeypatch.setattr(Chain, "pose", refuse)
+    monkeypatch.setattr(Chain, "point", refuse)
     series = series_of(FLAT, frames, ["skin_force"], chain=Chain.cody())
     assert list(series.zones) == ["skin"]
     monkeypatch.setattr(Measurer, "_moments", refuse)
