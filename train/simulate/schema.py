@@ -64,7 +64,7 @@ LABELS = {
     "window_s": Field(0.01, 60.0, 1.2, "time after the first touch within which a label shows"),
     "push_n": Field(0.1, 1e6, 6.0, "moves each movable object that a [[family]] gives"),
     "slides_m": Field(0.0, 1.0, 0.02, "what is called movable moves at least this far by then"),
-    "yields": Field(0.0, 1.0, 0.03, "what is soft yields by then, as a part of its thickness"),
+    "yields": Field(0.0, 1.0, 0.01, "what is soft yields by then, as a part of its thickness"),
 }
 SPREAD = {
     "place_m": Field(0.0, 0.08, 0.0, "where along the forearm the object is met"),
