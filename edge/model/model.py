@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import EdgeError, InputError
+from edge.files import open_regular, parsing
 from edge.model import onnx_file as onnxfile
 from edge.model.stopping import Novelty, Stopping
 from edge.touch import measures
@@ -490,17 +491,12 @@ class _Answer(NamedTuple):
 
 def _contents(name: str) -> tuple[onnxfile.Contents, os.stat_result]:
     """What the file holds, checked, and which file that was."""
-    try:
-        with open(name, "rb") as file:
-            stat = os.fstat(file.fileno())
-            data = file.read(LARGEST_BYTES + 1)
-    except FileNotFoundError:
-        raise InputError(f"{name}: no such model; make one with `make export`") from None
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from None
-    if len(data) > LARGEST_BYTES:
-        raise InputError(f"{name}: is larger than any model; copy or export it again")
-    return onnxfile.check(data, name), stat
+    if not os.path.lexists(name) and "\0" not in name:
+        raise InputError(f"{name}: no such model; make one with `make export`")
+    with open_regular(name, LARGEST_BYTES) as file:
+        stat = os.fstat(file.fileno())
+        with parsing(name, "a model", "; copy or export it again"):
+            return onnxfile.check(file.read(LARGEST_BYTES), name), stat
 
 
 def _is(name: str, stat: os.stat_result) -> bool:

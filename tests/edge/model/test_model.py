@@ -288,3 +288,20 @@ def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path
         f"{path}: its metadata is of format {number}, this edge-classify reads {FORMAT}; export it "
         "again"
     )
+
+
+@pytest.mark.parametrize("what", ["fifo", "folder", "device", "sparse"])
+def test_a_model_that_is_no_file_is_refused_at_once(what, tmp_path):
+    """A FIFO would wait for a writer, a device has no end, a sparse file needs more than memory."""
+    path = tmp_path / "model.onnx"
+    if what == "fifo":
+        os.mkfifo(path)
+    elif what == "folder":
+        path.mkdir()
+    elif what == "device":
+        path = "/dev/zero"
+    else:
+        with path.open("wb") as file:
+            file.truncate(1 << 40)
+    with pytest.raises(InputError, match=r"cannot be read|at most \d+ are read"):
+        Model(path)
