@@ -23,7 +23,11 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "recording", nargs="+", help="an .npz recording, several to compare, or a map"
     )
-    parser.add_argument("--model", metavar="model.onnx", help="show its decisions on several")
+    parser.add_argument(
+        "--model",
+        metavar="model.onnx",
+        help="show its decisions on several recordings, or its skin or arm behind a map",
+    )
     parser.add_argument("--out", metavar="PNG", help="the picture; beside the recording without it")
     parser.add_argument(
         "--scene", action="store_true", help="sketch arm, contact and its path from the side too"
@@ -35,14 +39,15 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw, and say where."""
+    from edge.model.model import Model
     from edge.recording import load
 
     first = arguments.recording[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
-    if arguments.model is not None and len(arguments.recording) == 1:
-        raise InputError("--model shows decisions on several recordings; give more than one")
+    single = len(arguments.recording) == 1 and Path(first).suffix == ".npz"
+    if arguments.model is not None and single:
+        raise InputError("--model is for several recordings or a map, not for one recording")
     if len(arguments.recording) > 1:
-        from edge.model.model import Model
         from train.draw import comparison
 
         if arguments.scene or arguments.threshold is not None:
@@ -53,7 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         from edge.runtime import touch_map
         from train.draw import touch_map as picture
 
-        picture.draw(touch_map.load(first), out, first, arguments.task)
+        info = None if arguments.model is None else Model(arguments.model).info
+        picture.draw(touch_map.load(first), out, first, arguments.task, info)
     else:
         from train.draw.recording import draw
 

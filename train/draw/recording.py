@@ -135,7 +135,7 @@ def _feature(axis: Any, series: FeatureSeries | None, name: str, unit: str) -> N
     axis.set_ylim(bottom=0.0)
 
 
-def _links(chain: Chain, q: Any) -> np.ndarray:
+def link_positions(chain: Chain, q: Any) -> np.ndarray:
     """(links, 3) positions of the chain's joints and its tip, in metres."""
     points = []
     moving = 0
@@ -162,7 +162,7 @@ def _side(
     width, radius, mass = (_size(drawn, key) for key in ("width_m", "radius_m", "mass_kg"))
     for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
         k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
-        points = _links(chain, joints[k])
+        points = link_positions(chain, joints[k])
         axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
         found = _contact(recording, chain, layout, k)
         if found is not None:

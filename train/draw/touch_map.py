@@ -13,15 +13,44 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.files import write_whole
+from edge.model.model import ModelInfo
 from edge.runtime.touch_map import TouchMap
+from train.draw.recording import link_positions
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"
 UNKNOWN = "not told"
 
 
-def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> None:
+def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
+    """What the contacts lie on: its name, and lines (points, 3) in the map's frame.
+
+    The skin's edges, or the arm with each joint in the middle of its range.
+    """
+    layout, chain = info.layout, info.chain
+    if chain is not None:
+        middle = [0.0 if limit is None else sum(limit) / 2.0 for limit in chain.limits]
+        return "the arm, its joints mid-range", [link_positions(chain, middle)]
+    rows, cols = layout.shape
+    round_it = np.linspace(0.0, cols if layout.wraps else cols - 1, 4 * cols)
+    ends = [np.array([layout.position(row, col) for col in round_it]) for row in (0, rows - 1)]
+    sides = np.linspace(0.0, cols if layout.wraps else cols - 1, 5)
+    return "the skin", [
+        *ends,
+        *(np.array([layout.position(row, col) for row in (0, rows - 1)]) for col in sides),
+    ]
+
+
+def draw(
+    found: TouchMap,
+    out: Path,
+    where: str,
+    task: str | None = None,
+    info: ModelInfo | None = None,
+) -> None:
     """Two views of the contacts, a colour and marker a label; fainter where votes were divided.
+
+    With the model's `info`, the outline of its arm or skin is drawn behind them.
 
     Raises:
         InputError: the map is empty, or has no such task.
@@ -37,7 +66,17 @@ def draw(found: TouchMap, out: Path, where: str, task: str | None = None) -> Non
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
     positions = np.array([touch.place for touch in touches])
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
+    name, lines = ("", []) if info is None else outline(info)
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
+        for i, line in enumerate(lines):
+            axis.plot(
+                line[:, across],
+                line[:, up],
+                color="0.6",
+                linewidth=2.0,
+                label=name if i == 0 else None,
+                zorder=0,
+            )
         for i, label in enumerate(sorted(set(labels))):
             those = np.array([seen == label for seen in labels])
             axis.scatter(

@@ -1,12 +1,17 @@
 """A map of touch as a picture."""
 
 import json
+from dataclasses import replace
 
 import matplotlib.image
 import numpy as np
 import pytest
 
+from edge import demo
+from edge.model.model import Model
+from edge.touch.arm import Chain
 from train.__main__ import main
+from train.draw.touch_map import outline
 
 HEAD = {"event": "map", "frame": "torso_lift_link", "unit": "metre", "tasks": ["category"]}
 
@@ -60,3 +65,25 @@ def test_what_cannot_be_drawn_is_one_sentence(path, capsys, text, options, sente
     assert main(["show", str(path), *options]) == 2
     assert sentence in capsys.readouterr().err
     assert not path.with_suffix(".png").exists()
+
+
+def test_the_arm_or_skin_of_a_model_is_drawn_behind_the_contacts(path, tmp_path):
+    plain, behind = tmp_path / "plain.png", tmp_path / "behind.png"
+    assert main(["show", str(path), "--out", str(plain)]) == 0
+    assert main(["show", str(path), "--model", str(demo.MODEL), "--out", str(behind)]) == 0
+    assert plain.read_bytes() != behind.read_bytes()
+    chain = Chain.cody()
+    name, (links,) = outline(replace(Model(demo.MODEL).info, chain=chain))
+    assert name == "the arm, its joints mid-range"
+    middle = [sum(limit) / 2 for limit in chain.limits]
+    np.testing.assert_allclose(links[-1], chain.pose(middle)[:3, 3], atol=1e-12)
+
+
+def test_a_skin_without_an_arm_is_its_own_outline():
+    info = replace(Model(demo.MODEL).info, chain=None)
+    name, lines = outline(info)
+    assert name == "the skin"
+    layout = info.layout
+    for line in lines:
+        np.testing.assert_allclose(np.hypot(line[:, 0], line[:, 1]), layout.radius_m, rtol=1e-12)
+    assert lines[0][0, 2] - lines[1][0, 2] == pytest.approx(15 * layout.pitch_m[0])

@@ -59,14 +59,14 @@ class ClassifyNode(Node):
 
     def _open(self, skin: str, fake: str):
         """The skin, where its joint angles come from, and how long there is something to read."""
-        chain = self._model.info.chain
+        chain, dof = self._model.info.chain, self._model.info.dof
         if fake:
             recording = edge.load(fake)
             file = skin_file(recording.layout)
             opened, playback = play(file, recording, clock=PacedClock())
             return opened, playback, playback.ends
         opened = edge.Skin.open(skin)
-        if chain is None:
+        if dof is None:
             return opened, None, float("inf")
         lines: deque[bytes] = deque(maxlen=256)
 
@@ -79,8 +79,8 @@ class ClassifyNode(Node):
         self.create_subscription(JointState, "joint_states", on_joints, 50)
         stream = Joints(
             lambda: lines.popleft() if lines else b"",
-            dof=chain.dof,
-            names=chain.names,
+            dof=dof,
+            names=None if chain is None else chain.names,
             now=opened.clock.now,
         )
         return opened, stream, float("inf")
