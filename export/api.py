@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from edge import __version__
 from edge.files import write_whole
 from edge.model.model import Model, ModelInfo, Task
@@ -28,6 +30,10 @@ from train.stopping import SequentialClassifier
 
 MISSING_SHARE = 0.02
 """Recordings without a contact above which the thresholds deserve a warning."""
+LONG_TOUCHES = 3.0
+"""Windows that a touch goes on for, from which on a longer one is worth a try."""
+LEAK = 0.5
+"""Labels told before the touch, above which a model knows the place rather than the thing."""
 NAMED = 3
 """Files that a sentence names before it counts the rest."""
 CALLS = 60
@@ -209,7 +215,22 @@ def warnings(fitted: Fitted) -> list[str]:
             f"warning: {len(dataset.unused)} recordings have further contacts, of which only the "
             f"first is used: {_files(dataset.unused)}; `python -m train split` cuts them apart"
         )
-    longest = max(float(t.recording.t[-1]) - t.onset_s for t in dataset.trials)
+    lasting = [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
+    if float(np.median(lasting)) >= LONG_TOUCHES * fitted.window_s:
+        lines.append(
+            f"the window takes {fitted.window_s:g} s of touches that go on for "
+            f"{np.median(lasting):.1f} s (median); a longer --window may tell more"
+        )
+    for task, one in fitted.chosen.items():
+        if any(measures.feature(name).quantity == "joint_angle" for name in one.choice.features):
+            told = told_by_posture(dataset, task)
+            lines.append(
+                f"{'warning: ' if told > LEAK else ''}{task}: the joint angles at onset, before "
+                f"the touch, tell {told:.1%} of the labels by themselves (1-NN, leave-one-out): "
+                "where the arm was, not what it felt; --features without "
+                "posture tells what touch can"
+            )
+    longest = max(lasting)
     if fitted.window_s > longest + 1e-9:
         lines.append(
             f"warning: the window of {fitted.window_s:g} s is longer than any recording goes on "
@@ -230,6 +251,20 @@ def warnings(fitted: Fitted) -> list[str]:
                 "which of them is kept is arbitrary"
             )
     return lines
+
+
+def told_by_posture(dataset: DataSet, task: str) -> float:
+    """Share of a task's labels that the nearest other trial's joint angles at onset tell."""
+    found = []
+    for trial in dataset.trials:
+        joints = trial.series.joints
+        assert joints is not None
+        known = joints[np.isfinite(joints).all(axis=1)]
+        found.append(known[0] if len(known) else np.zeros(joints.shape[1]))
+    angles, labels = np.array(found), dataset.labels(task)
+    squares = ((angles[:, None] - angles) ** 2).sum(axis=2)
+    np.fill_diagonal(squares, np.inf)
+    return float((labels[squares.argmin(axis=1)] == labels).mean())
 
 
 def _files(paths: Sequence[Path]) -> str:

@@ -2,14 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import export
 import train
 from edge.model.model import Model
 from edge.model.verify import verify
-from edge.recording import save
-from export.api import measure, report
+from edge.recording import load, save
+from export.api import LEAK, measure, report, told_by_posture, warnings
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +70,32 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
     assert "python -m train thresholds" in text
     assert "warning: 1 recordings lack a label for object and are left out: " in text
     assert "the window of 9 s is longer than any recording goes on after its onset" in text
+
+
+def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings, tmp_path):
+    """The arm stood elsewhere for each object: its angles tell all without a touch."""
+    objects = sorted({load(path).labels["object"] for path in recordings.glob("*.npz")})
+    for path in recordings.glob("*.npz"):
+        recording = load(path)
+        place = np.full_like(recording.joints, 0.3 * objects.index(recording.labels["object"]))
+        save(tmp_path / path.name, replace(recording, joints=place))
+    fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
+    assert told_by_posture(fitted.dataset, "object") == 1.0
+    (said,) = [line for line in warnings(fitted) if line.startswith("warning: object")]
+    assert "tell 100.0% of the labels by themselves" in said
+
+
+def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
+    """Every recording begins in a pose that one of another object has too, and no other."""
+    for i, path in enumerate(sorted(recordings.glob("*.npz"))):
+        recording = load(path)
+        save(tmp_path / path.name, replace(recording, joints=0.0 * recording.joints + i % 8))
+    fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
+    assert told_by_posture(fitted.dataset, "object") == 0.0 < LEAK
+    assert not any(line.startswith("warning: object") for line in warnings(fitted))
+
+
+def test_a_window_that_takes_a_small_part_of_the_touches_is_named(fitted):
+    short = replace(fitted, window_s=fitted.window_s / 100.0)
+    assert any("a longer --window may tell more" in line for line in warnings(short))
+    assert not any("a longer --window" in line for line in warnings(fitted))
