@@ -13,6 +13,7 @@ from tests.hard_cases.adversarial import FAMILIES, judged
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM
 
+FAMILY_GROUP = "ties and gaps"
 TOLD = 2.0**-49
 """Two candidates whose distances differ by more than this part of the rows' size are told apart:
 a coordinate carries an error of at most 2^-52 of it, a sum of 20 squares and a root add a few."""
@@ -102,7 +103,7 @@ CASES = [
     ),
     *(
         Case(
-            "ties and gaps",
+            FAMILY_GROUP,
             family.replace("_", " "),
             "whole numbers, no rounding",
             "difference of distances told wrongly, of the rows' size",

@@ -18,12 +18,15 @@ from typing import Any
 import numpy as np
 
 from edge.errors import EdgeError
+from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, TrackSettings
+from tests.hard_cases.adversarial import Found, judged
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM
+from tests.hard_cases.limits import FAMILY_GROUP
 from tests.hard_cases.models import Ours, features, microseconds, plain_graph, session
 from train.dataset import load_trials
 from train.projection import Projection
@@ -115,9 +118,6 @@ LADDERS: dict[str, Ladder] = {
     "simulator: taxel forces on a bed of 1e15 N/m": Ladder(
         "N/m", decades(6, 30, 1), seeded("stiff", seed=0)
     ),
-    "refusals: finite, but beyond any distance": Ladder(
-        "feature", decades(140, 308, 0.25), seeded("size")
-    ),
     "limits: skins to 256 x 256 at full scale, across the seam": Ladder(
         "rows and columns", [16, 64, 128, 256, 512], seeded("side", across=True), "taxels"
     ),
@@ -128,32 +128,52 @@ LADDERS: dict[str, Ladder] = {
 """By the key of a case."""
 
 
-def search(case: Case, ladder: Ladder) -> tuple[float | None, float | None]:
-    """The last value that holds, and the first that does not; None where there is none."""
+def search(case: Case, ladder: Ladder) -> tuple[float | None, float | None, bool]:
+    """The last value that holds, the first that does not (None where there is none), and whether
+    that one was refused with a sentence."""
     last = None
     for value in ladder.values:
         try:
             error = case.error(**ladder.at(value))
         except EdgeError:
-            return last, value  # refused: it goes no further
+            return last, value, True
         if not error <= case.bound:
-            return last, value
+            return last, value, False
         last = value
-    return last, None
+    return last, None, False
 
 
 def margin(case: Case) -> str:
     """The cliff of a case in words, and where recordings lie."""
+    if case.group == FAMILY_GROUP:
+        return told(str(case.hazard[0]["family"]))
     ladder = LADDERS.get(case.key)
     if ladder is None:
         return "no parameter to go further with: all of it is tried"
     with np.errstate(all="ignore"):
-        last, first = search(case, ladder)
-    held = "" if last is None else f"holds to {last:.2g}"
-    cliff = "no failure found" if first is None else f"first failure or refusal at {first:.2g}"
+        last, first, refused = search(case, ladder)
+    parts = [] if last is None else [f"holds to {last:.6g}"]
+    if first is None:
+        parts.append("no failure found")
+    else:
+        parts.append(f"{'refused with a sentence' if refused else 'fails'} from {first:.6g}")
     there = LIE.get(ladder.lie)
     lies = f"; recordings lie at {there}" if there else ""
-    return f"{ladder.what}: {held}{', ' if held else ''}{cliff}{lies}"
+    return f"{ladder.what}: {', '.join(parts)}{lies}"
+
+
+def told(family: str, sets: int = 40) -> str:
+    """The smallest difference that a family's answers told, and what went wrong below it."""
+    every = Found()
+    for seed in range(sets):
+        every.add(judged(family, seed), (family, seed))
+    wrong = f"{every.wrong} wrong without a flag"
+    if every.wrong:
+        wrong += f", of distances {every.missed:.0e} of the rows' size apart"
+    return (
+        f"{every.queries} queries: neighbours told apart to {every.gap:.0e} of their distance, "
+        f"{wrong}, {every.close} flagged as close; recordings lie at {LIE['gap']} of the rows' size"
+    )
 
 
 LIE = {
@@ -239,7 +259,8 @@ def prices() -> Mapping[str, str]:
     tracker = ContactTracker(FOREARM, TrackSettings(debounce=1))
     contact = [c for i in range(4) for c in tracker.push(Frame(0.01 * i, counts))][-1]
     series = contact.series()
-    graph, plain, narrow, region, vector, finite = microseconds(
+    chain = Chain.cody()
+    graph, plain, narrow, region, vector, finite, pose = microseconds(
         [
             lambda: whole.run(["t_label", "t_neighbours"], {"features": x}),
             lambda: bare.run(["rows"], {"x": x}),
@@ -247,6 +268,7 @@ def prices() -> Mapping[str, str]:
             lambda: largest_region(counts, 50),
             lambda: feature_vector(series, 0.03),
             lambda: np.isfinite(x).all(),
+            lambda: chain.pose(np.full(chain.dof, 0.5)),
         ],
         200,
     )
@@ -265,7 +287,8 @@ def prices() -> Mapping[str, str]:
         "simulator": "0 us and 0 bytes on the board: it is paid when trials are simulated",
         "features": f"{touch}; {vector:.0f} us a feature vector",
         "limits": touch,
-        "kinematics": "within the pose of a frame (make bench: pose), 0 bytes",
+        "kinematics": f"within {pose:.0f} us a pose of five joints, 0 bytes",
+        FAMILY_GROUP: decision,
         "refusals": f"{finite:.1f} us a vector at the edge, and the graph's own guard within it",
         "early stopping": "0 us where no decision point is asked for",
     }

@@ -1,5 +1,6 @@
 """The table's margins are of cases that exist, and a search finds where a case begins to fail."""
 
+from edge.errors import InputError
 from tests.hard_cases.cases import Case
 from tests.hard_cases.margins import LADDERS, LIE, Ladder, decades, margin, search
 from tests.hard_cases.registry import CASES
@@ -12,9 +13,17 @@ def test_each_ladder_is_of_a_case_and_lies_on_a_known_scale():
 
 def test_a_search_ends_at_the_first_failure():
     case = Case("g", "n", "", "", 0, lambda x: float(x >= 1e3))
-    assert search(case, Ladder("x", decades(0, 6, 1), lambda x: {"x": x})) == (1e2, 1e3)
-    assert search(case, Ladder("x", [1.0, 2.0], lambda x: {"x": x})) == (2.0, None)
-    assert search(case, Ladder("x", [1e4], lambda x: {"x": x})) == (None, 1e4)
+    assert search(case, Ladder("x", decades(0, 6, 1), lambda x: {"x": x})) == (1e2, 1e3, False)
+    assert search(case, Ladder("x", [1.0, 2.0], lambda x: {"x": x})) == (2.0, None, False)
+    assert search(case, Ladder("x", [1e4], lambda x: {"x": x})) == (None, 1e4, False)
+
+
+def test_a_refusal_is_no_wrong_answer():
+    def refuse(x):
+        raise InputError("too much")
+
+    case = Case("g", "n", "", "", 0, refuse)
+    assert search(case, Ladder("x", [1.0], lambda x: {"x": x})) == (None, 1.0, True)
 
 
 def test_a_case_without_a_parameter_says_so():
