@@ -32,7 +32,7 @@ NUMBERS = re.compile(r"\b(?<!\.py:)(0x)?\d+\b")
 """In a sentence they tell inputs apart, not faults; a line of code keeps its own."""
 SECONDS = 5.0
 MEGABYTES = 200.0
-STUCK_S = 60.0
+STUCK_S = 180.0
 """Without a sign for so long a reader hangs, however busy the machine is."""
 
 
