@@ -14,7 +14,7 @@ from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM
 
 FAMILY_GROUP = "ties and gaps"
-TOLD = 2.0**-49
+TOLD = 2.0**-48
 """Two candidates whose distances differ by more than this part of the rows' size are told apart:
 a coordinate carries an error of at most 2^-52 of it, a sum of 20 squares and a root add a few."""
 
