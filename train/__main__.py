@@ -9,7 +9,7 @@ from importlib import import_module
 
 from edge.cli import dispatch
 
-COMMANDS = ("import_", "simulate", "study", "tradeoff", "show")
+COMMANDS = ("import_", "simulate", "study", "tradeoff", "show", "split", "thresholds")
 """Modules of `train.commands`; each has `add_parser(subparsers)`, which sets `run`."""
 
 

@@ -239,7 +239,7 @@ def load_trials(
     """
     types = measures.features(tuple(features))
     raw = data if isinstance(data, Recordings) else read(data, progress=progress)
-    reference = _thresholds(raw.recordings[0].layout, threshold, onset)
+    reference = with_thresholds(raw.recordings[0].layout, threshold, onset)
     reference = replace(reference, dead=_dead(raw.recordings))
     needed = any(feature.of_joints for feature in types)
     tasks, left_out = _lacking(raw, needed or any(feature.moves for feature in types))
@@ -333,7 +333,7 @@ def _each(recording: Recording) -> list[dict[str, str]]:
     return [one for one in each if isinstance(one, dict)] if isinstance(each, list) else []
 
 
-def _thresholds(layout: SkinLayout, threshold: int | None, onset: int | None) -> SkinLayout:
+def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None) -> SkinLayout:
     """The skin with other thresholds, where they are given."""
     if threshold is not None:
         ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1

@@ -1,0 +1,34 @@
+"""One recording a contact."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from edge.recording import load, save
+from edge.touch.track import ContactTracker
+from train.__main__ import main
+from train.dataset import contacts
+
+
+def twice(recording):
+    gap = np.zeros((50, *recording.frames.shape[1:]), dtype=np.uint16)
+    frames = np.concatenate([recording.frames, gap, recording.frames])
+    t = np.arange(len(frames)) / 100.0
+    return replace(recording, t=t, frames=frames, joints=None)
+
+
+def test_each_contact_becomes_a_recording_with_its_own_labels(make_touch, tmp_path, capsys):
+    two = twice(make_touch(seconds=0.6))
+    each = [{"object": "one"}, {"object": "other"}]
+    save(tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": each}))
+    assert main(["split", str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 0
+    assert "2 recordings in" in capsys.readouterr().out
+    whole = contacts(two, ContactTracker(two.layout))
+    for i, label in enumerate(("one", "other")):
+        part = load(tmp_path / "out" / f"two-{i:02d}.npz")
+        assert part.labels["object"] == label
+        assert part.labels["category"] == two.labels["category"]
+        (found,) = contacts(part, ContactTracker(part.layout))
+        assert found[0] == whole[i][0]
+        assert (found[1].peak == whole[i][1].peak[: len(found[1].peak)]).all()
+        assert "contacts" not in part.meta
