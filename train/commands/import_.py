@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
 from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
-from edge.recording import save
+from edge.recording import Recording, save
 from train.importers import names
+
+ZERO_FRAMES = 3
 
 
 def add_parser(commands: Any) -> None:
@@ -28,6 +32,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("file", type=Path, help="the file")
     parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
     add_arm(parser, "whose joint names say which angles of a log are kept, and in what order")
+    parser.add_argument(
+        "--zero",
+        action="store_true",
+        help="subtract what each taxel shows in the first three frames, for a sensor whose offset "
+        "drifts from trial to trial; nothing may be touched in them",
+    )
     parser.set_defaults(run=run)
 
 
@@ -39,7 +49,14 @@ def run(arguments: argparse.Namespace) -> int:
     for name, recording in tqdm(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
             raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
-        save(arguments.out / f"{name}.npz", recording)
+        save(arguments.out / f"{name}.npz", zeroed(recording) if arguments.zero else recording)
         n += 1
     print(f"{n} recordings in {arguments.out}")
     return 0
+
+
+def zeroed(recording: Recording) -> Recording:
+    """The same without each taxel's median over the first three frames; below it is 0."""
+    offset = np.median(recording.frames[:ZERO_FRAMES], axis=0).astype(np.uint16)
+    frames = np.where(recording.frames > offset, recording.frames - offset, 0)
+    return replace(recording, frames=frames.astype(np.uint16))
