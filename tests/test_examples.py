@@ -124,7 +124,8 @@ def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
     assert [(r.class_id, r.score) for r in mobility.results] == [("movable", 1.0)]
     assert ros.topics["~/object"][0].results[0].class_id == "pillow"
     events = [json.loads(message.data) for message in ros.topics["~/events"]]
-    assert [event["event"] for event in events] == ["onset", "decision", "decision", "decision"]
+    tasks = len(edge.Model(demo.MODEL).info.tasks)
+    assert [event["event"] for event in events] == ["onset", *["decision"] * tasks]
     assert ros.destroyed.name == "edge_classify"
 
 

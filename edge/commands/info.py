@@ -57,8 +57,9 @@ def text(info: ModelInfo, said: dict[str, Any]) -> str:
     lines = [f"{said['file']}: {said['bytes'] / 1024:.0f} kB, format {said['format']}", ""]
     for name, task in info.tasks.items():
         lines.append(
-            f"{name}: {task.accuracy:.1%} accurate (leave-one-out), {task.components} components, "
-            f"{task.k} neighbour{'s' * (task.k != 1)}, scaling {task.scaling}"
+            f"{name}: {task.accuracy:.1%} accurate (nested), {task.components} "
+            f"component{'s' * (task.components != 1)}, {task.k} "
+            f"neighbour{'s' * (task.k != 1)}, scaling {task.scaling}"
         )
         lines += _wrapped(", ".join(task.labels))
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())

@@ -25,7 +25,7 @@ def test_a_person_gets_sentences(capsys, monkeypatch):
     out = capsys.readouterr().out
     info = Model(demo.MODEL).info
     for task, one in info.tasks.items():
-        assert f"{task}: {one.accuracy:.1%} accurate (leave-one-out)" in out
+        assert f"{task}: {one.accuracy:.1%} accurate (nested)" in out
     assert "Skin: 16 x 24 taxels, closed around" in out
     assert f"Fitted on {info.rows} trials" in out
     assert max(map(len, out.splitlines())) < 160

@@ -7,6 +7,7 @@ import pytest
 from edge import demo
 from edge.cli import main
 from edge.commands.output import Output, event_text
+from edge.model.model import Model
 
 TOUCH = str(demo.FOLDER / "pillow-movable.npz")
 RUN = ["run", "--model", str(demo.MODEL), "--fake", TOUCH]
@@ -29,7 +30,8 @@ def test_a_person_reads_when_what_was_decided_and_how_sure(terminal, capsys):
 def test_json_at_a_terminal_is_what_a_pipe_gets(terminal, capsys):
     assert main([*RUN, "--json"]) == 0
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [e["event"] for e in events] == ["onset", "decision", "decision", "decision", "end"]
+    tasks = len(Model(demo.MODEL).info.tasks)
+    assert [e["event"] for e in events] == ["onset", *["decision"] * tasks, "end"]
     assert all(round(e["onset_s"], 6) == e["onset_s"] for e in events[:-1])
 
 
@@ -39,7 +41,8 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
     decisions, _, picture = out.partition("▀")
     assert decisions.count("mobility") == 4
     assert picture.count("▀") >= 4 * 8 * 24 - 1
-    assert out.splitlines()[-1].startswith("12 of 12 decisions are right")
+    asked = 4 * len(Model(demo.MODEL).info.tasks)
+    assert out.splitlines()[-1].startswith(f"{asked} of {asked} decisions are right")
 
 
 def test_a_map_of_chips_comes_last(terminal, capsys):
