@@ -55,7 +55,7 @@ def test_every_contact_begins_on_a_skin_whose_scale_is_unknown():
     for name, recording in touches.touches(file, trials=3):
         assert recording.frames.max() > file.layout.onset, name
         assert recording.frames.max() <= 599
-        assert set(recording.labels) == {"category", "mobility", "object"}
+        assert set(recording.labels) >= {"category", "mobility", "object"}
         assert not recording.frames[recording.t < 0.2].any()
 
 
