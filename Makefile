@@ -186,7 +186,8 @@ demo-data: $(READY)
 	rm -rf $(DEMODATA)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
-	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --decision-points none
+	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --decision-points none \
+		--features paper --projection pca --tasks category mobility object
 	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
 
 HARD := $(OUT)/hard-cases

@@ -22,6 +22,7 @@ def make(out: Path) -> None:
         train(["simulate", str(SCENE), "--trials", "3", "--out", folder])
         fixed = ["--features", "paper", "contact", "--projection", "lda", "--k", "6"]
         fixed += ["--decision-points", "none"]
+        fixed += ["--tasks", "category", "mobility", "object"]
         export(["--data", folder, "--out", str(out), "--jobs", "1", *fixed])
 
 
