@@ -164,12 +164,25 @@ def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
         }
 
 
-def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, recordings):
-    model, path = exported / "model.onnx", recordings / "hard_1.npz"
+@pytest.fixture
+def parted(recordings, tmp_path):
+    """A touch and half a second without one, so that a loop of it is many contacts."""
+    one = recording.load(recordings / "hard_1.npz")
+    rest = 50
+    t = np.concatenate([one.t, one.t[-1] + np.arange(1, rest + 1) / 100.0])
+    frames = np.concatenate([one.frames, np.zeros((rest, 16, 24), np.uint16)])
+    joints = np.concatenate([one.joints, np.repeat(one.joints[-1:], rest, axis=0)])
+    path = tmp_path / "parted.npz"
+    recording.save(path, Recording(t, frames, joints, meta=one.meta))
+    return path
+
+
+def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, parted):
+    model, path = exported / "model.onnx", parted
     once = edge("run", "--model", model, "--fake", path)[1]
-    twice = edge("run", "--model", model, "--fake", path, "--loop", "--seconds", 3.6)[1]
+    twice = edge("run", "--model", model, "--fake", path, "--loop", "--seconds", 4.6)[1]
     assert [sum(e["event"] == "onset" for e in events) for events in (once, twice)] == [1, 2]
-    assert twice[-1]["frames"] == 360
+    assert twice[-1]["frames"] == 460
 
 
 def test_run_needs_the_joint_angles_that_its_model_was_made_with(edge, exported, make_touch,
@@ -274,8 +287,8 @@ def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
     assert trial.valid is None
 
 
-def test_record_saves_one_trial_a_contact_and_never_overwrites(edge, recordings, tmp_path):
-    arguments = ("record", "--fake", recordings / "hard_1.npz", "--loop", "--label", "object=a b/c",
+def test_record_saves_one_trial_a_contact_and_never_overwrites(edge, parted, tmp_path):
+    arguments = ("record", "--fake", parted, "--loop", "--label", "object=a b/c",
                  "--out", tmp_path / "t", "--length", 1.2, "--trials")  # fmt: skip
     assert len(edge(*arguments, 2)[1]) == 2
     assert len(edge(*arguments, 1)[1]) == 1
@@ -339,8 +352,8 @@ def test_two_contacts_are_two_trials(edge, make_touch, tmp_path):
     recording.save(tmp_path / "two.npz", both)
     events = edge("record", "--fake", tmp_path / "two.npz", "--label", "object=a", "--out",
                   tmp_path / "t")[1]  # fmt: skip
-    # 20 frames of lead-in, 50 of contact, 5 that show its end.
-    assert [(e["frames"], e["complete"]) for e in events] == [(75, True)] * 2
+    # 20 frames of lead-in, 50 of contact, 30 that show its end.
+    assert [(e["frames"], e["complete"]) for e in events] == [(100, True)] * 2
 
 
 def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
