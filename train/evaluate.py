@@ -30,7 +30,7 @@ from train.projection import Grid, Spectrum, gains_of, on_grid, widths_of
 
 FOLDS = 10
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
-SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003)
+SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
 
 Labels = Mapping[str, NDArray[np.str_]]
