@@ -36,7 +36,6 @@ def test_a_recording_is_classified(monkeypatch, capsys):
         ["Decided(task='category'", " label='soft-movable'"],
         ["Decided(task='mobility'", " label='movable'"],
         ["Decided(task='object'", " label='pillow'"],
-        ["Decided(task='softness'", " label='soft'"],
     ]
 
 
