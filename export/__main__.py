@@ -98,24 +98,25 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
+    window_s, features, scaling = arguments.window, arguments.features, arguments.scaling
     if arguments.front is not None:
-        _take_front(arguments)
-    _check_fixed(arguments)
+        point = _of_front(arguments)
+        window_s, features = point.window_s, list(point.features)
+        scaling = scaling or point.scaling
+    _check_fixed(arguments, window_s)
     points = arguments.decision_points
     fitted = fit(
         arguments.data,
-        features=arguments.features,
+        features=features,
         projection=arguments.projection,
-        scaling=arguments.scaling,
+        scaling=scaling,
         components=arguments.components,
         k=arguments.k,
-        window_s=arguments.window,
+        window_s=window_s,
         samples=arguments.samples,
         tasks=arguments.tasks,
         leave_out=arguments.leave_out,
-        decision_points_s=None
-        if points is None
-        else parse_decision_points(points, arguments.window),
+        decision_points_s=None if points is None else parse_decision_points(points, window_s),
         threshold=arguments.threshold,
         onset=arguments.onset,
         arm=open_arm(arguments),
@@ -130,24 +131,22 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _take_front(arguments: argparse.Namespace) -> None:
-    """Set what a point of the front says, where the options do not."""
+def _of_front(arguments: argparse.Namespace) -> operating_points.OperatingPoint:
+    """The operating point that was asked for."""
     path = arguments.fronts or FRONTS
     if arguments.fronts is None and not path.exists():
         path = operating_points.SHIPPED
     front = operating_points.ParetoFront.read(path)
     point = front.pick(arguments.front)
-    arguments.window, arguments.features = point.window_s, list(point.features)
     print(
         f"{path}: {arguments.front} is {point.window_s:g} s of {' '.join(point.features)}, scaling "
         f"{point.scaling}: {front.task} {point.accuracy:.1%} in {point.milliseconds:.0f} ms there",
         file=sys.stderr,
     )
-    if arguments.scaling is None:
-        arguments.scaling = point.scaling
+    return point
 
 
-def _check_fixed(arguments: argparse.Namespace) -> None:
+def _check_fixed(arguments: argparse.Namespace, window_s: float) -> None:
     for name in ("components", "k", "jobs"):
         value = getattr(arguments, name)
         if value is not None and value < 1:
@@ -158,15 +157,15 @@ def _check_fixed(arguments: argparse.Namespace) -> None:
             raise InputError(f"--{name} must be 0 to 65534 counts, not {value}")
     if not 2 <= arguments.samples <= 1000:
         raise InputError(f"--samples must be 2 to 1000, not {arguments.samples}")
-    if not 0.0 < arguments.window <= 60.0:
-        raise InputError(f"--window must be above 0 and at most 60 seconds, not {arguments.window}")
+    if not 0.0 < window_s <= 60.0:
+        raise InputError(f"--window must be above 0 and at most 60 seconds, not {window_s}")
 
 
 def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:
     """Seconds from onset out of `a:b:step`, `a,b,c` or `none`; the full window comes last.
 
     Raises:
-        InputError: it is none of them, or a look is not above 0.
+        InputError: it is none of them, or a decision point is not above 0.
     """
     if text == "none":
         return ()

@@ -39,6 +39,17 @@ def test_a_recording_is_classified(monkeypatch, capsys):
     ]
 
 
+def test_a_model_is_fitted_and_exported(monkeypatch, capsys, make_touch, tmp_path):
+    for kind in ("hard", "soft"):
+        for seed in range(5):
+            edge.save(tmp_path / "trials" / f"{kind}-{seed}.npz", make_touch(kind=kind, seed=seed))
+    run(monkeypatch, capsys, "fit_and_export.py", tmp_path / "trials", tmp_path / "model.onnx")
+    model = edge.Model(tmp_path / "model.onnx")
+    events = edge.Classifier(model).classify(make_touch(kind="hard", seed=9))
+    decided = {event.task: event.label for event in events if isinstance(event, edge.Decided)}
+    assert decided["category"] == "rigid-fixed"
+
+
 def test_a_skin_is_watched(monkeypatch, capsys):
     """A fake skin feels a touch, and then the owner presses Ctrl-C."""
     recording = edge.load(PILLOW)

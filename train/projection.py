@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
+from edge.touch.measures import feature
 
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
@@ -121,7 +122,12 @@ def scale_of(
     if method == "III":
         return np.ldexp(mean, powers), ones
     if method == "IV":
-        squares = [((block - m) ** 2).mean() for block, m in zip(small, mean, strict=True)]
+        squares = []
+        for name, block, middle in zip(features, small, mean, strict=True):
+            # Cells and joints each have a level of their own, which tells them apart and no
+            # trial: a wide feature deviates from each column's mean.
+            middles = block.mean(axis=0) if feature(name).wide else middle
+            squares.append(((block - middles) ** 2).mean())
         deviation = np.sqrt(squares)
         # A spread below the rounding of its own mean is no spread.
         deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0

@@ -51,7 +51,7 @@ class Summary:
             parts.append(
                 f"{self.as_trained} of them equal a training trial to the last bit and are most "
                 "likely the same recordings, so this accuracy does not apply to new touches; the "
-                "leave-one-out accuracy that `make export` printed does"
+                "nested accuracy that `make export` printed does"
             )
         for task in self._tasks:
             right, total = self.accuracy(task)

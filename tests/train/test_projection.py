@@ -38,6 +38,14 @@ def test_scalings_are_the_papers_equations_per_feature_type():
         assert scaled == pytest.approx(np.hstack(blocks), rel=1e-14, abs=1e-13)
 
 
+def test_a_wide_feature_deviates_from_the_mean_of_each_column():
+    """Method IV: a cell's own level would swamp what the trials differ in."""
+    around = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    level = np.array([1000.0, -1000.0])
+    _, gain = scale_of(level + around, "IV", ["taxel_force_mean"], [2])
+    assert gain.tolist() == [1.0]
+
+
 @pytest.mark.parametrize("method", ["I", "II", "IV", "V"])
 def test_a_feature_type_that_told_nothing_in_training_is_dropped(method):
     X = data()
