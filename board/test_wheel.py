@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-LARGEST = 200_000
+LARGEST = 250_000
 
 
 @pytest.fixture(scope="session")
@@ -79,7 +79,11 @@ def test_it_names_three_dependencies_one_version_and_a_licence(contents):
     ]
     assert sorted(needed) == ["numpy", "onnxruntime", "smbus2"]
     source = ast.parse((CHECKOUT / "edge" / "__init__.py").read_text())
-    (version,) = (n.value.value for n in source.body if isinstance(n, ast.Assign))
+    (version,) = (
+        n.value.value
+        for n in source.body
+        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Constant)
+    )
     assert fields["Version"] == version
     assert fields["License-Expression"] == "BSD-3-Clause"
     assert any(name.endswith("/LICENSE") for name in contents)

@@ -125,6 +125,8 @@ def describe(
 
 
 def _labels(dataset: DataSet, task: str) -> set[str]:
+    if task not in dataset.tasks:
+        return set()
     return {*dataset.labels(task).tolist(), *dataset.untouched_labels(task)}
 
 

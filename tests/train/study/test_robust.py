@@ -59,10 +59,11 @@ def test_what_differs_in_the_sensor_alone_shares_its_physics(scene):
 
 
 def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene):
-    """A light pillow gives way: it is felt a quarter of a second after the arm has met it."""
+    """A light pillow gives way: it is felt a fifth of a second after a bin is."""
     (series,) = anew(context, {UNCHANGED: scene}).values()
     assert (vectors(series) == context.vectors()).all()
-    assert max(trial.onset_s for trial in context.dataset.trials) > 0.5
+    onsets = [trial.onset_s for trial in context.dataset.trials]
+    assert max(onsets) - min(onsets) > 0.15
 
 
 def test_shared_physics_changes_no_bit(context, scene):
