@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
     window_s, features, scaling = arguments.window, arguments.features, arguments.scaling
     if arguments.front is not None:
-        point = _of_front(arguments)
+        front, point = _of_front(arguments)
         window_s, features = point.window_s, list(point.features)
         scaling = scaling or point.scaling
     _check_fixed(arguments, window_s)
@@ -124,6 +124,12 @@ def run(arguments: argparse.Namespace) -> int:
         jobs=arguments.jobs,
         progress=True,
     )
+    if arguments.front is not None and front.digest != fitted.dataset.digest:
+        print(
+            "warning: the operating points were measured on other recordings, so their accuracy "
+            "and time may not be those of these; `make tradeoff DATA=...` measures yours",
+            file=sys.stderr,
+        )
     path = arguments.out / "model.onnx"
     size = save(path, fitted)
     print(report(fitted, measure(fitted)), file=sys.stderr)
@@ -131,8 +137,10 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _of_front(arguments: argparse.Namespace) -> operating_points.OperatingPoint:
-    """The operating point that was asked for."""
+def _of_front(
+    arguments: argparse.Namespace,
+) -> tuple[operating_points.ParetoFront, operating_points.OperatingPoint]:
+    """The front, and the operating point of it that was asked for."""
     path = arguments.fronts or FRONTS
     if arguments.fronts is None and not path.exists():
         path = operating_points.SHIPPED
@@ -143,7 +151,7 @@ def _of_front(arguments: argparse.Namespace) -> operating_points.OperatingPoint:
         f"{point.scaling}: {front.task} {point.accuracy:.1%} in {point.milliseconds:.0f} ms there",
         file=sys.stderr,
     )
-    return point
+    return front, point
 
 
 def _check_fixed(arguments: argparse.Namespace, window_s: float) -> None:

@@ -41,10 +41,12 @@ class ParetoFront:
     Attributes:
         task: whose accuracy it is.
         points: the fastest first, each more accurate than those before it.
+        digest: SHA-256 over the recordings that they were measured on; empty where not known.
     """
 
     task: str
     points: tuple[OperatingPoint, ...]
+    digest: str = ""
 
     @classmethod
     def read(cls, path: Path) -> ParetoFront:
@@ -64,10 +66,10 @@ class ParetoFront:
                 )
                 for point in found["points"]
             ]
-            task = str(found["task"])
+            task, digest = str(found["task"]), str(found.get("data_digest", ""))
         if not points or not all(point.scaling in SCALINGS for point in points):
             raise InputError(f"{path}: has no point to choose from; make one with `make tradeoff`")
-        return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)))
+        return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)), digest)
 
     def pick(self, wanted: str) -> OperatingPoint:
         """The point that is asked for.

@@ -104,7 +104,9 @@ def tradeoff(
     ]
     report = write(out, "What accuracy costs in time", lead, parts)
     with write_whole(out / "front.json") as file:
-        file.write(json.dumps(fronts(points, main, board.name), indent=1).encode() + b"\n")
+        file.write(
+            json.dumps(fronts(points, main, board.name, dataset.digest), indent=1).encode() + b"\n"
+        )
     return report
 
 
@@ -213,12 +215,13 @@ def is_paper(point: MeasuredPoint) -> bool:
     )
 
 
-def fronts(points: Sequence[MeasuredPoint], main: str, board: str) -> dict[str, Any]:
+def fronts(points: Sequence[MeasuredPoint], main: str, board: str, digest: str) -> dict[str, Any]:
     """front.json: the best settings on the recordings' own skin, which models are exported for."""
     return {
         "format": 1,
         "task": main,
         "board": board,
+        "data_digest": digest,
         "points": [
             {
                 "window_s": point.window_s,
