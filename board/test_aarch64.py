@@ -30,12 +30,13 @@ HARD = CHECKOUT / "build" / "hard-cases" / "golden"
 TABLE = aarch64.FOLDER / "instructions.csv"
 
 NOT_EMULATED = {
+    "tests/edge/commands/test_fake.py": "exports a model: the workstation's packages",
     "tests/edge/commands/test_owner_loop.py": "exports a model: the workstation's packages",
     "tests/edge/test_recording.py::test_any_metadata_is_read_or_refused_with_a_sentence": (
         "hundreds of damaged files; parsing them is the same Python everywhere"
     ),
     "tests/edge/i2c/test_smbus2.py": "preloads a library that the machine's compiler makes",
-    "tests/edge/runtime/test_loop.py::test_a_long_run_neither_grows_nor_drifts": "takes a minute",
+    "tests/edge/skin/test_loop.py::test_a_long_run_neither_grows_nor_drifts": "takes a minute",
 }
 
 
