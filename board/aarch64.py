@@ -27,7 +27,7 @@ CPU = "cortex-a72"
 EMULATOR = ("qemu-user",)
 SYSTEM = ("python3-minimal", "libpython3-stdlib", "libstdc++6", "libgomp1")
 BOARD = ("numpy", "onnxruntime", "smbus2")
-TESTING = ("hypothesis", "mpmath", "onnx", "psutil", "pytest", "pytest-xdist", "scipy")
+TESTING = "hypothesis joblib mpmath onnx psutil pytest pytest-xdist scipy tqdm".split()
 PLATFORMS = ("manylinux2014", "manylinux_2_17", "manylinux_2_27", "manylinux_2_28")
 
 CPUINFO = """\

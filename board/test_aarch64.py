@@ -35,6 +35,7 @@ NOT_EMULATED = {
     "tests/edge/test_recording.py::test_any_metadata_is_read_or_refused_with_a_sentence": (
         "hundreds of damaged files; parsing them is the same Python everywhere"
     ),
+    "tests/edge/i2c/test_serial_bus.py": "waits for a terminal that answers in real time",
     "tests/edge/i2c/test_smbus2.py": "preloads a library that the machine's compiler makes",
     "tests/edge/skin/test_loop.py::test_a_long_run_neither_grows_nor_drifts": "takes a minute",
 }
