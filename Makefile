@@ -56,7 +56,7 @@ test: lint types
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml
-SIMULATED := $(OUT)/cody18
+SIMULATED := $(OUT)/$(basename $(notdir $(SCENE)))
 
 $(SIMULATED)/.made: $(READY) $(SCENE) $(wildcard train/simulate/*.py train/simulate/effects/*.py)
 	rm -rf $(SIMULATED)
