@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 from edge import recording
 from edge.errors import InputError
 from edge.recording import Recording
+from train.cluster import on_cluster
 from train.simulate.assemble import make_plan
 from train.simulate.convergence import choose_step
 from train.simulate.engine import Batch, Kind, kind_of, read_out
@@ -218,25 +217,13 @@ def _on_cores(
 def _on_dask(
     scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], address: str | None
 ) -> Iterator[list[Simulated]]:
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise InputError(
-            "--backend dask needs Dask: pip install 'edge-classify[cluster]'"
-        ) from None
-    try:
-        client = distributed.Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise InputError(f"--address {address}: no Dask scheduler answers there: {error}") from None
-    with closing(client):
-        spread = client.scatter(scene, broadcast=True)
-        futures = [
-            client.submit(simulate_part, spread, trials, step_s, None, pure=False)
-            for trials, step_s in work
-        ]
-        for future in distributed.as_completed(futures):
-            yield future.result()
-            future.release()
+    from joblib import Parallel, delayed
+
+    with on_cluster(address):
+        run = Parallel(n_jobs=-1, return_as="generator_unordered")
+        yield from run(
+            delayed(simulate_part)(scene, trials, step_s, None) for trials, step_s in work
+        )
 
 
 def total_trials(scene: Scene) -> int:

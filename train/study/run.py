@@ -6,14 +6,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from contextlib import closing, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import joblib
 
 from edge.errors import InputError
+from train.cluster import on_cluster
 from train.dataset import load_trials
 from train.report import html as report
 from train.report.tables import Section
@@ -78,7 +76,8 @@ def study(
             f"every trial has the same {' and the same '.join(alike)}: there is nothing to tell "
             "apart; give recordings of two classes or more"
         )
-    with _cluster(address) as backend:
+    backend = None if address is None else "dask"
+    with nullcontext() if address is None else on_cluster(address):
         context.cluster = backend
         # First, as it is what finds out whether the scene is that of the recordings.
         others = robust.section(context)
@@ -128,23 +127,3 @@ def _again(scene: Scene, count: int, like: Context) -> list[paper.Numbers]:
             part(context)
         found.append(context.ours)
     return found
-
-
-def _cluster(address: str | None) -> Any:
-    """A context that gives the joblib backend's name, or None for this machine."""
-    if address is None:
-        return nullcontext(None)
-    from contextlib import contextmanager
-
-    from distributed import Client
-
-    @contextmanager
-    def connected() -> Any:
-        try:
-            client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
-        except (OSError, TimeoutError, ValueError) as error:
-            raise InputError(f"no Dask scheduler at {address}: {error}") from None
-        with closing(client), joblib.parallel_config("dask"):
-            yield "dask"
-
-    return connected()
