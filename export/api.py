@@ -15,7 +15,8 @@ import numpy as np
 
 from edge import __version__
 from edge.files import write_whole
-from edge.model.model import Model, ModelInfo, Task
+from edge.model.info import ModelInfo, Task
+from edge.model.model import Model
 from edge.touch import measures
 from edge.touch.features import feature_vector
 from export import golden

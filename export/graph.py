@@ -18,7 +18,7 @@ from onnx import TensorProto, helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
-from edge.model.model import METADATA_KEY, ModelInfo
+from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.onnx_file import check
 from export.build import OPSET, Builder, project, widened
 from train.pipeline import NEAREST_OF_LABEL, ContactClassifier, Space

@@ -10,7 +10,7 @@ import pytest
 
 from edge import cli
 from edge.i2c import block
-from edge.model.model import FORMAT
+from edge.model.info import FORMAT
 from export.__main__ import main as export
 
 ROOT = Path(__file__).parents[1]

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from edge.commands.output import Output
-from edge.model.model import Model, ModelInfo
+from edge.model.info import ModelInfo
+from edge.model.model import Model
 
 ROUNDS = 200
 

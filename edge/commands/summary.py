@@ -9,7 +9,7 @@ from typing import Any
 
 from edge.classifier import AS_TRAINED
 from edge.errors import printable
-from edge.model.model import Task
+from edge.model.info import Task
 
 NONE = "(none)"
 """The column of trials without a decision."""

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import open_regular
-from edge.model.model import ModelInfo
+from edge.model.info import ModelInfo
 from edge.runtime.event_writer import LineWriter, json_line
 
 LARGEST_BYTES = 1 << 32

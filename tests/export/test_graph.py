@@ -7,7 +7,8 @@ import numpy as np
 import onnx
 import pytest
 
-from edge.model.model import Model, ModelInfo, Task
+from edge.model.info import ModelInfo, Task
+from edge.model.model import Model
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings

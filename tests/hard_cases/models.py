@@ -18,7 +18,8 @@ from sklearn.decomposition import PCA
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
-from edge.model.model import Model, ModelInfo, Task
+from edge.model.info import ModelInfo, Task
+from edge.model.model import Model
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings

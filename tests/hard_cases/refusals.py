@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
-from edge.model.model import ModelInfo
+from edge.model.info import ModelInfo
 from edge.recording import Recording, load, save
 from edge.runtime import touch_map as touchmap
 from edge.runtime.joint_stream import Joints

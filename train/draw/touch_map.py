@@ -13,7 +13,7 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.model.model import ModelInfo
+from edge.model.info import ModelInfo
 from edge.runtime.touch_map import TouchMap
 from train.draw.recording import link_positions
 

@@ -14,7 +14,8 @@ from onnx import TensorProto, helper
 
 from edge.errors import InputError
 from edge.model import onnx_file as onnxfile
-from edge.model.model import FORMAT, METADATA_KEY, Model
+from edge.model.info import FORMAT, METADATA_KEY
+from edge.model.model import Model
 
 
 @pytest.fixture(scope="module")

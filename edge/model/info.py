@@ -1,0 +1,223 @@
+"""What a model file says of itself: the metadata beside the graph."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from edge.config import ConfigTable, parse_json, shown
+from edge.errors import InputError
+from edge.model.stopping import Novelty, Stopping
+from edge.touch import measures
+from edge.touch.arm import Chain
+from edge.touch.features import widths
+from edge.touch.layout import SkinLayout
+from edge.touch.track import TrackSettings
+
+METADATA_KEY = "edge-classify"
+FORMAT = 3
+
+
+@dataclass(frozen=True)
+class Task:
+    """One question that the model answers, and how it was fitted.
+
+    Attributes:
+        labels: the answers, in the order of the scores.
+        k: neighbours that vote.
+        components: coordinates that distances are measured in.
+        scaling: "none" or "I" to "V" (paper, Eqs. 1 to 5).
+        accuracy: nested accuracy of the whole choice at export, 0 to 1.
+        projection: "pca" (principal components) or "lda" (discriminants).
+        features: those that it takes, in the order of the model's; all where empty.
+        left_out: what the accuracy left out as a whole: "trial", or a label such as "object".
+        no_contact: the answer where a recording ends without a contact, or None.
+    """
+
+    labels: tuple[str, ...]
+    k: int
+    components: int
+    scaling: str
+    accuracy: float
+    projection: str = "pca"
+    features: tuple[str, ...] = ()
+    left_out: str = "trial"
+    no_contact: str | None = None
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """A model's metadata: all that the board needs besides the weights."""
+
+    tasks: dict[str, Task]
+    layout: SkinLayout
+    tracking: TrackSettings
+    window_s: float
+    samples: int
+    features: tuple[str, ...]
+    units: dict[str, str]
+    motion_frame: str
+    """`world` (with joint angles) or `skin`."""
+    chain: Chain | None
+    rows: int
+    """Training trials."""
+    data_digest: str
+    versions: dict[str, str] = field(default_factory=dict)
+    decision_points_s: tuple[float, ...] = ()
+    """Windows at which the model can be asked, the last the full one; none without calibration."""
+    stopping: dict[str, Stopping] = field(default_factory=dict)
+    """Of each task, where there are decision points."""
+    novelty: Novelty | None = None
+    """Where there are decision points."""
+    joints: int = 0
+    """Joint angles of a frame, where a feature is made of them."""
+
+    @property
+    def width(self) -> int:
+        """Length of a feature vector."""
+        return sum(widths(self.features, self.samples, self.layout, self.joints))
+
+    @property
+    def dof(self) -> int | None:
+        """Joint angles that a frame must bring; None where the model needs none."""
+        return (self.joints or None) if self.chain is None else self.chain.dof
+
+    def to_json(self) -> str:
+        """As the model file carries it."""
+        calibration: dict[str, Any] = {}
+        if self.decision_points_s and self.novelty is not None:
+            calibration = {
+                "decision_points_s": self.decision_points_s,
+                "stopping": {task: one.to_dict() for task, one in self.stopping.items()},
+                "novelty": self.novelty.to_dict(),
+            }
+        return json.dumps(
+            {
+                **calibration,
+                "format": FORMAT,
+                "tasks": {name: vars(task) for name, task in self.tasks.items()},
+                "skin": self.layout.to_dict(),
+                "tracking": vars(self.tracking),
+                "window_s": self.window_s,
+                "samples": self.samples,
+                "features": self.features,
+                "units": self.units,
+                "motion_frame": self.motion_frame,
+                "arm": None if self.chain is None else self.chain.to_dict(),
+                **({"joints": self.joints} if self.joints else {}),
+                "rows": self.rows,
+                "data_digest": self.data_digest,
+                "versions": self.versions,
+            },
+            sort_keys=True,
+            allow_nan=False,
+            ensure_ascii=False,
+        )
+
+    @classmethod
+    def from_json(cls, text: str, name: str) -> ModelInfo:
+        """Read what `to_json` wrote.
+
+        Raises:
+            InputError: something is missing or of the wrong kind; the sentence names `name`.
+        """
+        where = f"{name}: its metadata"
+        try:
+            meta = ConfigTable(parse_json(text, where), where)
+            if meta.whole("format") != FORMAT:
+                raise InputError(
+                    f"{where} is of format {shown(meta.raw['format'])}, this edge-classify reads "
+                    f"{FORMAT}"
+                )
+            tasks, tracking = meta.table("tasks"), meta.table("tracking")
+            points = tuple(meta.numbers("decision_points_s", default=()))
+            stopping, novelty = _calibration(meta.raw, len(points), where)
+            info = cls(
+                tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
+                layout=SkinLayout.from_dict(meta.get("skin"), where=where),
+                tracking=TrackSettings(
+                    tracking.whole("debounce", allowed=range(1, 1001)),
+                    tracking.whole("connectivity", allowed=(4, 8)),
+                ),
+                window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
+                samples=meta.whole("samples", allowed=range(2, 10_001)),
+                features=meta.texts("features"),
+                units={str(k): str(v) for k, v in meta.table("units").raw.items()},
+                motion_frame=meta.choice("motion_frame", ("world", "skin")),
+                chain=Chain.from_dict(meta.get("arm"), where=where) if meta.has("arm") else None,
+                rows=meta.whole("rows"),
+                data_digest=meta.text("data_digest", empty=True),
+                versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
+                decision_points_s=points,
+                stopping=stopping,
+                novelty=novelty,
+                joints=meta.whole("joints", 0, allowed=range(0, 1001)),
+            )
+            tracking.done()
+        except InputError as error:
+            raise InputError(f"{error}; export it again") from None
+        info._check(name)
+        return info
+
+    def _check(self, name: str) -> None:
+        try:
+            types = measures.features(self.features)
+        except InputError as error:
+            raise InputError(
+                f"{name}: was made for the features {', '.join(self.features)}; {error}; "
+                "export it with this version of edge-classify"
+            ) from None
+        of_joints = any(feature.of_joints for feature in types)
+        dof = self.joints if self.chain is None else self.chain.dof
+        if self.joints != (dof if of_joints else 0) or of_joints > (self.joints > 0):
+            raise InputError(f"{name}: its features and its joints disagree; export it again")
+        if not self.tasks:
+            raise InputError(f"{name}: its metadata names no task; export it again")
+        if self.decision_points_s:
+            before = (0.0, *self.decision_points_s[:-1])
+            rising = all(a < b for a, b in zip(before, self.decision_points_s, strict=True))
+            if (
+                not rising
+                or self.decision_points_s[-1] != self.window_s
+                or self.stopping.keys() != self.tasks.keys()
+                or self.novelty is None
+                or self.novelty.task not in self.tasks
+            ):
+                raise InputError(f"{name}: its decision points make no sense; export it again")
+        if (self.motion_frame == "world") != (self.chain is not None):
+            raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
+
+
+def _task(table: ConfigTable) -> Task:
+    labels = table.texts("labels")
+    if not labels:
+        raise table.fail("labels", "a list of at least one text")
+    task = Task(
+        labels,
+        k=table.whole("k", allowed=range(1, 1 << 31)),
+        components=table.whole("components", allowed=range(1 << 31)),
+        scaling=table.text("scaling"),
+        accuracy=table.number("accuracy", low=0.0, high=1.0),
+        projection=table.text("projection"),
+        features=table.texts("features"),
+        left_out=table.text("left_out"),
+        no_contact=table.text("no_contact") if table.has("no_contact") else None,
+    )
+    table.done()
+    return task
+
+
+def _calibration(
+    meta: Mapping[str, Any], points: int, where: str
+) -> tuple[dict[str, Stopping], Novelty | None]:
+    """The stopping rules of each task and the limits of novelty, of a model that has them."""
+    if not points:
+        return {}, None
+    try:
+        stopping = meta["stopping"].items()
+        rules = {str(task): Stopping.from_dict(entry, points) for task, entry in stopping}
+        return rules, Novelty.from_dict(meta["novelty"], points)
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
+        raise InputError(f"{where}: its stopping rules cannot be read") from None
