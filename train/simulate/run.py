@@ -64,6 +64,11 @@ def steps(scene: Scene) -> dict[Kind, float]:
     }
 
 
+def file_name(scene: Scene, trial: TrialSpec) -> str:
+    """Of a trial's recording."""
+    return f"{trial.key}-{trial.number:0{len(str(max(scene.count - 1, 10)))}d}.npz"
+
+
 def recordings(
     batch: Batch, scene: Scene, step_s: float, wanted: NDArray[np.bool_] | None = None
 ) -> Iterator[tuple[str, Recording]]:
@@ -76,7 +81,7 @@ def recordings(
         kept = slice(None) if batch.kept is None else batch.kept[i]
         t = batch.t if batch.times is None else batch.times[i]
         soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
-        name = f"{trial.key}-{trial.number:0{len(str(max(scene.count - 1, 10)))}d}"
+        file = file_name(scene, trial)
         meta: dict[str, Any] = {
             "labels": {
                 "category": f"{soft}-{trial.condition}",
@@ -87,7 +92,7 @@ def recordings(
             "skin": skin,
             "arm": arm,
             "source": f"simulated: {scene.name}",
-            "trial": name,
+            "trial": Path(file).stem,
             "simulation": {
                 "seed": scene.seed,
                 "step_s": step_s,
@@ -98,7 +103,7 @@ def recordings(
             },
         }
         yield (
-            f"{name}.npz",
+            file,
             Recording(
                 t=t[kept],
                 frames=batch.counts[i][kept],

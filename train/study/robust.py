@@ -15,11 +15,10 @@ from edge.touch.track import TrackSettings
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
 from train.simulate.assemble import make_plan
-from train.simulate.engine import kind_of, read_out
-from train.simulate.run import parts, recordings
+from train.simulate.engine import kind_of, read_out, run_physics
+from train.simulate.run import file_name, parts, recordings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
-from train.simulate.truth import true_runs
 from train.study.context import Context
 from train.study.score import grid_search, transfer
 from train.study.skins import follow, vectors
@@ -88,7 +87,7 @@ def measured(
 
     Args:
         scenes: {name: scene} that differ in their sensor alone.
-        trials: of one kind.
+        trials: of one kind, as they were drawn.
         step_s: of the physics.
         wanted: file names of the trials to follow.
         layout: the skin, with its thresholds.
@@ -104,30 +103,40 @@ def measured(
         for name, scene in scenes.items()
     }
     shown = next(iter(scenes))
-    found: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
-    for physics, true in true_runs(scenes[shown], trials, step_s, plans[shown]):
-        for name, scene in scenes.items():
-            batch = recordings(read_out(physics, plans[name]), scene, step_s, true)
-            kept = {file: recording for file, recording in batch if file in wanted}
-            contacts = follow(list(kept.values()), layout, tracking, chain)
-            found[name].update(zip(kept, contacts, strict=True))
+    physics = run_physics(scenes[shown], trials, step_s, plan=plans[shown])
+    found: dict[str, dict[str, FeatureSeries | None]] = {}
+    for name, scene in scenes.items():
+        batch = recordings(read_out(physics, plans[name]), scene, step_s)
+        kept = {file: recording for file, recording in batch if file in wanted}
+        contacts = follow(list(kept.values()), layout, tracking, chain)
+        found[name] = dict(zip(kept, contacts, strict=True))
     return found
 
 
 def anew(context: Context, scenes: Mapping[str, Scene]) -> dict[str, list[FeatureSeries | None]]:
     """{name: the data set's trials, in its order, as simulated anew from each scene}.
 
+    A trial is the same draw in every scene, the one that did as its label says when it was
+    recorded: a slower or weaker arm that no longer moves it does not change what it is.
+
     Raises:
         InputError: a scene has no trial of a recording's name.
     """
     data = context.dataset
     wanted = [trial.path.name for trial in data.trials]
+    redrawn = {
+        file: int(recording.meta.get("simulation", {}).get("redrawn", 0))
+        for file, recording in zip(wanted, context.recordings, strict=True)
+    }
     alike = [{name: scenes[name] for name in names} for names in groups(scenes)]
-    cases = [
-        (group, trials, step_s, set(wanted), data.layout, data.tracking, data.chain)
-        for group in alike
-        for trials, step_s in parts(next(iter(group.values())))
-    ]
+    cases = []
+    for group in alike:
+        shown = next(iter(group.values()))
+        for trials, step_s in parts(shown):
+            drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
+            cases.append(
+                (group, drawn, step_s, set(wanted), data.layout, data.tracking, data.chain)
+            )
     merged: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
     for answer in context.map("simulated anew", measured, cases):
         for name, contacts in answer.items():

@@ -85,3 +85,17 @@ def test_recordings_of_another_scene_are_refused(context, scene, monkeypatch):
     other = replace(context, scene=replace(scene, seed=scene.seed + 1))
     with pytest.raises(InputError, match="cody18 gives other trials than these recordings"):
         robust.section(other)
+
+
+def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_it(scene, tmp_path):
+    """What a heavy thing does under half the force is no contradiction of its label."""
+    heavy = tuple(o for o in scenes.load(SCENE, count=2).objects if o.name == "wooden crate")
+    alone = replace(scene, objects=heavy)
+    weak = variants(alone)["arm stiffness x 0.5"]
+    with pytest.raises(InputError, match="contradicted"):
+        list(simulate(weak))
+    folder = tmp_path / "crates"
+    write(alone, folder)
+    crates = Context(load_trials([folder]), alone, jobs=1)
+    (series,) = anew(crates, {"weak": weak}).values()
+    assert all(contact is not None for contact in series)
