@@ -56,7 +56,7 @@ def asked(built):
 
 def bench_decision_of_all_tasks(against, note, asked):
     model, series = asked
-    vector = feature_vector(series, model.info.window_s, model.info.samples)
+    vector = feature_vector(series, model.info.window_s, model.info.samples, model.info.features)
     share = against(lambda: model.decide(vector), {}) / FRAME_S
     note("a 10 ms frame", share, "at most 0.01")
 

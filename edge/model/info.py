@@ -75,9 +75,14 @@ class ModelInfo:
     """Joint angles of a frame, where a feature is made of them."""
 
     @property
+    def widths(self) -> tuple[int, ...]:
+        """How many values of a feature vector each feature takes, in their order."""
+        return widths(self.features, self.samples, self.layout, self.joints)
+
+    @property
     def width(self) -> int:
         """Length of a feature vector."""
-        return sum(widths(self.features, self.samples, self.layout, self.joints))
+        return sum(self.widths)
 
     @property
     def dof(self) -> int | None:

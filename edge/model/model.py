@@ -240,8 +240,11 @@ class Model:
                 "the features are too large for the model to measure a distance to them"
             )
         bad = int(np.argmin(np.isfinite(x)))
-        feature = self.info.features[bad // self.info.samples]
-        return InputError(f"sample {bad % self.info.samples} of {feature} is not finite")
+        ends = np.cumsum(self.info.widths)
+        place = int(ends.searchsorted(bad, side="right"))
+        feature = self.info.features[place]
+        within = bad - int(ends[place]) + self.info.widths[place]
+        return InputError(f"value {within} of {feature} is not finite")
 
 
 def require_joints(model: Model, dof: int | None, where: str) -> None:

@@ -2,13 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from edge.cli import main as edge_classify
+from edge.errors import InputError
 from edge.model.model import Model
 from export.__main__ import main
 
-SIX = ["skin_force", "right_length", "left_width", "skin_slant", "regions", "contact_area_rate"]
+SIX = ["skin_force", "right_length", "left_width", "skin_slant", "regions", "contact_area_rate@10"]
 
 
 @pytest.fixture(scope="module")
@@ -22,10 +24,17 @@ def six(recordings, tmp_path_factory):
 def test_the_model_says_what_it_measures_and_in_which_units(six):
     info = Model(six / "model.onnx").info
     assert info.features == tuple(SIX)
-    assert (info.samples, info.width) == (20, 120)
+    assert (info.samples, info.width) == (20, 5 * 20 + 10)
     assert info.units["skin_force"] == "newton"
-    assert info.units["contact_area_rate"] == "taxel/s"
+    assert info.units["contact_area_rate@10"] == "taxel/s"
     assert (info.chain, info.motion_frame) == (None, "skin")
+
+
+def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six):
+    vector = np.zeros(110)
+    vector[105] = np.nan
+    with pytest.raises(InputError, match="value 5 of contact_area_rate@10 is not finite"):
+        Model(six / "model.onnx").decide(vector)
 
 
 def test_its_golden_file_holds(six, capsys):
@@ -50,7 +59,7 @@ def test_replay_decides_with_it(six, recordings, capsys):
     [
         (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
         (["--samples", "1"], "--samples must be 2 to 1000"),
-        (["--features", *SIX, "--samples", "700"], "4200 values a trial are more than the 4096"),
+        (["--features", *SIX, "--samples", "900"], "4510 values a trial are more than the 4096"),
     ],
 )
 def test_what_cannot_be_measured_is_one_sentence_and_writes_nothing(
