@@ -12,7 +12,7 @@ take 55 fits, not 110.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,7 +26,7 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of
-from train.projection import Grid, Spectrum, gains_of, on_grid, widths_of
+from train.projection import Spectrum, gains_of, widths_of
 
 FOLDS = 10
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
@@ -127,53 +127,65 @@ def group_folds(groups: NDArray[np.str_], count: int = 20, seed: int = 2012) -> 
 
 
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order.
+    """(..., m, k) columns of the smallest of (..., m, n), nearest first, equal ones in their order.
 
     Which of several equal ones is the last of the k is left open.
     """
-    among = np.sort(np.argpartition(squares, k - 1, axis=1)[:, :k], axis=1)
-    order = np.argsort(np.take_along_axis(squares, among, axis=1), axis=1, kind="stable")
-    return np.take_along_axis(among, order, axis=1)
+    among = np.sort(np.argpartition(squares, k - 1, axis=-1)[..., :k], axis=-1)
+    order = np.argsort(np.take_along_axis(squares, among, axis=-1), axis=-1, kind="stable")
+    return np.take_along_axis(among, order, axis=-1)
 
 
-def _squares(
-    z: NDArray[np.float64], train: NDArray[np.int64], test: NDArray[np.int64], columns: range
-) -> NDArray[np.float64]:
-    """(test, train) squared distances along some columns, taken directly."""
-    out = np.zeros((len(test), len(train)))
-    gap = np.empty_like(out)
-    for column in columns:
-        np.subtract(z[test, column, None], z[train, column], out=gap)
-        gap *= gap
-        out += gap
-    return out
+def _integers(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Coordinates (n, c) and (m, c) in steps so coarse that `_squares` are exact.
+
+    The steps are 2^-22 of the largest coordinate, or finer: trials that are equal are equal still.
+    """
+    columns = max(a.shape[1], 1)
+    bits = (51 - (columns - 1).bit_length()) // 2
+    exponent = np.frexp(max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)))[1]
+    return np.rint(np.ldexp(a, bits - exponent)), np.rint(np.ldexp(b, bits - exponent))
+
+
+def _squares(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, n) squared distances of rows a (m, c) to rows b (n, c) of `_integers`."""
+    lengths = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1)
+    return np.asarray(lengths - 2.0 * (a @ b.T))
 
 
 def _neighbours(
     spectrum: Spectrum,
-    d: NDArray[np.float64],
+    new: NDArray[np.float64],
     labels: NDArray[np.int64] | None,
-    train: NDArray[np.int64],
-    test: NDArray[np.int64],
     grid: SearchGrid,
-) -> Iterator[NDArray[np.int64]]:
-    """(test, k) places among `train` of each projection of the grid."""
-    k = min(grid.neighbours[-1], len(train))
-    exact = Grid(float(np.abs(d[train]).max(initial=0.0)))
-    if grid.projection == "pca":
-        axes = spectrum.leading(grid.components[-1])
-        z = exact.project(d, on_grid(axes.T))
-        squares, done = np.zeros((len(test), len(train))), 0
+) -> NDArray[np.int64]:
+    """(projections, test, k) places among the trials of a spectrum, for each of the grid's.
+
+    The coordinates are those of `train.projection.Projection` but for its rounding of weights.
+
+    Args:
+        new: (test, p) rows.
+        labels: (targets, n) of the trials of the spectrum; None of principal components.
+    """
+    k = min(grid.neighbours[-1], len(spectrum.scores))
+    squares = []
+    if labels is None:
+        axes = spectrum.leading(grid.components[-1]).T
+        near, far = _integers(spectrum.rows @ axes, new @ axes)
+        so_far, done = np.zeros((len(far), len(near))), 0
         for count in grid.components:
-            squares += _squares(z, train, test, range(done, min(count, len(axes))))
-            done = max(done, min(count, len(axes)))
-            yield _nearest(squares, k)
-        return
-    assert labels is not None
-    for shrinkage in grid.shrinkages:
-        weights = np.hstack([spectrum.discriminants(one, shrinkage) for one in labels])
-        z = exact.project(d, on_grid(weights))
-        yield _nearest(_squares(z, train, test, range(z.shape[1])), k)
+            so_far = so_far + _squares(far[:, done:count], near[:, done:count])
+            done = count
+            squares.append(so_far)
+    else:
+        scores = spectrum.scores_of(new)
+        for shrinkage in grid.shrinkages:
+            directions = np.hstack([spectrum.directions(one, shrinkage) for one in labels])
+            near, far = _integers(spectrum.scores @ directions, scores @ directions)
+            squares.append(_squares(far, near))
+    return _nearest(np.stack(squares), k)
 
 
 def _answers(
@@ -193,34 +205,30 @@ def _answers(
             key = grid.scaling, grid.features
             if key not in spectra:
                 part = X[:, columns_of(grid.features, features, widths)]
+                known = part[train]
                 taken = [i for i, f in enumerate(features) if f in (grid.features or features)]
                 gains = gains_of(
-                    part[train],
+                    known,
                     grid.scaling,
                     [features[i] for i in taken],
                     [widths[i] for i in taken],
                 )
-                d = (part - part[train].mean(axis=0)) * gains
-                spectra = {key: (Spectrum(d[train]), d)}
-            spectrum, d = spectra[key]
-            pick = [k - 1 for k in grid.neighbours]
-            shared = (
-                list(_neighbours(spectrum, d, None, train, test, grid))
-                if grid.projection == "pca"
-                else None
-            )
+                mean = known.mean(axis=0)
+                spectra = {key: (Spectrum((known - mean) * gains), (part[test] - mean) * gains)}
+            spectrum, new = spectra[key]
+            shared = _neighbours(spectrum, new, None, grid) if grid.projection == "pca" else None
             for task, labels in classes.items():
                 if grid.tasks and task not in grid.tasks:
                     continue
                 near = shared
                 if near is None:
                     targets = np.stack([classes[t][train] for t in grid.targets or (task,)])
-                    near = list(_neighbours(spectrum, d, targets, train, test, grid))
-                for places in near:
-                    right = votes_right(places, labels[train], labels[test])
-                    most = right.shape[1] - 1
-                    found[task] += [right[:, min(j, most)] for j in pick]
-    return {task: np.array(right) for task, right in found.items()}
+                    near = _neighbours(spectrum, new, targets, grid)
+                right = votes_right(near, labels[train], labels[test])
+                pick = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
+                # A row a candidate: of each projection, each k.
+                found[task].append(right[..., pick].transpose(0, 2, 1).reshape(-1, len(test)))
+    return {task: np.concatenate(right) for task, right in found.items()}
 
 
 def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]) -> int:

@@ -208,28 +208,35 @@ class Spectrum:
 
     Attributes:
         values: (r,) eigenvalues above their own rounding, the largest first.
+        rows: (n, p) centred.
         scores: (n, r) coordinates of the rows along the eigenvectors.
     """
 
     def __init__(self, X: NDArray[np.float64]) -> None:
         self._given = X
-        _, self._rows, _ = _centred(X)
-        n, p = self._rows.shape
+        _, self.rows, _ = _centred(X)
+        n, p = self.rows.shape
         self._dual = n < p
-        scatter = self._rows @ self._rows.T if self._dual else self._rows.T @ self._rows
+        scatter = self.rows @ self.rows.T if self._dual else self.rows.T @ self.rows
         values, vectors = np.linalg.eigh(scatter)
         keep = values > max(n, p) * np.finfo(float).eps * values[-1]
         self.values = np.ascontiguousarray(values[keep][::-1])
         self._vectors = np.ascontiguousarray(vectors[:, keep][:, ::-1])
         roots = np.sqrt(self.values)
-        self.scores = self._vectors * roots if self._dual else self._rows @ self._vectors
+        self.scores = self._vectors * roots if self._dual else self.rows @ self._vectors
 
     def _lift(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions (r, c) among the eigenvectors as weights of the columns (p, c)."""
         if not self._dual:
             return self._vectors @ directions
         over = directions / np.sqrt(self.values)[:, None]
-        return np.asarray(self._rows.T @ (self._vectors @ over))
+        return np.asarray(self.rows.T @ (self._vectors @ over))
+
+    def scores_of(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, r) coordinates of other rows (m, p), less the mean of the given, along the same."""
+        if not self._dual:
+            return np.asarray(rows @ self._vectors)
+        return np.asarray((rows @ self.rows.T) @ (self._vectors / np.sqrt(self.values)))
 
     def leading(self, count: int) -> NDArray[np.float64]:
         """(c, p) the first principal axes up to sign, quicker than `principal_axes`.
@@ -240,7 +247,7 @@ class Spectrum:
         `principal_axes`.
         """
         if (
-            count < min(self._rows.shape)
+            count < min(self.rows.shape)
             and count <= len(self.values)
             and self.values[count - 1] > WELL_CONDITIONED * self.values[0]
         ):
@@ -261,11 +268,17 @@ class Spectrum:
             labels: (n,) class indices.
             shrinkage: above 0.
         """
+        weights = self._lift(self.directions(labels, shrinkage))
+        return np.asarray(weights * _signs(weights.T))
+
+    def directions(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
+        """(r, c) `discriminants` among the eigenvectors: `scores` times them are coordinates."""
         n = len(labels)
         ridge = shrinkage * float(self.values.sum()) / n
         root = 1.0 / np.sqrt(self.values + ridge)
         sizes = np.bincount(labels)
-        sizes, labels = sizes[sizes > 0], np.unique(labels, return_inverse=True)[1]
+        if not sizes.all():
+            sizes, labels = sizes[sizes > 0], np.unique(labels, return_inverse=True)[1]
         members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
         # The rows are centred, so the members' indicators need not be.
         means = root[:, None] * (self.scores.T @ (members / np.sqrt(sizes)))
@@ -275,8 +288,7 @@ class Spectrum:
         z = self.scores @ directions
         within = z - (members.T @ z / sizes[:, None])[labels]
         variance = ((within**2).sum(axis=0) + ridge * (directions**2).sum(axis=0)) / n
-        weights = self._lift(directions / np.sqrt(variance))
-        return np.asarray(weights * _signs(weights.T))
+        return np.asarray(directions / np.sqrt(variance))
 
 
 def check_columns(columns: int) -> None:

@@ -1,5 +1,7 @@
 """Nested accuracy against doing it the long way with the exported estimators."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
@@ -49,6 +51,20 @@ def test_every_answer_is_that_of_the_exported_estimators():
             test = np.flatnonzero(folds == j)
             for choice, right in zip(table.choices["t"], table.right["t"][i], strict=True):
                 assert (right[test] == told(choice, X, y, train, test)).all()
+
+
+def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
+    """Each trial has a twin of another label: the earlier of equally near ones decides."""
+    X, y = trials(18)
+    X, y = np.repeat(X, 2, axis=0), np.array(["a", "b", "b", "c", "c", "a"] * 6)
+    folds = np.repeat(np.arange(18) % 3, 2)
+    grids = [replace(grid, neighbours=(1, 2)) for grid in GRIDS]
+    for scale in (1.0, 1e-9, 1e9):
+        table = evaluate(X * scale, {"t": y}, folds, grids, features=TWO)
+        for fold in range(3):
+            train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+            for choice, right in zip(table.choices["t"], table.right["t"][fold], strict=True):
+                assert (right[test] == told(choice, X * scale, y, train, test)).all()
 
 
 def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
