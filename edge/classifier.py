@@ -82,6 +82,10 @@ class Classifier:
     measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
     `out_of_range` (there is no label, as the features are too large to be measured against the
     training rows).
+
+    A task that was trained with recordings of no contact is decided by `finish` where there was
+    none, flagged `no_contact` and at the time of the last frame; `missing_taxels` says that a
+    frame lacked some.
     """
 
     def __init__(
@@ -136,6 +140,8 @@ class Classifier:
         self._numbers: dict[Contact, int] = {}
         """The contacts under way."""
         self._begun = 0
+        self._end_s: float | None = None
+        self._missing_taxels = False
 
     def _begin(self, contact: Contact, number: int) -> _Waiting:
         tasks = self.model.info.tasks
@@ -151,6 +157,9 @@ class Classifier:
         """
         began = time.perf_counter()
         events: list[Event] = []
+        self._end_s = frame.t
+        if frame.valid is not None and self._begun == 0 and not self._missing_taxels:
+            self._missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         for contact in self.tracker.push(frame):
             number = self._numbers.get(contact)
             if number is None:
@@ -171,10 +180,20 @@ class Classifier:
         return events
 
     def finish(self) -> list[Event]:
-        """The stream has ended: decide what is still waiting, flagged `short`."""
+        """The stream has ended: decide what waits, flagged `short`, or that nothing was touched."""
         began = time.perf_counter()
         waiting, self._waiting = self._waiting, []
+        if self._begun == 0 and self._end_s is not None:
+            return list(self._untouched(self._end_s, began))
         return [event for one in waiting for event in self._decide(one, began, short=True)]
+
+    def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
+        """The decisions on a stream without contact, of the tasks that have a label for it."""
+        flags = ("no_contact", "missing_taxels") if self._missing_taxels else ("no_contact",)
+        for name, task in self.model.info.tasks.items():
+            if task.no_contact is not None:
+                latency_ms = round((time.perf_counter() - began) * 1e3, 3)
+                yield Decided(name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags)
 
     def classify(self, recording: Recording) -> Iterator[Event]:
         """Decide on a recording from its first frame, as the board would have.

@@ -45,7 +45,7 @@ class Decided:
         confidence: the label's share of the votes, 0 to 1; with an error rate, the calibrated
             probability that the label is right.
         window_s: seconds from onset that it was decided on.
-        onset_s: when the contact began.
+        onset_s: when the contact began; without a contact, when the stream ended.
         latency_ms: from the frame that completed the window to the answer.
         flags: what to know about it, see `Classifier`.
         error: how often a decision may be wrong, where that was asked for and is certified.

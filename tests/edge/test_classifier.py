@@ -55,6 +55,26 @@ def test_classify_and_watch_give_what_pushing_the_frames_gives(model, make_touch
     ]
 
 
+def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_recordings(
+    exported, make_touch
+):
+    model = Model(exported / "model.onnx")
+    touch = make_touch()
+    quiet = replace(touch, frames=np.zeros_like(touch.frames))
+    assert list(Classifier(model).classify(quiet)) == []
+    model.info.tasks["object"] = replace(model.info.tasks["object"], no_contact="none")
+    (said,) = Classifier(model).classify(quiet)
+    assert (said.task, said.label, said.confidence) == ("object", "none", 1.0)
+    assert (said.window_s, said.onset_s, said.flags) == (0.0, quiet.t[-1], ("no_contact",))
+    lacking = replace(quiet, valid=np.arange(384).reshape(16, 24) > 0)
+    (said,) = Classifier(model).classify(lacking)
+    assert said.flags == ("no_contact", "missing_taxels")
+    decided = [event for _, event in watch(model, touch) if isinstance(event, Decided)]
+    assert [event.task for event in decided] == ["category", "object"]
+    assert all(event.label != "none" for event in decided)
+    assert Classifier(model).finish() == []  # no frame at all says nothing
+
+
 def test_joint_angles_are_asked_for_before_anything_is_read(model, make_touch):
     bare = replace(make_touch(), joints=None)
     with pytest.raises(InputError, match="the recording: has no joint angles"):

@@ -7,6 +7,7 @@ import pytest
 
 import export
 import train
+from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load, save
@@ -70,6 +71,18 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
     assert "python -m train thresholds" in text
     assert "warning: 1 recordings lack a label for object and are left out: " in text
     assert "the window of 9 s is longer than any recording goes on after its onset" in text
+
+
+def test_recordings_of_no_contact_are_decided_as_such(recordings, make_touch, tmp_path):
+    still = make_touch(seconds=0.0)
+    labels = {"category": "none", "object": "hard 0"}
+    save(tmp_path / "still.npz", replace(still, meta={**still.meta, "labels": labels}))
+    paths = [str(recordings), str(tmp_path)]
+    fitted = train.fit(paths, features=["paper"], projection="pca", jobs=1)
+    assert not any("no contact" in line for line in warnings(fitted))
+    export.save(tmp_path / "model.onnx", fitted)
+    (said,) = Classifier(Model(tmp_path / "model.onnx")).classify(still)
+    assert (said.task, said.label) == ("category", "none")
 
 
 def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings, tmp_path):
