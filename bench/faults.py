@@ -365,7 +365,7 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 UNKNOWABLE = """
 * The protocol cannot tell. An AD7147's words carry no check, so that a flipped bit is a value
-(only a word of 0 and twelve of 0xFFFF are told), and an MPR121's only six spare bits of sixteen;
+(only 0, 0xFFFF and what no touch reaches are told), and an MPR121's only six spare bits of sixteen;
 a chip that serves old bytes is told after 100 frames, where its calibration has seen it make
 noise; a wrong channel is told by reading the mux back, which a skin file may switch off."""
 

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from edge.commands.output import Output
-from edge.fake.player import frame_bits, highest_raw
+from edge.fake.player import frame_bits
 from edge.skin.file import SkinFile, frame_rate, load
 
 FRAMES = 100
@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
 
 def highest_count(file: SkinFile) -> int:
     """The most counts that a touch can give on the chip with the smallest range."""
-    return min(highest_raw(chip) for chip in file.chips)
+    return min(chip.highest for chip in file.chips)
 
 
 def faults(file: SkinFile) -> Iterator[str]:

@@ -103,13 +103,6 @@ def _rest(chip: ChipSpec) -> int:
     return min(REST[chip.kind], 128 if chip.bits == 8 else 2048 if chip.bits == 12 else 65535)
 
 
-def highest_raw(chip: ChipSpec) -> int:
-    """The largest raw value of a chip."""
-    if chip.kind == "mpr121":
-        return 1023
-    return (1 << chip.bits) - 1 if chip.kind == "block" else 65534
-
-
 def fake_buses(
     file: SkinFile,
     scene: Scene,
@@ -164,7 +157,7 @@ class _Felt:
         self._top = np.full(len(self._rest), 65534, dtype=np.int64)
         for chip in spec.chips:
             places = list(chip.taxels)
-            self._gain[places], self._top[places] = chip.sign, highest_raw(chip)
+            self._gain[places], self._top[places] = chip.sign, chip.highest
         self._gain[UNUSED], self._rest[UNUSED] = 0, _rest(spec.chips[0])
         self._at, self._raw = math.nan, self._rest
 
@@ -180,7 +173,7 @@ class _Felt:
 
     def sense(self, chip: ChipSpec, noise: float, stream: np.random.Generator | None) -> Sense:
         """What one chip senses."""
-        places, top = np.array(chip.taxels), highest_raw(chip)
+        places, top = np.array(chip.taxels), chip.highest
 
         def quiet(t: float) -> NDArray[np.uint16]:
             return self.raw(t).take(places, mode="wrap").astype(np.uint16)

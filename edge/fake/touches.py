@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge import demo
-from edge.fake.player import calibrated, highest_raw
+from edge.fake.player import calibrated
 from edge.recording import Recording, load
 from edge.skin.file import UNUSED, SkinFile
 from edge.touch.layout import SkinLayout
@@ -87,7 +87,7 @@ def reach(file: SkinFile) -> int:
         for taxel in chip.taxels:
             if taxel != UNUSED:
                 at = int(rest.baseline.flat[taxel])
-                most = min(most, at - 1 if chip.sign < 0 else highest_raw(chip) - at)
+                most = min(most, at - 1 if chip.sign < 0 else chip.highest - at)
     return most
 
 

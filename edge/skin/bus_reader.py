@@ -312,7 +312,7 @@ class BusReader:
     def doubt_all(self) -> None:
         """What took one chip's power or its bus may have taken its neighbours' settings."""
         for slot in self.slots:
-            self._doubt(slot)
+            self.doubt(slot)
 
     def judge(self, slot: Slot, whole: bool) -> None:
         """Hear what the bytes of a chip that was read were like: whole, or damaged."""
@@ -320,9 +320,10 @@ class BusReader:
             slot.found_healthy = slot.check_from = 0
         elif self._frames >= slot.check_from:
             slot.damaged = True
-            self._doubt(slot)
+            self.doubt(slot)
 
-    def _doubt(self, slot: Slot) -> None:
+    def doubt(self, slot: Slot) -> None:
+        """Have a running chip's settings checked after this frame's or the next one's reading."""
         if slot.state is State.RUNNING:
             slot.suspect = self._doubts = True
 

@@ -50,6 +50,11 @@ class ChipSpec:
         way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
         return f"{way}address {self.address:#04x}"
 
+    @property
+    def highest(self) -> int:
+        """The largest raw value that it measures; an AD7147 that reads 0xFFFF is at its end."""
+        return {"ad7147": 0xFFFE, "mpr121": 1023}.get(self.kind, (1 << self.bits) - 1)
+
 
 @dataclass(frozen=True)
 class BusSpec:
@@ -78,6 +83,8 @@ class Signal:
         drift_counts_per_s: how fast the baseline follows while nothing touches.
         drift_limit_counts: how far from the calibration it may go.
         settle_s: how long after a contact it stays frozen.
+        saturation_counts: no touch takes a taxel further from its baseline: a value beyond is the
+            wire's, not the taxel's.
         dead: taxels never to be used, (row, col).
     """
 
@@ -86,6 +93,7 @@ class Signal:
     drift_counts_per_s: float = 20.0
     drift_limit_counts: int = 2000
     settle_s: float = 0.5
+    saturation_counts: int = 65535
     dead: tuple[tuple[int, int], ...] = ()
 
 
@@ -217,6 +225,7 @@ def _signal(table: ConfigTable, layout: SkinLayout, unsaid: Usual) -> tuple[Sign
             "drift_limit_counts", unsaid.drift_limit_counts, range(65536)
         ),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
+        saturation_counts=table.whole("saturation_counts", 65535, range(1, 65536)),
         dead=tuple(pairs),
     )
     table.done()

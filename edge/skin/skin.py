@@ -194,6 +194,7 @@ class Skin:
         self._stage_of = np.full(n, total, dtype=np.intp)
         self._chip_of = np.full(n, len(self._slots), dtype=np.intp)
         self._sign = np.ones(n, dtype=np.int32)
+        self._highest = np.full(n, 0xFFFF, dtype=np.int32)
         order = {id(slot): i for i, slot in enumerate(self._slots)}
         for group in self._groups:
             stage = group.stages.start
@@ -203,6 +204,7 @@ class Skin:
                         self._stage_of[taxel] = stage
                         self._chip_of[taxel] = order[id(slot)]
                         self._sign[taxel] = slot.spec.sign
+                        self._highest[taxel] = slot.spec.highest
                     stage += 1
         self._served = self._chip_of < len(self._slots)
         """Taxels that have a chip and are not dead."""
@@ -223,6 +225,14 @@ class Skin:
             step_counts=signal.drift_counts_per_s * self.period_s * FOLLOW_FRAMES,
             limit=signal.drift_limit_counts,
         )
+        reach = signal.saturation_counts + signal.drift_limit_counts
+        lowest = np.zeros(n, dtype=np.int32)
+        if calibration is not None:
+            lowest = np.maximum(self.baseline.counts - reach, 0)
+            np.minimum(self._highest, self.baseline.counts + reach, out=self._highest)
+        self._lowest = lowest.astype(np.uint16)
+        self._range = (self._highest - lowest).astype(np.uint16)
+        """What a taxel can read lies from `_lowest` to so much above it."""
         if calibration is not None:
             noisy = np.zeros(len(self._slots) + 1, dtype=np.bool_)
             np.logical_or.at(noisy, self._chip_of, calibration.noise.ravel() >= NOISY)
@@ -338,6 +348,13 @@ class Skin:
             valid &= whole.take(self._stage_of)
             valid &= self._served
             counts *= valid
+        # What lies under the lowest wraps round to above every range.
+        beyond = (values - self._lowest > self._range) & valid
+        if beyond.any():
+            valid &= ~beyond
+            counts *= valid
+            for i in np.unique(self._chip_of[beyond]).tolist():
+                self._owners[i].doubt(slots[i])
         self._follow(values, counts, valid, times, t)
         shape = self.layout.shape
         self._last = Frame(

@@ -34,7 +34,9 @@ def test_a_skin_of_any_shape_gives_back_its_recording(shape):
 def test_raw_values_saturate_as_a_chip_does():
     layout = SkinLayout(rows=16, cols=24)
     recording = noise((16, 24))
-    skin, _ = play(skin_file(layout), recording)
+    file = skin_file(layout)
+    file = replace(file, signal=replace(file.signal, saturation_counts=65535))
+    skin, _ = play(file, recording)
     with skin:
         counts = skin.read().counts
     np.testing.assert_array_equal(counts, np.minimum(recording.frames[0], 65534 - 20946))

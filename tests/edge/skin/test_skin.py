@@ -141,6 +141,31 @@ def test_the_sign_is_turned_back():
         assert skin.raw()[0][3, 5] == 20946 - PICTURE[3, 5]
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(sign):
+    """Rest 20946, saturation 30000 counts and 2000 of drift: the wire's ones are beyond."""
+    signal = replace(CODY.signal, saturation_counts=30_000)
+    chip = replace(CODY.chips[0], sign=sign)
+    bus = replace(CODY.buses[0], chips=(chip,))
+    file = replace(CODY, buses=(bus,), signal=signal, reading=Reading(recheck_frames=100))
+    for raw, reached in ((1, True), (52_946, True), (52_947, False), (0xFFFF, False)):
+        with still(file) as skin:
+            [reader] = skin.readers
+            [slot], send, before = reader.slots, reader.slots[0].send, reader.bus.transactions
+
+            def spoiled(transfer, row=slot.row, send=send, raw=raw):
+                send(transfer)
+                row[8:10] = divmod(raw, 256)
+
+            slot.send = spoiled
+            valid = skin.read().valid
+            skin.read()
+            checks = reader.bus.transactions - before - 2
+        assert bool(valid[1, 1]) is reached
+        assert valid.sum() == 12 - (not reached)
+        assert checks == (not reached)
+
+
 def test_dead_and_uncovered_taxels_are_never_valid():
     first = CODY.buses[0]
     signal = replace(CODY.signal, dead=((2, 3),))
