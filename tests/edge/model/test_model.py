@@ -218,11 +218,11 @@ def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
 
 
 def test_a_graph_that_onnx_runtime_refuses_is_refused_in_one_sentence(altered):
-    def cut(proto):
-        del proto.graph.node[0]
+    def attributed(proto):
+        proto.graph.node[0].attribute.append(helper.make_attribute("unheard_of", 1))
 
     with pytest.raises(InputError, match="ONNX Runtime refuses it"):
-        Model(altered(cut))
+        Model(altered(attributed))
 
 
 @settings(max_examples=60, deadline=None)

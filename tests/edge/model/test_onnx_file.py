@@ -1,7 +1,10 @@
 """A model file is refused before ONNX Runtime sees it where no exported model looks like it."""
 
+from itertools import pairwise
+
 import numpy as np
 import onnx
+import onnxruntime
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
@@ -81,3 +84,125 @@ def test_a_file_cut_anywhere_is_a_model_or_one_sentence():
             refused += 1
             assert str(error).startswith("cut.onnx: ")
     assert refused > 0.9 * len(data)
+
+
+def shapes(data):
+    """{value: its shape as the work is reckoned}, at one vector."""
+    work = onnx_file._Work(1 << 40)
+    [graph] = map(onnx_file._message, onnx_file.read(data).graphs)
+    work.graph(graph)
+    return work._shapes
+
+
+def test_shapes_are_no_smaller_than_those_that_onnx_runtime_makes(exported):
+    proto = onnx.load(exported / "model.onnx")
+    made = [name for node in proto.graph.node for name in node.output]
+    given = np.zeros((1, proto.graph.input[0].type.tensor_type.shape.dim[1].dim_value))
+    reckoned = shapes(proto.SerializeToString())
+    del proto.graph.output[:]
+    proto.graph.output.extend(helper.make_empty_tensor_value_info(name) for name in made)
+    session = onnxruntime.InferenceSession(
+        proto.SerializeToString(), providers=["CPUExecutionProvider"]
+    )
+    real = session.run(made, {"features": given})
+    for name, value in zip(made, real, strict=True):
+        assert len(value.shape) == len(reckoned[name])
+        assert all(a <= b for a, b in zip(value.shape, reckoned[name], strict=True)), name
+
+
+def node(operator, *inputs, **attributes):
+    return helper.make_node(operator, ["x", *inputs], ["y"], **attributes)
+
+
+WHOLE = {"one": [1], "both": [0, 1], "margins": [0, 2, 0, 3], "margin": [2, 3], "k": [2]}
+
+
+@pytest.mark.parametrize(
+    ("made", "shape"),
+    [
+        (node("ReduceSum", "one"), (3, 1)),
+        (node("ReduceSum", "one", keepdims=0), (3,)),
+        (node("ReduceMin", keepdims=0), ()),
+        (node("ArgMax", axis=1, keepdims=0), (3,)),
+        (node("Unsqueeze", "both"), (1, 1, 3, 5)),
+        (node("Gather", "both", axis=1), (3, 2)),
+        (node("Concat", "x", axis=-1), (3, 10)),
+        (node("Pad", "margins"), (3, 10)),
+        (node("Pad", "margin", "", "one"), (3, 10)),
+        (node("MatMul", "wide"), (3, 7)),
+        (node("Where", "x", "x", "deep"), (2, 3, 5)),
+        (node("TopK", "k"), (3, 2)),
+    ],
+    ids=lambda value: (
+        "-".join([value.op_type, *value.input[1:]]) if hasattr(value, "input") else ""
+    ),
+)
+def test_shapes_of_each_operator(made, shape):
+    """Those of ONNX's own inference; of TopK no more than its input's is known."""
+    if made.op_type == "TopK":
+        made.output.append("places")
+    if made.op_type == "Where":
+        made.input[:] = ["yes", "x", "deep"]
+    sides = [
+        helper.make_tensor_value_info("x", TensorProto.DOUBLE, [3, 5]),
+        helper.make_empty_tensor_value_info("y"),
+    ]
+    constants = [numpy_helper.from_array(np.array(v), name) for name, v in WHOLE.items()]
+    constants.append(numpy_helper.from_array(np.zeros((5, 7)), "wide"))
+    constants.append(numpy_helper.from_array(np.zeros((2, 1, 1)), "deep"))
+    constants.append(numpy_helper.from_array(np.zeros(5, dtype=bool), "yes"))
+    graph = helper.make_graph([made], "g", sides[:1], sides[1:], constants)
+    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)])
+    told = onnx.shape_inference.infer_shapes(proto, strict_mode=True, data_prop=True)
+    assert tuple(d.dim_value for d in told.graph.output[0].type.tensor_type.shape.dim) == shape
+    reckoned = shapes(proto.SerializeToString())["y"]
+    assert reckoned == ((3, 5) if made.op_type == "TopK" else shape)
+
+
+def doubled(times):
+    names = ["x", *(f"v{i}" for i in range(times - 1)), "y"]
+    return [helper.make_node("Concat", [a, a], [b], axis=1) for a, b in pairwise(names)]
+
+
+COLUMN = numpy_helper.from_array(np.zeros((5000, 1)), "w")
+FAR = numpy_helper.from_array(np.array([0, 0, 0, 1 << 40]), "w")
+AXES = numpy_helper.from_array(np.array([0]), "w")
+
+
+@pytest.mark.parametrize(
+    ("nodes", "constant"),
+    [
+        (doubled(60), COLUMN),
+        (
+            [
+                helper.make_node("Add", ["x", "w"], ["a"]),
+                helper.make_node("Gather", ["a", "i"], ["b"], axis=1),
+                helper.make_node("MatMul", ["a", "b"], ["y"]),
+            ],
+            COLUMN,
+        ),
+        ([node("Pad", "w")], FAR),
+        ([helper.make_node("Cast", ["x"], ["w2"], to=7), node("Unsqueeze", "w2")], AXES),
+        ([node("ReduceSum", "w", keepdims=0, noop_with_empty_axes=1)], AXES),
+        ([helper.make_node("Sqrt", ["nowhere"], ["y"])], AXES),
+        ([node("Add", "x")] * 70_000, AXES),
+    ],
+    ids=["doubling", "product", "margin", "made axes", "no axes", "unknown name", "many nodes"],
+)
+def test_more_work_than_the_file_accounts_for_is_refused(nodes, constant):
+    index = numpy_helper.from_array(np.zeros(5000, dtype=np.int64), "i")
+    with pytest.raises(InputError, match=r"m.onnx: its graph contradicts itself, or a decision"):
+        onnx_file.check(model(nodes, [constant, index]).SerializeToString(), "m.onnx")
+
+
+def test_a_sparse_constant_is_refused():
+    proto = model([add()])
+    proto.graph.sparse_initializer.append(
+        helper.make_sparse_tensor(
+            numpy_helper.from_array(np.ones(1), "w"),
+            numpy_helper.from_array(np.zeros(1, dtype=np.int64)),
+            [1 << 40],
+        )
+    )
+    with pytest.raises(InputError, match="its graph contradicts itself"):
+        onnx_file.check(proto.SerializeToString(), "m")
