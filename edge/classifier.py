@@ -16,8 +16,7 @@ from edge.recording import Recording
 from edge.touch.contact import Contact
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
-from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker
+from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
     from edge.skin.loop import JointSource
@@ -123,18 +122,11 @@ class Classifier:
             check_rate(novelty_rate, "the rate of false alarms")
             self._rules = stopping_rules(model, error)
         self.model = model
-        self.layout = for_device(info.layout, layout or info.layout)
         self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
-        self.tracker = ContactTracker(
-            self.layout,
-            info.tracking,
-            chain=info.chain,
-            horizon_s=info.window_s,
-            features=info.features,
-            joints=info.joints,
-            max_contacts=max_contacts,
-            motion_on_skin=motion_on_skin,
+        self.tracker = info.tracker(
+            layout or info.layout, max_contacts=max_contacts, motion_on_skin=motion_on_skin
         )
+        self.layout = self.tracker.layout
         self.error, self.novelty_rate = error, novelty_rate
         self._waiting: list[_Waiting] = []
         self._numbers: dict[Contact, int] = {}
@@ -142,12 +134,6 @@ class Classifier:
         self._begun = 0
         self._end_s: float | None = None
         self._missing_taxels = False
-
-    def _begin(self, contact: Contact, number: int) -> _Waiting:
-        tasks = self.model.info.tasks
-        if self.error is None:
-            return _Waiting(contact, number, len(self.model.decision_points_s) - 1, list(tasks))
-        return _Waiting(contact, number, 0, list(tasks))
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -166,7 +152,9 @@ class Classifier:
                 self._begun += 1
                 number = self._begun
                 self._numbers[contact] = number
-                self._waiting.append(self._begin(contact, number))
+                first = 0 if self.error is not None else len(self.model.decision_points_s) - 1
+                tasks = list(self.model.info.tasks)
+                self._waiting.append(_Waiting(contact, number, first, tasks))
                 events.append(Onset(contact.onset_s, self._named(number)))
             if contact.ended:
                 del self._numbers[contact]

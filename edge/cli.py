@@ -30,8 +30,7 @@ COMMANDS = (
     "fake",
     "demo",
 )
-"""Modules of `edge.commands`, in the order of the help. Each has `add_parser(subparsers)`, which
-sets `run`, a function of the parsed arguments that returns the exit status."""
+"""Modules of `edge.commands`, in the order of the help; see `add_commands`."""
 
 
 def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
@@ -46,10 +45,7 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
         "text; where stdout is piped, one JSON object per line.",
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in wanted:
-        import_module(f"edge.commands.{name}").add_parser(commands)
-    for command in commands.choices.values():
+    for command in add_commands(top, "edge.commands", wanted):
         command.add_argument(
             "--json", action="store_true", help="print JSON lines, as if stdout were no terminal"
         )
@@ -58,6 +54,25 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
             "-q", "--quiet", action="store_true", help="say nothing on stderr but errors"
         )
     return top
+
+
+def add_commands(
+    top: argparse.ArgumentParser, package: str, names: Sequence[str]
+) -> Iterator[argparse.ArgumentParser]:
+    """Add subcommands, each a module of the package, and give their parsers.
+
+    A module has `HELP` (a line), `DESCRIPTION`, `add_options(parser)`, and `run`, a function of
+    the parsed arguments that returns the exit status.
+    """
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name in names:
+        module = import_module(f"{package}.{name}")
+        command = commands.add_parser(
+            name.rstrip("_"), help=module.HELP, description=module.DESCRIPTION
+        )
+        module.add_options(command)
+        command.set_defaults(run=module.run)
+        yield command
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -94,7 +94,7 @@ def read_text(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> str:
     Raises:
         InputError: as `open_regular`, or it is not UTF-8.
     """
-    with parsing(os.fspath(path), "text"):
+    with parsing(os.fspath(path), "a text file"):
         return read_bytes(path, at_most).decode()
 
 

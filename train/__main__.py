@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
-from edge.cli import dispatch
+from edge.cli import add_commands, dispatch
 
 COMMANDS = ("import_", "simulate", "study", "tradeoff", "show", "split", "thresholds")
-"""Modules of `train.commands`; each has `add_parser(subparsers)`, which sets `run`."""
+"""Modules of `train.commands`; see `edge.cli.add_commands`."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -18,9 +17,7 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(
         prog="train", description="Recordings in, studies out; `python -m export` makes the model."
     )
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in COMMANDS:
-        import_module(f"train.commands.{name}").add_parser(commands)
+    list(add_commands(top, "train.commands", COMMANDS))
     return top
 
 

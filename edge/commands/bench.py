@@ -11,7 +11,7 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,25 +31,29 @@ from edge.skin.loop import garbage_aside
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, first_contact
 
 FORMAT = 1
 RATE_HZ = 100.0
+INSIDE = slice(1, -2)
+"""Frames of the touch at which nothing but following is due."""
+FEWEST_ROUNDS, MOST_ROUNDS = 20, 1_000_000
 COLD_STARTS = 5
 COLD = "import sys; from edge.classifier import Classifier; from edge.model.model import Model; \
 Classifier(Model(sys.argv[1]))"
 Timings = dict[str, float | int]
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "bench",
-        help="time each stage of a decision on this machine",
-        description="Times each stage on a touch that grows over the model's skin, and writes "
-        "medians, 99th percentiles, memory and start-up time as JSON, for `make tradeoff "
-        "BOARD=board.json` on the workstation.",
-    )
+HELP = "time each stage of a decision on this machine"
+DESCRIPTION = (
+    "Times each stage on a touch that grows over the model's skin, and writes "
+    "medians, 99th percentiles, memory and start-up time as JSON, for `make tradeoff "
+    "BOARD=board.json` on the workstation."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument("--out", required=True, metavar="board.json", help="the file to write")
     parser.add_argument(
@@ -60,13 +64,14 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--rounds", type=int, default=2000, help="how often each stage is timed (default: 2000)"
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, write, and print one line per stage on stderr."""
-    if not 20 <= arguments.rounds <= 1_000_000:
-        raise InputError(f"--rounds must be 20 to 1000000, not {arguments.rounds}")
+    if not FEWEST_ROUNDS <= arguments.rounds <= MOST_ROUNDS:
+        raise InputError(
+            f"--rounds must be {FEWEST_ROUNDS} to {MOST_ROUNDS}, not {arguments.rounds}"
+        )
     model = Model(arguments.model)
     skin = None if arguments.skin is None else load(arguments.skin)
     output = Output.of(arguments)
@@ -160,97 +165,55 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     decision is due.
     """
     info = model.info
-    frames = touch(model, info.window_s)
-    layout = Classifier(model).layout
-    inside = frames[1:-2]
-    settings = {"threshold": layout.threshold_counts, "valid": None, "wraps": layout.wraps}
-    tracker = ContactTracker(
-        layout,
-        info.tracking,
-        chain=info.chain,
-        horizon_s=info.window_s,
-        features=info.features,
-        joints=info.joints,
-    )
-    series = None
-    for frame in frames:
-        for contact in tracker.push(frame):
-            series = contact.series()
-    if series is None:
+    layout, frames = info.layout, touch(model, info.window_s)
+    found = first_contact(frames, info.tracker(layout))
+    if found is None:
         raise EdgeError(
             f"{model.path}: no touch rises above its onset_counts; export the model again"
         )
-    vector = feature_vector(series, info.window_s, info.samples, info.features)
-    model.decide(vector)
+    series, counts = found[1], [frame.counts for frame in frames[INSIDE]]
+    due = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
 
-    def pushed(make: Callable[[], Any], take: Callable[[list[float]], list[float]]) -> list[float]:
-        """Times of pushing the touch into fresh results of `make`; `take` selects those kept."""
-        seen: list[float] = []
-        while len(seen) < rounds:
-            target = make()
-            times = []
-            for frame in frames:
-                began = time.perf_counter_ns()
-                target.push(frame)
-                times.append((time.perf_counter_ns() - began) / 1e3)
-            seen += take(times)
-        return seen
+    def region(counts: NDArray[np.uint16]) -> object:
+        return largest_region(counts, layout.threshold_counts, wraps=layout.wraps)
 
-    def fresh() -> ContactTracker:
-        return ContactTracker(
-            layout,
-            info.tracking,
-            chain=info.chain,
-            horizon_s=info.window_s,
-            features=info.features,
-            joints=info.joints,
-        )
+    def vector(_: int = 0) -> NDArray[np.float64]:
+        return feature_vector(series, info.window_s, info.samples, info.features)
 
-    deciding = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
-    few = max(rounds // 10, 20)
-    last: list[float] = []
-    while len(last) < few:
-        classifier = Classifier(model)
-        for i, frame in enumerate(frames[: deciding + 1]):
-            began = time.perf_counter_ns()
-            classifier.push(frame)
-            if i == deciding:
-                last.append((time.perf_counter_ns() - began) / 1e3)
-    repeated = [frame.counts for frame in inside]
-    return {
-        "region": summary(
-            timed(
-                lambda i: largest_region(repeated[i % len(repeated)], **settings),  # type: ignore[arg-type]
-                rounds,
-            )
-        ),
-        "track": summary(pushed(fresh, lambda times: times[1:-2])),
-        "features": summary(
-            timed(
-                lambda i: feature_vector(series, info.window_s, info.samples, info.features),
-                rounds,
-            )
-        ),
-        "decision": summary(timed(lambda i: model.decide(vector), rounds)),
-        "answer": summary(
-            timed(
-                lambda i: model.decide(
-                    feature_vector(series, info.window_s, info.samples, info.features)
-                ),
-                rounds,
-            )
-        ),
-        "frame": summary(pushed(lambda: Classifier(model), lambda times: times[1:-2])),
-        "last": summary(last),
+    once, calls = vector(), range(rounds)
+    model.decide(once)
+    few = max(rounds // 10, FEWEST_ROUNDS)
+    stages = {
+        "region": timed(region, [counts[i % len(counts)] for i in calls]),
+        "track": pushed(lambda: info.tracker(layout), frames, INSIDE, rounds),
+        "features": timed(vector, calls),
+        "decision": timed(lambda _: model.decide(once), calls),
+        "answer": timed(lambda _: model.decide(vector()), calls),
+        "frame": pushed(lambda: Classifier(model), frames, INSIDE, rounds),
+        "last": pushed(lambda: Classifier(model), frames, slice(due, due + 1), few),
     }
+    return {name: summary(times) for name, times in stages.items()}
 
 
-def timed(call: Callable[[int], Any], rounds: int) -> list[float]:
-    """Microseconds that each of `rounds` calls takes."""
+def pushed(
+    make: Callable[[], ContactTracker | Classifier],
+    frames: Sequence[Frame],
+    keep: slice,
+    rounds: int,
+) -> list[float]:
+    """Microseconds that the frames `keep` take, pushed with the others into what `make` gives."""
+    seen: list[float] = []
+    while len(seen) < rounds:
+        seen += timed(make().push, frames)[keep]
+    return seen
+
+
+def timed(call: Callable[[Any], object], items: Iterable[Any]) -> list[float]:
+    """Microseconds that a call with each of the items takes."""
     times = []
-    for i in range(rounds):
+    for item in items:
         began = time.perf_counter_ns()
-        call(i)
+        call(item)
         times.append((time.perf_counter_ns() - began) / 1e3)
     return times
 

@@ -6,7 +6,6 @@ import argparse
 import logging
 import math
 from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,14 +30,15 @@ touched, or broken."""
 RESTLESS_COUNTS = 5.0
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "calibrate",
-        help="measure rest values and noise and write them into the skin file",
-        description="Reads the skin while nothing touches it and writes each taxel's mean and "
-        "standard deviation into the skin file; the old file is kept as skin.toml.bak.",
-    )
+HELP = "measure rest values and noise and write them into the skin file"
+DESCRIPTION = (
+    "Reads the skin while nothing touches it and writes each taxel's mean and "
+    "standard deviation into the skin file; the old file is kept as skin.toml.bak."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     add_skin(parser)
     parser.add_argument(
         "--frames",
@@ -51,7 +51,6 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="write the calibration even if a taxel seems to be touched",
     )
-    parser.set_defaults(run=run)
 
 
 def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCalibration, int]:

@@ -15,17 +15,17 @@ FRAMES = 100
 """Counted together, so that transactions that not every frame needs count by their share."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "check",
-        help="say what is wrong with a skin file, and what frame rate its wires carry",
-        description="Reads a skin file and runs its drivers over a fake bus that counts the "
-        "bits on the wire. The exit status is 1 if the skin cannot work as the file describes "
-        "it, or if the wires cannot carry the frame rate that the file asks for.",
-    )
+HELP = "say what is wrong with a skin file, and what frame rate its wires carry"
+DESCRIPTION = (
+    "Reads a skin file and runs its drivers over a fake bus that counts the "
+    "bits on the wire. The exit status is 1 if the skin cannot work as the file describes "
+    "it, or if the wires cannot carry the frame rate that the file asks for."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("skin", metavar="skin.toml", help="the file that describes the skin")
-    parser.set_defaults(run=run)
 
 
 def highest_count(file: SkinFile) -> int:

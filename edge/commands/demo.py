@@ -7,7 +7,6 @@ import logging
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,17 +26,17 @@ LABEL_WIDTH = 24
 WHAT_NEXT = "`edge-classify view --fake REC.npz` shows a touch as it happens."
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "demo",
-        help="decide on recorded touches that come with the program",
-        description="Plays the recordings that come with the program onto fake chips, reads "
-        "them with the real drivers, and decides with the model that comes with the program: "
-        "everything runs as it would on a robot, except for the wires. The recordings are "
-        "simulated. The exit status is 1 if a decision is wrong.",
-    )
-    parser.set_defaults(run=run)
+HELP = "decide on recorded touches that come with the program"
+DESCRIPTION = (
+    "Plays the recordings that come with the program onto fake chips, reads "
+    "them with the real drivers, and decides with the model that comes with the program: "
+    "everything runs as it would on a robot, except for the wires. The recordings are "
+    "simulated. The exit status is 1 if a decision is wrong."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
 
 
 def events(model: Model, recording: Recording) -> Iterator[Event]:

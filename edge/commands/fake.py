@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from edge.commands.output import Output
 from edge.errors import InputError
@@ -16,16 +15,17 @@ TRIALS = 8
 STILL_S = 5.0
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "fake",
-        help="make labelled touches for a skin file, to rehearse with before it is wired",
-        description="Maps the simulated touches that come with the program onto the geometry of "
-        "a skin, and writes them as labelled recordings, with one in which nothing touches. Play "
-        "them with --fake to rehearse calibrate, record, export and run. A model fitted on them "
-        "knows nothing of the real skin.",
-    )
+HELP = "make labelled touches for a skin file, to rehearse with before it is wired"
+DESCRIPTION = (
+    "Maps the simulated touches that come with the program onto the geometry of "
+    "a skin, and writes them as labelled recordings, with one in which nothing touches. Play "
+    "them with --fake to rehearse calibrate, record, export and run. A model fitted on them "
+    "knows nothing of the real skin."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "--skin", required=True, metavar="skin.toml", help="the file that describes the skin"
     )
@@ -34,7 +34,6 @@ def add_parser(commands: Any) -> None:
         "--trials", type=int, default=TRIALS, help="of each touch (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the variation between trials")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import statistics
+import textwrap
 import time
 from typing import Any
 
@@ -16,19 +18,20 @@ from edge.model.info import ModelInfo
 from edge.model.model import Model
 
 ROUNDS = 200
+LONGEST_LINE = 80
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "info",
-        help="say what a model is: its tasks, labels, accuracy, features, skin and arm",
-        description="Prints what a model file says of itself: what it tells apart and how "
-        "accurately, what it was fitted on, and which skin and arm it needs. Also its size, and "
-        "how long a decision takes on this machine.",
-    )
+HELP = "say what a model is: its tasks, labels, accuracy, features, skin and arm"
+DESCRIPTION = (
+    "Prints what a model file says of itself: what it tells apart and how "
+    "accurately, what it was fitted on, and which skin and arm it needs. Also its size, and "
+    "how long a decision takes on this machine."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
-    parser.set_defaults(run=run)
 
 
 def decision_us(model: Model) -> float:
@@ -57,37 +60,33 @@ def text(info: ModelInfo, said: dict[str, Any]) -> str:
     skin, chain = info.layout, info.chain
     lines = [f"{said['file']}: {said['bytes'] / 1024:.0f} kB, format {said['format']}", ""]
     for name, task in info.tasks.items():
-        lines.append(
+        lines += _wrapped(
             f"{name}: {task.accuracy:.1%} accurate (nested), {task.components} "
             f"component{'s' * (task.components != 1)}, {task.k} "
             f"neighbour{'s' * (task.k != 1)}, scaling {task.scaling}"
         )
-        lines += _wrapped(", ".join(task.labels))
+        lines += _wrapped(", ".join(task.labels), "  ")
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())
     lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples each of"]
-    lines += _wrapped(units)
+    lines += _wrapped(units, "  ")
     if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
-        lines.append(f"With --error, earlier: at {points} s.")
+        lines.append(f"With --error, it may decide at {points} s.")
     wraps = ", closed around" if skin.wraps else ""
-    lines.append(
+    versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
+    for sentence in (
         f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above {skin.threshold_counts} "
-        f"counts, onset above {skin.onset}; force in {skin.force_unit}s."
-    )
-    lines.append(
+        f"counts, onset above {skin.onset}; force in {skin.force_unit}s.",
         "Arm: none; motion is measured on the skin."
         if chain is None
-        else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}."
-    )
-    versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
-    lines += [
+        else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}.",
         f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with {versions}.",
         f"A decision takes {said['decision_us']:g} us on this machine.",
-    ]
+    ):
+        lines += _wrapped(sentence)
     return "\n".join(lines)
 
 
-def _wrapped(words: str) -> list[str]:
-    import textwrap
-
-    return textwrap.wrap(words, 76, initial_indent="  ", subsequent_indent="  ")
+def _wrapped(text: str, indent: str = "") -> list[str]:
+    columns = min(shutil.get_terminal_size().columns, LONGEST_LINE)
+    return textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=indent)

@@ -131,9 +131,7 @@ def check_error(model: Model, error: float | None) -> None:
             how = (
                 f"always after {model.decision_points_s[rule.last]:g} s"
                 if rule.fixed
-                else f"from a confidence of {rule.confidence:g} on"
+                else f"at a confidence of {rule.confidence:g} or more, after {rule.mean_s:.2f} s "
+                "on average in training"
             )
-            LOG.info(
-                f"{task}: decided {how}, {rule.mean_s:.2f} s on average in "
-                f"training; at most {rule.error:.1%} wrong"
-            )
+            LOG.info(f"{task}: decided {how}; at most {rule.error:.1%} wrong")

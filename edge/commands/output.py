@@ -67,7 +67,7 @@ def event_text(line: Mapping[str, Any]) -> str:
     if kind == "onset":
         return f"{line['onset_s']:8.3f} s  contact{which}"
     if kind == "decision":
-        return decision_text(line, which)
+        return decision_text(line, which and f"{which}:")
     if kind == "release":
         lasted = line["release_s"] - line["onset_s"]
         return f"{line['release_s']:8.3f} s  released{which} after {lasted:.2f} s"

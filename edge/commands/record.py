@@ -35,14 +35,15 @@ LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest allows longer windows to be tried."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "record",
-        help="wait for contacts and save each as a labelled trial",
-        description="Waits for a contact, saves it with a short lead-in as one .npz file, and "
-        "waits for the next. Existing files are never overwritten.",
-    )
+HELP = "wait for contacts and save each as a labelled trial"
+DESCRIPTION = (
+    "Waits for a contact, saves it with a short lead-in as one .npz file, and "
+    "waits for the next. Existing files are never overwritten."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     add_skin(parser)
     add_joints(parser)
     parser.add_argument(
@@ -79,7 +80,6 @@ def add_parser(commands: Any) -> None:
         help="with --joints but no --arm: how many angles each line has",
     )
     add_arm(parser, "stored in each trial (default: Cody's)")
-    parser.set_defaults(run=run)
 
 
 def _label(text: str) -> tuple[str, str]:
@@ -278,5 +278,5 @@ def _save(
         "complete": complete,
     }
     said = ", ".join(f"{task}={label}" for task, label in labels.items())
-    cut = "" if complete else ", cut short"
+    cut = "" if complete else "; cut short, as reading ended first"
     output.event(event, f"{path}: {event['seconds']:g} s, {len(frames)} frames, {said}{cut}")

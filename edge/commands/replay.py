@@ -18,15 +18,16 @@ from edge.recording import Recording, find, load
 LOG = logging.getLogger(__name__)
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "replay",
-        help="decide on recordings, frame by frame",
-        description="Decides on recordings as `edge-classify run` decides live. A file that "
-        "cannot be used is named on stderr and the others are still replayed; the exit status "
-        "is then 2.",
-    )
+HELP = "decide on recordings, frame by frame"
+DESCRIPTION = (
+    "Decides on recordings as `edge-classify run` decides live. A file that "
+    "cannot be used is named on stderr and the others are still replayed; the exit status "
+    "is then 2."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
         "--summary",
@@ -35,7 +36,6 @@ def add_parser(commands: Any) -> None:
     )
     add_error(parser)
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
-    parser.set_defaults(run=run)
 
 
 def decide(

@@ -24,15 +24,16 @@ from edge.touch.track import MAX_CONTACTS
 LOG = logging.getLogger(__name__)
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "run",
-        help="read the skin and decide, live",
-        description="Reads the skin and reports contacts, decisions, and chips that fail or "
-        "recover. Ctrl-C or SIGTERM ends it cleanly after the current frame; a second signal "
-        "terminates it at once. Under systemd it reports that it is ready and alive.",
-    )
+HELP = "read the skin and decide, live"
+DESCRIPTION = (
+    "Reads the skin and reports contacts, decisions, and chips that fail or "
+    "recover. Ctrl-C or SIGTERM ends it cleanly after the current frame; a second signal "
+    "terminates it at once. Under systemd it reports that it is ready and alive."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     add_error(parser)
     add_skin(parser)
@@ -55,7 +56,6 @@ def add_parser(commands: Any) -> None:
         metavar="FILE",
         help="follow several contacts at once, and append each with its position to FILE",
     )
-    parser.set_defaults(run=run)
 
 
 def chip_event(status: ChipStatus, t: float) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 import numpy as np
 
@@ -13,17 +12,16 @@ from edge.commands.source import open_skin
 from edge.skin.file import UNUSED, SkinFile
 from edge.skin.skin import ChipStatus
 
+HELP = "show which chips answer, as a map of the skin"
+DESCRIPTION = (
+    "Sets up every chip, and prints the state of each and a map of the "
+    "taxels. The exit status is 1 if a chip does not answer."
+)
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "scan",
-        help="show which chips answer, as a map of the skin",
-        description="Sets up every chip, and prints the state of each and a map of the "
-        "taxels. The exit status is 1 if a chip does not answer.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     add_skin(parser)
-    parser.set_defaults(run=run)
 
 
 def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:

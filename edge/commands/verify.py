@@ -13,26 +13,27 @@ from edge.model.verify import in_float32, verify
 LOG = logging.getLogger(__name__)
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "verify",
-        help="check that this machine computes what the workstation did",
-        description="Runs the frames and feature vectors of a golden file on this machine and "
-        "compares every result with the stored one: integers must be equal, and floats agree "
-        "within their stated bounds. The exit status is 1 if one differs.",
-    )
+HELP = "check that this machine computes what the workstation did"
+DESCRIPTION = (
+    "Runs the frames and feature vectors of a golden file on this machine and "
+    "compares every result with the stored one: integers must be equal, and floats agree "
+    "within their stated bounds. The exit status is 1 if one differs."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
         "--golden", required=True, help="golden.npz, which was written together with the model"
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per quantity; 1 if one differs."""
     output = Output.of(arguments)
     checks = verify(Model(arguments.model), arguments.golden)
+    width = max(len(check.name) for check in checks)
     for check in checks:
         line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
         line["passed"] = check.passed
@@ -40,8 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
             line["share_of_bound"] = round(check.worst, 6)
         if check.row is not None:
             line |= {"worst_row": check.row, "seen": check.seen, "expected": check.expected}
-        verdict = "ok    " if check.passed else "DIFFERS"
-        output.event(line, f"{verdict:<8} {check.name:<22} {check.rows:>5} rows")
+        verdict = "ok" if check.passed else "DIFFERS"
+        output.event(line, f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows")
     failed = [check for check in checks if not check.passed]
     for check in failed:
         LOG.error(

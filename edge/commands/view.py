@@ -10,7 +10,6 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from edge.classifier import Classifier
 from edge.commands import terminal
@@ -31,23 +30,23 @@ FULL_NEWTONS, FULL_FACTOR = 17.0, 50
 is unknown, for this many times the threshold."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "view",
-        help="show the skin live in a terminal",
-        description="Draws the skin and, with --model, the latest decisions. Taxels in contact "
-        "are red to white by force, those below the contact threshold grey, and those that "
-        "cannot be read blue. Each line shows two rows of taxels; row 0 is at the top. "
-        "q or Ctrl-C ends it.",
-    )
+HELP = "show the skin live in a terminal"
+DESCRIPTION = (
+    "Draws the skin and, with --model, the latest decisions. Taxels in contact "
+    "are red to white by force, those below the contact threshold grey, and those that "
+    "cannot be read blue. Each line shows two rows of taxels; row 0 is at the top. "
+    "q or Ctrl-C ends it."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("--model", help="model.onnx, to show its decisions too")
     parser.add_argument(
         "--rate", type=float, default=RATE_HZ, help="pictures a second (default: %(default)s)"
     )
     add_skin(parser)
     add_joints(parser)
-    parser.set_defaults(run=run)
 
 
 def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[str]:
@@ -140,7 +139,7 @@ def _show(
             look()
             for event in classifier.push(frame) if classifier is not None else ():
                 if isinstance(event, Onset):
-                    decisions = dict.fromkeys(tasks, "touching ...")
+                    decisions = dict.fromkeys(tasks, "in contact")
                 elif isinstance(event, Decided):
                     decisions[event.task] = spoken(event)
             if frame.t < due:

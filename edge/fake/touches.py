@@ -26,6 +26,8 @@ STRENGTH, SPEED = (0.8, 1.25), (0.9, 1.1)
 """Factors that a trial's forces and its pace are drawn from."""
 LEAD_S = 0.3
 """Before the simulated contact begins."""
+TAIL_S = 0.3
+"""After it, while its last forces go on: no touch ends within the window of a decision."""
 WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
 """Where the force of a count is not known, the strongest taxel of the weakest contact has so many
 times the counts of the onset, which is taken to be at least so many."""
@@ -115,7 +117,7 @@ def _mapped(
     forces = strength * newtons(source)
     middle = _middle(forces)
     lasts = float(source.t[-1] - source.t[0]) / speed
-    t = np.arange(int((LEAD_S + lasts) * rate_hz) + 1) / rate_hz
+    t = np.arange(int((LEAD_S + lasts + TAIL_S) * rate_hz) + 1) / rate_hz
     at = (t - LEAD_S) * speed + source.t[0]
     right = np.clip(np.searchsorted(source.t, at, side="right"), 1, len(source.t) - 1)
     part = (at - source.t[right - 1]) / (source.t[right] - source.t[right - 1])

@@ -13,8 +13,8 @@ from edge.model.stopping import Novelty, Stopping
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.features import widths
-from edge.touch.layout import SkinLayout
-from edge.touch.track import TrackSettings
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, TrackSettings
 
 METADATA_KEY = "edge-classify"
 FORMAT = 3
@@ -88,6 +88,27 @@ class ModelInfo:
     def dof(self) -> int | None:
         """Joint angles that a frame must bring; None where the model needs none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
+
+    def tracker(
+        self, layout: SkinLayout, *, max_contacts: int = 1, motion_on_skin: bool = False
+    ) -> ContactTracker:
+        """A fresh tracker that follows contacts on a skin by the model's rules, for its features.
+
+        The last two arguments are those of `ContactTracker`.
+
+        Raises:
+            InputError: the skin is not the one that the model was made for.
+        """
+        return ContactTracker(
+            for_device(self.layout, layout),
+            self.tracking,
+            chain=self.chain,
+            horizon_s=self.window_s,
+            features=self.features,
+            joints=self.joints,
+            max_contacts=max_contacts,
+            motion_on_skin=motion_on_skin,
+        )
 
     def to_json(self) -> str:
         """As the model file carries it."""

@@ -33,8 +33,8 @@ from edge.model.model import Model, require_joints
 from edge.recording import Recording, load_arrays, load_meta
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
-from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, first_contact
+from edge.touch.layout import SkinLayout
+from edge.touch.track import first_contact
 
 PARTS = ("label", "neighbours", "scores", "distances")
 
@@ -82,16 +82,7 @@ def in_float32(checks: Sequence[Check], bound: float = 1e-12) -> bool:
 
 def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeries] | None:
     """Onset and series of a recording's first contact, by the board's own path."""
-    info = model.info
-    tracker = ContactTracker(
-        for_device(info.layout, recording.layout),
-        info.tracking,
-        chain=info.chain,
-        horizon_s=info.window_s,
-        features=info.features,
-        joints=info.joints,
-    )
-    return first_contact(recording, tracker)
+    return first_contact(recording, model.info.tracker(recording.layout))
 
 
 def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:

@@ -47,7 +47,7 @@ def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path):
 
 def test_text_that_is_not_utf_8_is_named(tmp_path):
     (tmp_path / "a").write_bytes(b"\xff")
-    with pytest.raises(InputError, match="a: not text: it is not UTF-8 text"):
+    with pytest.raises(InputError, match="a: not a text file: it is not UTF-8 text"):
         read_text(tmp_path / "a")
 
 

@@ -6,7 +6,6 @@ import argparse
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -19,15 +18,16 @@ from train.importers import names
 ZERO_FRAMES = 3
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "import",
-        help="turn another lab's data into recordings",
-        description="Writes one recording per trial; existing files of the same name are "
-        "replaced. "
-        "To add a format, see train/importers/__init__.py.",
-    )
+HELP = "turn another lab's data into recordings"
+DESCRIPTION = (
+    "Writes one recording per trial; existing files of the same name are "
+    "replaced. "
+    "To add a format, see train/importers/__init__.py."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("format", choices=names(), help="what kind of file it is")
     parser.add_argument("file", type=Path, help="the file")
     parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
@@ -38,7 +38,6 @@ def add_parser(commands: Any) -> None:
         help="subtract what each taxel shows in the first three frames, for a sensor whose offset "
         "drifts from trial to trial; nothing may be touched in them",
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

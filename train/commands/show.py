@@ -5,21 +5,20 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 from edge.errors import InputError
 
+HELP = "draw a recording or a map of touch"
+DESCRIPTION = (
+    "Draw a recording: frames over time with the region found, and the three "
+    "features; with --scene, what happens, seen from the side. Draw several "
+    "recordings side by side, with the decisions of --model. Draw a map that "
+    "`edge-classify run --map` wrote: where things were touched, and what they were."
+)
 
-def add_parser(subparsers: Any) -> None:
-    """Add the command."""
-    parser = subparsers.add_parser(
-        "show",
-        help="draw a recording or a map of touch",
-        description="Draw a recording: frames over time with the region found, and the three "
-        "features; with --scene, what happens, seen from the side. Draw several "
-        "recordings side by side, with the decisions of --model. Draw a map that "
-        "`edge-classify run --map` wrote: where things were touched, and what they were.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "recording", nargs="+", help="an .npz recording, several to compare, or a map"
     )
@@ -34,7 +33,6 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--threshold", type=int, metavar="COUNTS", help="in place of the skin's")
     parser.add_argument("--task", help="of a map: which labels to show (default: category)")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import Any
+
+HELP = "simulate a scene into recordings"
+DESCRIPTION = (
+    "Simulate the touches that a scene file describes, and only the effects it "
+    "calls for. The same scene gives the same files, whatever the batch or the machine."
+)
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the command."""
-    parser = subparsers.add_parser(
-        "simulate",
-        help="simulate a scene into recordings",
-        description="Simulate the touches that a scene file describes, and only the effects it "
-        "calls for. The same scene gives the same files, whatever the batch or the machine.",
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("scene", help="a TOML file like train/scenes/cody18.toml")
     parser.add_argument("--out", metavar="DIR", help="folder for the recordings")
     parser.add_argument(
@@ -28,7 +27,6 @@ def add_parser(subparsers: Any) -> None:
         "--backend", choices=("local", "dask"), default="local", help="where the batches run"
     )
     parser.add_argument("--address", help="of a Dask scheduler, like tcp://127.0.0.1:8786")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -19,18 +18,18 @@ LEAD_S = 0.25
 """Kept of what lies before a contact, where no other contact does."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "split",
-        help="cut recordings into one a contact",
-        description="Writes each contact of each recording to a file of its own, named after the "
-        "recording and the contact's number. The labels are those of meta.contacts, a list of one "
-        "set of labels a contact, or else the recording's.",
-    )
+HELP = "cut recordings into one a contact"
+DESCRIPTION = (
+    "Writes each contact of each recording to a file of its own, named after the "
+    "recording and the contact's number. The labels are those of meta.contacts, a list of one "
+    "set of labels a contact, or else the recording's."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("data", nargs="+", help=".npz recordings or folders of them")
     parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

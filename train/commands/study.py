@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import Any
+
+HELP = "every analysis of the paper on a data set, ours beside the paper's"
+DESCRIPTION = (
+    "Writes OUT/report.html (nothing outside it is linked), each plot as PNG and each table as CSV."
+)
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "study",
-        help="every analysis of the paper on a data set, ours beside the paper's",
-        description="Writes OUT/report.html (nothing outside it is linked), each plot as PNG and "
-        "each table as CSV.",
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
     )
@@ -38,7 +36,6 @@ def add_parser(commands: Any) -> None:
         "recordings alone; 8 take about half a minute each)",
     )
     parser.add_argument("--address", help="of a Dask scheduler that runs the sweeps instead")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -23,17 +22,17 @@ ONSET = 1.5
 """The onset lies so many times above the threshold, so that a force that hovers is one contact."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "thresholds",
-        help="propose thresholds from the recordings' own noise",
-        description=f"Takes the first {QUIET_S:g} s of each recording for noise, proposes a "
-        f"threshold {MARGIN:g} times above the level that one in ten recordings exceeds and an "
-        f"onset {ONSET:g} times above that, and says how many contacts other thresholds find.",
-    )
+HELP = "propose thresholds from the recordings' own noise"
+DESCRIPTION = (
+    f"Takes the first {QUIET_S:g} s of each recording for noise, proposes a "
+    f"threshold {MARGIN:g} times above the level that one in ten recordings exceeds and an "
+    f"onset {ONSET:g} times above that, and says how many contacts other thresholds find."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("data", nargs="+", help=".npz recordings or folders of them")
-    parser.set_defaults(run=run)
 
 
 def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:

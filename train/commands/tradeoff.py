@@ -5,17 +5,16 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import Any
+
+HELP = "what accuracy costs in time: waiting, the wire, arithmetic"
+DESCRIPTION = (
+    "Writes OUT/report.html (nothing outside it is linked), each plot as PNG, "
+    "each table as CSV, and front.json, which `python -m export --front` reads."
+)
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "tradeoff",
-        help="what accuracy costs in time: waiting, the wire, arithmetic",
-        description="Writes OUT/report.html (nothing outside it is linked), each plot as PNG, "
-        "each table as CSV, and front.json, which `python -m export --front` reads.",
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
     )
@@ -41,7 +40,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, help="processes (all cores)"
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

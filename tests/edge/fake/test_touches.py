@@ -8,6 +8,7 @@ from edge.fake import touches
 from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.file import parse
+from edge.touch.track import ContactTracker, first_contact
 
 WIDE = """[skin]
 rows = 120
@@ -48,6 +49,13 @@ def test_a_contact_is_as_large_in_metres_on_a_finer_skin():
 
     coarse, fine = (made(p, wraps="true")["cardboard-box-fixed-000"] for p in (0.01, 0.005))
     assert spread(fine, 0.005) == pytest.approx(spread(coarse, 0.01), rel=0.1)
+
+
+def test_every_contact_goes_on_for_a_whole_window():
+    file = skinfile.load(skinfile.shipped("mpr121"))
+    for name, recording in touches.touches(file, trials=4):
+        onset_s, _ = first_contact(recording, ContactTracker(recording.layout))
+        assert recording.t[-1] > onset_s + 1.2, name
 
 
 def test_every_contact_begins_on_a_skin_whose_scale_is_unknown():
