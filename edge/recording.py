@@ -24,6 +24,7 @@ from edge.touch.layout import SkinLayout
 LARGEST_BYTES = 1 << 27
 """Arrays that claim to be larger together are taken for a damaged file: an hour of 384 taxels at
 40 Hz has 111 MB, two minutes of 64 x 62 at 100 Hz have 95."""
+MOST_COUNTS = 65535
 KEYS = ("t", "frames", "joints", "valid", "meta")
 
 
@@ -97,6 +98,71 @@ class Recording:
             yield Frame(t=t, counts=self.frames[i], valid=valid, joints=joints)
 
 
+def _plain(path: str, recording: Recording, scale: float | None = None) -> Recording:
+    """The recording as the contract says, where what it means leaves no doubt.
+
+    Whole numbers of any type that are counts become uint16, taxels in a row the skin's rows and
+    columns, times and angles float64, and labels that are whole numbers text.
+
+    Args:
+        scale: see `save`.
+    """
+    meta, frames = recording.meta, np.asarray(recording.frames)
+    if frames.dtype != np.uint16 and frames.dtype.kind in "iuf" or scale is not None:
+        frames = _counts(path, frames, scale)
+        meta = meta if scale is None else {**meta, "scale": scale}
+    known = meta if isinstance(meta, dict) else {}  # what is none, `_check` refuses
+    skin, labels = known.get("skin"), known.get("labels")
+    if frames.ndim == 2 and isinstance(skin, dict):
+        rows, cols = skin.get("rows"), skin.get("cols")
+        if type(rows) is int and type(cols) is int and 0 < rows * cols == frames.shape[1]:
+            frames = frames.reshape(len(frames), rows, cols)
+    if isinstance(labels, dict) and any(map(_whole, labels.values())):
+        text = {task: str(label) if _whole(label) else label for task, label in labels.items()}
+        meta = {**meta, "labels": text}
+
+    def double(values: NDArray[Any]) -> NDArray[Any]:
+        return values.astype(np.float64) if values.dtype.kind == "f" else values
+
+    joints = None if recording.joints is None else double(np.asarray(recording.joints))
+    return Recording(double(np.asarray(recording.t)), frames, joints, recording.valid, meta)
+
+
+def _whole(label: object) -> bool:
+    return isinstance(label, int | np.integer) and not isinstance(label, bool)
+
+
+def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[Any]:
+    """Frames of another type as uint16, times `scale` and rounded where it is given."""
+    if scale is not None:
+        if not 0.0 < scale < np.inf:
+            raise InputError(f"{path}: the scale must be a number above 0, not {scale:g}")
+        frames = np.rint(frames.astype(np.float64) * scale)
+    if not frames.size:
+        return frames.astype(np.uint16)
+    if not np.isfinite(frames).all():
+        raise InputError(
+            f"{path}: frames hold what is not finite; set it to 0 and say in `valid` which taxels "
+            "could be read"
+        )
+    low, high = frames.min(), frames.max()
+    if low < 0:
+        raise InputError(
+            f"{path}: frames go down to {low:g}; counts are above baseline: subtract the frame "
+            "before touch, then np.clip(frames, 0, None)"
+        )
+    fine = (frames != np.rint(frames)).any()
+    if fine or high > MOST_COUNTS:
+        # A power of ten, so that the factor is easily the same for all recordings of a set.
+        factor = (scale or 1.0) * 10.0 ** np.floor(np.log10(MOST_COUNTS / high))
+        raise InputError(
+            f"{path}: frames are {frames.dtype} up to {high:g}"
+            f"{' and no whole numbers' if fine else ''}; counts are whole numbers up to "
+            f"{MOST_COUNTS}: edge.save(path, recording, scale={factor:g}), the same for all"
+        )
+    return frames.astype(np.uint16)
+
+
 def _check(path: str, recording: Recording) -> None:
     """Raise InputError with one sentence where the trial is not as the contract says."""
     t, frames, joints, valid = recording.t, recording.frames, recording.joints, recording.valid
@@ -107,13 +173,17 @@ def _check(path: str, recording: Recording) -> None:
     if frames.dtype != np.uint16 or frames.ndim != 3:
         fail(
             f"frames must be uint16 (n, rows, cols), not {frames.dtype} {frames.shape}; "
-            "store counts above baseline"
+            + (
+                'say in meta.skin how many "rows" and "cols" they have'
+                if frames.ndim == 2
+                else "store counts above baseline"
+            )
         )
     n, rows, cols = frames.shape
     if n == 0 or rows == 0 or cols == 0:
         fail(f"frames are empty {frames.shape}; record at least one frame")
     if t.dtype != np.float64 or t.shape != (n,):
-        fail(f"t must be float64 ({n},) for {n} frames, not {t.dtype} {t.shape}")
+        fail(f"t must be float64 ({n},) seconds for {n} frames, not {t.dtype} {t.shape}")
     if not np.isfinite(t).all():
         fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
     back = np.flatnonzero(np.diff(t) < 0)
@@ -262,11 +332,18 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
         valid=arrays.get("valid"),
         meta=load_meta(name, arrays),
     )
+    recording = _plain(name, recording)
     _check(name, recording)
     return recording
 
 
-def save(path: str | os.PathLike[str], recording: Recording, *, overwrite: bool = True) -> None:
+def save(
+    path: str | os.PathLike[str],
+    recording: Recording,
+    *,
+    scale: float | None = None,
+    overwrite: bool = True,
+) -> None:
     """Write a recording, whole or not at all; the same recording gives the same bytes.
 
     >>> import edge, numpy as np, tempfile
@@ -278,11 +355,20 @@ def save(path: str | os.PathLike[str], recording: Recording, *, overwrite: bool 
     ...     edge.load(f"{folder}/cup.npz").labels
     {'object': 'cup'}
 
+    Args:
+        path: of the `.npz`.
+        recording: frames of whole numbers of any type; flat ones (n, rows * cols) where
+            `meta.skin` says the rows and columns.
+        scale: counts of a unit of `frames` that are no counts; it is kept in `meta.scale`. Give
+            all recordings of a data set the same.
+        overwrite: whether a file that exists is replaced.
+
     Raises:
         InputError: the recording is not as the contract says, `path` cannot be written, or
             it exists and `overwrite` is False.
     """
     name = os.fspath(path)
+    recording = _plain(name, recording, scale)
     _check(name, recording)
     arrays: dict[str, NDArray[Any]] = {"t": recording.t, "frames": recording.frames}
     if recording.joints is not None:

@@ -103,7 +103,18 @@ WRONG = {
     "no t": (lambda a: {k: v for k, v in a.items() if k != "t"}, "t is missing"),
     "no frames": (lambda a: {k: v for k, v in a.items() if k != "frames"}, "frames is missing"),
     "no meta": (lambda a: {k: v for k, v in a.items() if k != "meta"}, "meta is missing"),
-    "float frames": (lambda a: {**a, "frames": a["frames"].astype(float)}, "frames must be uint16"),
+    "fractions": (
+        change(frames=np.full((180, 16, 24), 1.5)),
+        r"frames are float64 up to 1.5 and no whole numbers.*scale=10000\), the same for all",
+    ),
+    "large frames": (change(frames=np.full((180, 16, 24), 70000)), r"up to 70000;.*scale=0.1\)"),
+    "negative frames": (
+        change(frames=np.full((180, 16, 24), -3)),
+        "go down to -3; counts are above baseline: subtract the frame before touch, then np.clip",
+    ),
+    "frames not finite": (change(frames=np.full((180, 16, 24), np.nan)), "say in `valid` which"),
+    "complex frames": (change(frames=np.ones((180, 16, 24), complex)), "frames must be uint16"),
+    "rows unknown": (change(frames=np.ones((180, 384), np.uint16)), 'how many "rows" and "cols"'),
     "flat frames": (lambda a: {**a, "frames": a["frames"][0]}, "frames must be uint16"),
     "no frame": (lambda a: {**a, "frames": a["frames"][:0], "t": a["t"][:0]}, "frames are empty"),
     "short t": (lambda a: {**a, "t": a["t"][1:]}, r"t must be float64 \(180,\)"),
@@ -125,7 +136,7 @@ WRONG = {
     "meta no JSON": (change(meta=np.array("{")), "meta: not JSON"),
     "meta no object": (change(meta=np.array("[1]")), "meta must be a JSON object"),
     "meta with NaN": (change(meta=np.array('{"a": NaN}')), "NaN is not a JSON number"),
-    "labels no text": (change(meta=np.array('{"labels": {"object": 3}}')), "meta.labels must map"),
+    "labels no text": (change(meta=np.array('{"labels": {"object": true}}')), "meta.labels must map"),
     "another skin": (change(meta=np.array('{"skin": {"rows": 3}}')), "frames are 16 x 24"),
     "no scale": (change(meta=np.array('{"skin": {"counts_per_newton": -1}}')), "above 0"),
     "objects": (change(meta=np.array([None], dtype=object)), "holds Python objects"),
@@ -141,6 +152,34 @@ def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(case, make_to
         load(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.int64, np.float32, ">u2"])
+def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path):
+    counts = np.arange(2 * 12).reshape(2, 12)
+    meta = {"labels": {"object": np.int64(3)}, "skin": {"rows": 3, "cols": 4}}
+    given = Recording(np.array([0.0, 0.5], np.float32), counts.astype(kind), meta=meta)
+    save(tmp_path / "a.npz", given)
+    back = load(tmp_path / "a.npz")
+    assert (back.frames.dtype, back.t.dtype) == (np.dtype(np.uint16), np.dtype(np.float64))
+    assert (back.frames == counts.reshape(2, 3, 4)).all()
+    assert back.labels == {"object": "3"}
+    text = json.dumps({"labels": {"object": 3}, "skin": {"rows": 3, "cols": 4}})
+    np.savez(tmp_path / "b.npz", t=np.array([0.0, 0.5]), frames=counts.astype(kind), meta=text)
+    assert (load(tmp_path / "b.npz").frames == back.frames).all()
+    assert load(tmp_path / "b.npz").labels == back.labels
+
+
+def test_other_units_are_scaled_by_the_factor_that_is_given_and_kept(tmp_path):
+    newtons = np.array([0.0, 0.25, 1.0, 6.5]).reshape(4, 1, 1)
+    recording = Recording(np.arange(4.0), newtons)
+    save(tmp_path / "a.npz", recording, scale=1000.0)
+    back = load(tmp_path / "a.npz")
+    assert back.frames.ravel().tolist() == [0, 250, 1000, 6500]
+    assert back.meta["scale"] == 1000.0
+    for scale in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="scale must be a number above 0"):
+            save(tmp_path / "b.npz", recording, scale=scale)
 
 
 def test_a_missing_file_and_a_folder_are_named(tmp_path):
