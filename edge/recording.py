@@ -108,14 +108,15 @@ def _plain(path: str, recording: Recording, scale: float | None = None) -> Recor
         scale: see `save`.
     """
     meta, frames = recording.meta, np.asarray(recording.frames)
-    if frames.dtype != np.uint16 and frames.dtype.kind in "iuf" or scale is not None:
+    if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
         frames = _counts(path, frames, scale)
         meta = meta if scale is None else {**meta, "scale": scale}
     known = meta if isinstance(meta, dict) else {}  # what is none, `_check` refuses
     skin, labels = known.get("skin"), known.get("labels")
     if frames.ndim == 2 and isinstance(skin, dict):
         rows, cols = skin.get("rows"), skin.get("cols")
-        if type(rows) is int and type(cols) is int and 0 < rows * cols == frames.shape[1]:
+        whole = type(rows) is int and type(cols) is int and rows > 0
+        if whole and rows * cols == frames.shape[1]:
             frames = frames.reshape(len(frames), rows, cols)
     if isinstance(labels, dict) and any(map(_whole, labels.values())):
         text = {task: str(label) if _whole(label) else label for task, label in labels.items()}

@@ -114,6 +114,13 @@ WRONG = {
     ),
     "frames not finite": (change(frames=np.full((180, 16, 24), np.nan)), "say in `valid` which"),
     "complex frames": (change(frames=np.ones((180, 16, 24), complex)), "frames must be uint16"),
+    "rows below 0": (
+        change(
+            frames=np.ones((180, 384), np.uint16),
+            meta=np.array('{"skin": {"rows": -16, "cols": -24}}'),
+        ),
+        'how many "rows" and "cols"',
+    ),
     "rows unknown": (change(frames=np.ones((180, 384), np.uint16)), 'how many "rows" and "cols"'),
     "flat frames": (lambda a: {**a, "frames": a["frames"][0]}, "frames must be uint16"),
     "no frame": (lambda a: {**a, "frames": a["frames"][:0], "t": a["t"][:0]}, "frames are empty"),
@@ -136,7 +143,7 @@ WRONG = {
     "meta no JSON": (change(meta=np.array("{")), "meta: not JSON"),
     "meta no object": (change(meta=np.array("[1]")), "meta must be a JSON object"),
     "meta with NaN": (change(meta=np.array('{"a": NaN}')), "NaN is not a JSON number"),
-    "labels no text": (change(meta=np.array('{"labels": {"object": true}}')), "meta.labels must map"),
+    "labels no text": (change(meta=np.array('{"labels": {"a": true}}')), "meta.labels must map"),
     "another skin": (change(meta=np.array('{"skin": {"rows": 3}}')), "frames are 16 x 24"),
     "no scale": (change(meta=np.array('{"skin": {"counts_per_newton": -1}}')), "above 0"),
     "objects": (change(meta=np.array([None], dtype=object)), "holds Python objects"),
