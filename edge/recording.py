@@ -115,9 +115,8 @@ def _plain(path: str, recording: Recording, scale: float | None = None) -> Recor
     skin, labels = known.get("skin"), known.get("labels")
     if frames.ndim == 2 and isinstance(skin, dict):
         rows, cols = skin.get("rows"), skin.get("cols")
-        whole = type(rows) is int and type(cols) is int and rows > 0
-        if whole and rows * cols == frames.shape[1]:
-            frames = frames.reshape(len(frames), rows, cols)
+        if isinstance(rows, int) and isinstance(cols, int) and rows > 0 and cols > 0:
+            frames = frames.reshape(-1, rows, cols) if rows * cols == frames.shape[1] else frames
     if isinstance(labels, dict) and any(map(_whole, labels.values())):
         text = {task: str(label) if _whole(label) else label for task, label in labels.items()}
         meta = {**meta, "labels": text}
