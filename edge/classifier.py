@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 AS_TRAINED = "as_trained"
 """Flag of a decision at distance 0 from a training trial: the two are the same, to the last bit,
-in all that the model looks at. Nearly always it is that trial, replayed; a feature that told
-nothing in training is not looked at."""
+in all that the model takes into account. Nearly always it is that trial, replayed; a feature that
+was constant in training is not taken into account."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class _Waiting:
 
 
 class _Answer(NamedTuple):
-    """What is said of one task."""
+    """The answer to one task."""
 
     label: str | None
     confidence: float
@@ -119,7 +119,7 @@ class Classifier:
         info = model.info
         self._rules: dict[str, StoppingRule | None] = {}
         if error is not None:
-            check_rate(novelty_rate, "the rate of false alarms")
+            check_rate(novelty_rate, "the novelty rate")
             self._rules = stopping_rules(model, error)
         self.model = model
         self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
@@ -296,7 +296,7 @@ class Classifier:
         ]
 
     def _novel(self, decision_point: int, decisions: dict[str, Decision]) -> float:
-        """The smallest rate of false alarms at which the contact counts as unknown."""
+        """The smallest novelty rate at which the contact counts as unknown."""
         novelty = self.model.info.novelty
         if self.error is None or novelty is None:
             return 1.0
@@ -310,7 +310,7 @@ class Classifier:
         flags: tuple[str, ...],
         novel: float,
     ) -> _Answer | None:
-        """What a decision point says of a task; None where the task goes on waiting.
+        """A task's answer at a decision point; None where the task goes on waiting.
 
         Args:
             novel: from `_novel`.

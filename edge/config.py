@@ -1,4 +1,4 @@
-"""What a person or another program wrote, checked: TOML and JSON, with one sentence a mistake.
+"""TOML and JSON that a person or another program wrote, checked: one sentence for a mistake.
 
 Every complaint reads `FILE: KEY must be WHAT IS WANTED, not WHAT IS THERE`.
 """

@@ -1,4 +1,4 @@
-"""What a classifier tells of a stream of frames: contacts that begin, are decided, and end."""
+"""The events of a stream of frames: a contact begins, is decided, and ends."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Decided:
         window_s: seconds from onset that it was decided on.
         onset_s: when the contact began; without a contact, when the stream ended.
         latency_ms: from the frame that completed the window to the answer.
-        flags: what to know about it, see `Classifier`.
+        flags: its reservations, see `Classifier`.
         error: how often a decision may be wrong, where that was asked for and is certified.
         stopped_by: then `confidence`, or `window` where the stopping rule's last decision point
             came first.

@@ -34,7 +34,7 @@ MISSING_SHARE = 0.02
 LONG_TOUCHES = 3.0
 """Windows that a touch goes on for, from which on a longer one is worth a try."""
 LEAK = 0.5
-"""Labels told before the touch, above which a model knows the place rather than the thing."""
+"""Share of labels known before the touch, above which a model knows the place, not the object."""
 NAMED = 3
 """Files that a sentence names before it counts the rest."""
 CALLS = 60
@@ -145,7 +145,7 @@ def report(fitted: Fitted, prices: Sequence[tuple[float, float]] | None = None) 
 
 
 def _told(one: Chosen) -> str:
-    """The number that a user is told."""
+    """The accuracy, as a user reads it."""
     numbers = f"{_percent(one.accuracy)} of {one.accuracy.total} trials, nested"
     if one.left_out == TRIAL:
         return numbers

@@ -27,7 +27,7 @@ from train.stopping import SequentialClassifier
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
 SHORTLIST_ROWS = 1024
-"""From so many training rows on, a float32 product picks a shortlist that is measured exactly."""
+"""Training rows from which on a float32 product picks a shortlist that is measured exactly."""
 SHORTLIST = 24
 """How many more rows than voters a shortlist has, so that its check rarely fails."""
 FLOAT32_FIT = (2.0**-16, 2.0**16)

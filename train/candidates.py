@@ -53,7 +53,7 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Of its features, as `--features` takes them."""
+        """The names of its features, as `--features` takes them."""
         return " ".join(self.sets)
 
 

@@ -12,7 +12,7 @@ from edge.errors import InputError
 
 @contextmanager
 def on_cluster(address: str | None) -> Iterator[None]:
-    """Within it, `joblib.Parallel` runs on the cluster whose scheduler is at `address`.
+    """Within the block, `joblib.Parallel` runs on the cluster whose scheduler is at `address`.
 
     Args:
         address: like `tcp://127.0.0.1:8786`.

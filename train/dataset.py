@@ -137,7 +137,7 @@ class DataSet:
 
     @property
     def units(self) -> dict[str, str]:
-        """Of each feature."""
+        """The unit of each feature."""
         return {name: measures.feature(name).unit(self.layout) for name in self.names}
 
 

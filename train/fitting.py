@@ -25,15 +25,16 @@ from train.stopping import FEWEST, SequentialClassifier
 LEAVE_OUT = "object"
 TRIAL = "trial"
 DECISION_POINTS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-"""Twice as many decide no sooner on the simulated set, and take twice the memory."""
+"""Decision points by default; twice as many decide no sooner on the simulated set, and take twice
+the memory."""
 MOST_TRIALS = 2000
-"""Beyond them calibration takes minutes, and must be asked for."""
+"""Trials beyond which calibration takes minutes, and must be asked for."""
 LARGEST_BYTES = 1 << 20
-"""Of a model whose decision points nobody asked for."""
+"""Largest model that is given decision points which nobody asked for."""
 QUICK_FOLDS = 5
 LEAK = 0.5
-"""Part of what always saying the most frequent label leaves untold, told before any contact,
-above which data leak."""
+"""Share of the trials that do not have the most frequent label: where more of them are recognised
+before any contact, the data leak."""
 GROUP_FOLDS, FEW = 20, 300
 """Groups left out one at a time, as far as so many fit up to so many trials; ten parts beyond."""
 FEWEST_TRIALS = 3

@@ -84,7 +84,7 @@ def scale_of(
 
     The statistics are over all samples of a feature type in all trials (paper, section IV-D),
     not over columns. Where a maximum or a standard deviation is 0 the type is dropped (gain 0):
-    it told nothing in training and must not dominate when it moves.
+    it was constant in training and must not dominate when it moves.
 
     Args:
         X: (n, p).

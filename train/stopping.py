@@ -49,7 +49,7 @@ from train.pipeline import Choice, ContactClassifier, label_distances, vote
 FOLDS = 10
 FEWER_FOLDS = 5
 MANY_TRIALS = 400
-"""From so many trials on `FEWER_FOLDS` are enough: their models lack a fifth of plenty."""
+"""From so many trials on `FEWER_FOLDS` are enough: four fifths of them are plenty to fit."""
 FEWEST = 20
 """Trials below which there is nothing to calibrate with."""
 RISK = 0.1

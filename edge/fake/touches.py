@@ -21,7 +21,7 @@ from edge.skin.file import UNUSED, SkinFile
 from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.01
-"""Of a skin whose pitch is not known."""
+"""The pitch taken for a skin whose own is not known."""
 STRENGTH, SPEED = (0.8, 1.25), (0.9, 1.1)
 """Factors that a trial's forces and its pace are drawn from."""
 LEAD_S = 0.3

@@ -68,9 +68,9 @@ class ModelInfo:
     decision_points_s: tuple[float, ...] = ()
     """Windows at which the model can be asked, the last the full one; none without calibration."""
     stopping: dict[str, Stopping] = field(default_factory=dict)
-    """Of each task, where there are decision points."""
+    """The stopping rules of each task; none without decision points."""
     novelty: Novelty | None = None
-    """Where there are decision points."""
+    """The limits of novelty; None without decision points."""
     joints: int = 0
     """Joint angles of a frame, where a feature is made of them."""
 

@@ -12,8 +12,8 @@ from edge.errors import InputError
 UNKNOWN = "unknown"
 """The label of a contact that is unlike everything in training."""
 NOVELTY_RATE = 0.02
-"""How often a contact with a trained thing may be called unknown. At this rate such calls are part
-of the certified errors."""
+"""How often a contact with a trained object may be called unknown. At this rate such answers are
+counted among the certified errors."""
 LARGEST_LOG_ODDS = 25.0
 
 
@@ -186,7 +186,7 @@ class Novelty:
     """When a contact is unlike everything in training.
 
     The distance to the nearest training trial is taken in the space of the task with most labels:
-    of all tasks' spaces it keeps most of what tells things apart.
+    of all tasks' spaces it keeps most of what distinguishes objects.
 
     Attributes:
         task: whose space it is.
@@ -199,7 +199,7 @@ class Novelty:
     limits: tuple[tuple[float, ...], ...]
 
     def rate(self, decision_point: int, distance: float) -> float:
-        """The smallest rate of false alarms at which the distance counts as unknown; 1 at none."""
+        """The smallest novelty rate at which the distance counts as unknown; 1 at none."""
         found = 1.0
         for rate, limit in zip(self.rates, self.limits[decision_point], strict=True):
             if distance > limit:

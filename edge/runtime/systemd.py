@@ -1,4 +1,4 @@
-"""Word to the service manager: ready, alive, stopping (sd_notify(3): one datagram each)."""
+"""Messages to the service manager: ready, alive, stopping (sd_notify(3): a datagram each)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NEVER = float("inf")
 
 
 class Notifier:
-    """Says to systemd how the service is; says nothing where no systemd listens.
+    """Tells systemd that the service is ready, alive or stopping; silent where none listens.
 
     >>> Notifier({}, now=lambda: 0.0).ready()
     """
@@ -54,7 +54,7 @@ class Notifier:
         self._send("STOPPING=1")
 
     def close(self) -> None:
-        """Say no more; twice is fine."""
+        """Close the socket; calling it twice is fine."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

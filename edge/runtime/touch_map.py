@@ -161,12 +161,12 @@ class TouchMap:
 
     @property
     def frame(self) -> str:
-        """In which places are given."""
+        """The frame in which positions are given."""
         return self.head.frame
 
     @property
     def unit(self) -> str:
-        """Of places."""
+        """The unit of positions."""
         return self.head.unit
 
     def _entries(self) -> Iterator[tuple[int, dict[str, Any]]]:

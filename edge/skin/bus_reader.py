@@ -60,7 +60,7 @@ NEVER = -1.0e9
 
 
 class State(enum.Enum):
-    """Of one chip."""
+    """The state of one chip."""
 
     RUNNING = "running"
     STARTING = "starting"

@@ -105,7 +105,8 @@ class Reading:
         rate_hz: of frames.
         timeout_s: what a hung chip costs at most; adapters round it up to 10 ms.
         verify_mux: read a mux's control byte back after each selection.
-        recheck_frames: on each bus one chip's settings are read again every so many frames.
+        recheck_frames: number of frames after which the settings of the next chip of each bus
+            are read again.
         stuck_frames: a chip whose bytes do not change for so many frames is invalid; only
             where the calibration has seen it make noise.
         region_of_interest: read the chips near the contact at full rate, the rest in turn.

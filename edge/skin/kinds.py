@@ -39,7 +39,7 @@ USUAL = {
     ("block", 12): Usual(drift_counts_per_s=1.25, drift_limit_counts=125),
     ("block", 8): Usual(drift_counts_per_s=0.08, drift_limit_counts=8),
 }
-"""By kind and bits per taxel."""
+"""Defaults by kind and bits per taxel."""
 
 
 def usual_of(kind: str, bits: int) -> Usual:

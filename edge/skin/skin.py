@@ -34,7 +34,7 @@ OLDEST_FRAMES = 2
 
 @dataclass(frozen=True)
 class ChipStatus:
-    """How one chip does.
+    """The state of one chip.
 
     Attributes:
         bus, route, kind: where and what it is, for a person.
@@ -54,7 +54,7 @@ class ChipStatus:
 
 
 class _Worker(threading.Thread):
-    """Reads one bus whenever it is told to."""
+    """Reads one bus whenever a job is put into `todo`."""
 
     def __init__(self, reader: BusReader) -> None:
         super().__init__(name=f"edge-classify {reader.bus.name}", daemon=True)
@@ -259,7 +259,7 @@ class Skin:
         return down
 
     def status(self) -> list[ChipStatus]:
-        """How each chip does, in the file's order."""
+        """The state of each chip, in the file's order."""
         return [
             ChipStatus(
                 bus=reader.bus.name,

@@ -246,7 +246,7 @@ class Contact:
     def _distance(
         self, which: str, centroid: tuple[float, float], joints: NDArray[np.float64] | None
     ) -> float:
-        """From where this centroid was first seen; NaN where the pose is not known."""
+        """Distance from where this centroid was first seen; NaN where the pose is not known."""
         position = self._located(centroid, joints)
         if position is None:
             return math.nan

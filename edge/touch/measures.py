@@ -58,11 +58,12 @@ SIGNED = ("around", "slant", "joint_change", "joint_angle")
 """Quantities that may be negative, and so have no logarithm."""
 
 TRANSFORMS = ("log", "sqrt", "relative")
-"""Of a feature's value: the logarithm of the value and a floor (`edge.touch.features`), the
-square root with the value's sign, and the value over its largest magnitude within the window."""
+"""Transforms of a feature's value: the logarithm of the value and a floor (see
+`edge.touch.features`), the square root with the value's sign, and the value over its largest
+magnitude within the window."""
 SUMMARIES = ("rate", "mean", "deviation", "roughness")
-"""Of its course: the change a second; and one number for the window: mean, standard deviation,
-mean step from sample to sample."""
+"""Summaries of its course: the change a second; and one number for the window: mean, standard
+deviation, mean step from sample to sample."""
 _NAME = re.compile(
     rf"((?:(?:{'|'.join(TRANSFORMS)})_)*)(.+?)(?:_({'|'.join(SUMMARIES)}))?(?:@(\d+))?"
 )
@@ -90,7 +91,7 @@ class Feature:
     samples: int = 0
 
     def unit(self, layout: SkinLayout) -> str:
-        """Of its values on a skin."""
+        """The unit of its values on a skin."""
         unit = {
             "max_force": layout.force_unit,
             "force": layout.force_unit,

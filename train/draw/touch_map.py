@@ -19,7 +19,7 @@ from train.draw.recording import link_positions
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"
-UNKNOWN = "not told"
+UNKNOWN = "no label"
 
 
 def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:

@@ -30,7 +30,7 @@ THRESHOLD_COUNTS = 50
 ONSET_COUNTS = 60
 """A little above the threshold, so that a force that hovers there is one contact."""
 LARGEST_BYTES = 1 << 26
-"""Of a file once unpacked; the longest grasp of those published takes 1 MB."""
+"""Largest size of a file once unpacked; the longest of the published grasps takes 1 MB."""
 STALE_S = 0.1
 """Joint angles are known within this of their first and last time: ten times their period."""
 

@@ -55,7 +55,7 @@ class Log:
     arm: Chain | None = None
     _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(default_factory=dict)
     _joints: dict[str, dict[str, list[tuple[float, float]]]] = field(default_factory=dict)
-    """By topic and joint: times and angles."""
+    """Times and angles, by topic and joint."""
 
     @classmethod
     def of(cls, path: Path, arm: Chain | None = None) -> Log:

@@ -70,7 +70,7 @@ class Section:
 
 
 def percent(value: float) -> float:
-    """To two places, as the paper prints them."""
+    """Rounded to two places, as the paper prints its numbers."""
     return round(100.0 * value, 2)
 
 

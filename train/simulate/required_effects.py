@@ -1,4 +1,4 @@
-"""Which effects a scene required for, and what called for each."""
+"""Which effects a scene requires, and what called for each."""
 
 from __future__ import annotations
 

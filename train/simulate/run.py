@@ -65,7 +65,7 @@ def steps(scene: Scene) -> dict[Kind, float]:
 
 
 def file_name(scene: Scene, trial: TrialSpec) -> str:
-    """Of a trial's recording."""
+    """The file name of a trial's recording."""
     return f"{trial.key}-{trial.number:0{len(str(max(scene.count - 1, 10)))}d}.npz"
 
 

@@ -24,14 +24,14 @@ from train.study.skins import View
 OURS = (("paper", "pca"), ("paper", "lda"), ("contact", "lda"), ("moments", "lda"))
 """Sets of features and how they are projected: the paper's way first."""
 SAMPLES = 20
-"""Values of a feature that follows time."""
+"""Times at which a feature is sampled."""
 SCALING = "IV"
 TREES = 300
 TIMES = 10
-"""Of every taxel, for the peers."""
+"""Times at which every taxel is sampled, for the peers."""
 GROUP_TASK = "object"
 SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Parts of the trials in the learning curve."""
+"""Shares of the trials in the learning curve."""
 CURVE = (("paper", "pca"), ("contact", "lda"))
 
 Peer = Callable[[NDArray[np.float64], NDArray[np.str_], NDArray[np.float64]], NDArray[np.str_]]

@@ -54,12 +54,12 @@ class Context:
 
     @property
     def recordings(self) -> list[Recording]:
-        """Of each trial."""
+        """The recording of each trial."""
         return [trial.recording for trial in self.dataset.trials]
 
     @property
     def series(self) -> list[FeatureSeries | None]:
-        """Of each trial."""
+        """The series of each trial."""
         return [trial.series for trial in self.dataset.trials]
 
     def vectors(

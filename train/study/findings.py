@@ -20,13 +20,19 @@ def _rows(sections: Sequence[Section], name: str) -> list[dict[str, Any]]:
 
 
 def section(sections: Sequence[Section]) -> Section:
-    """What an owner needs most first: how well things that were never met are told apart."""
+    """The findings; first what an owner needs most: how well objects never met are recognised."""
     honest = _rows(sections, "honest")
     beyond = _rows(sections, "beyond_sets")
     table = Table(
         "findings",
         "In short",
-        ("task", "a new contact %", "a thing never met %", "best found %", "most frequent label %"),
+        (
+            "task",
+            "a new contact %",
+            "an object never met %",
+            "best found %",
+            "most frequent label %",
+        ),
         narrow=5,
     )
     text = []
@@ -41,17 +47,17 @@ def section(sections: Sequence[Section]) -> Section:
         top = "" if best is None else best["accuracy %"]
         table.rows.append((task, by["nested"], unseen, top, by["majority"]))
         sentence = (
-            f"{task}: with the paper's features a new contact with a known thing is told rightly "
+            f"{task}: with the paper's features a new contact with a known object is right "
             f"{by['nested']:.0f} % of the time"
         )
         if unseen != "":
-            sentence += f", one with a thing never met {unseen:.0f} %"
+            sentence += f", one with an object never met {unseen:.0f} %"
         if best is not None:
             sentence += (
                 f"; the best found here is {best['accuracy %']:.0f} %, {best['what decides']}"
             )
             if best["objects not met %"] != "":
-                sentence += f" ({best['objects not met %']:.0f} % of things never met)"
+                sentence += f" ({best['objects not met %']:.0f} % for objects never met)"
         text.append(sentence + ".")
     for part in sections:
         for found in part.text:

@@ -31,7 +31,7 @@ from train.study.skins import View, vectors
 GROUP_TASK = "object"
 FACTORS = (0.5, 2.0, 4.0, 8.0)
 PARTS = (0.05, 0.1, 0.2)
-"""Of an object's median peak force, as its own threshold."""
+"""Share of an object's median peak force that is taken as its own threshold."""
 
 
 def nested(

@@ -59,7 +59,7 @@ def physics(scene: Scene) -> Scene:
 def groups(scenes: Mapping[str, Scene]) -> list[list[str]]:
     """Names of scenes that differ in their sensor alone, a list for each physics.
 
-    A sensor without any effect is no part of a group: its film is taken in whole counts.
+    A sensor without any effect is no part of a group: its frames are kept in whole counts.
     """
     found: list[tuple[Scene, bool, list[str]]] = []
     for name, scene in scenes.items():

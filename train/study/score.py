@@ -64,7 +64,7 @@ def transfer(
     """Trained on trials as they are, tested on the same trials under some change.
 
     A changed trial has the draws of its twin in training but for the change: the twin is left
-    out, as in leave-one-out, or a trial would be told by itself.
+    out, as in leave-one-out, or a trial would be recognised by itself.
 
     Args:
         X: (n, p) training trials.

@@ -79,7 +79,7 @@ class MeasuredPoint:
     """One setting of one task, with what it costs and gives.
 
     Attributes:
-        task: what is told.
+        task: the question.
         taxels: of the skin, whole or pooled.
         wire: how it is wired.
         features: what is measured.
@@ -107,7 +107,7 @@ class MeasuredPoint:
 
     @property
     def seconds(self) -> float:
-        """From onset to decision."""
+        """Seconds from onset to decision."""
         return self.window_s + self.wire_s + self.arithmetic_s
 
 

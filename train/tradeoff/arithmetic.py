@@ -36,7 +36,7 @@ def accuracy(
     *,
     plain: bool = False,
 ) -> float:
-    """In ten folds, of a choice made once: the changes are compared, not the choice.
+    """Accuracy in ten folds of a choice made once: the changes are compared, not the choice.
 
     Args:
         X: (n, p).

@@ -230,12 +230,12 @@ def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> f
 
 @dataclass(frozen=True)
 class Novelty:
-    """Contacts with things that were trained, and with things that were not.
+    """Contacts with objects that were trained, and with objects that were not.
 
     Attributes:
-        novelty_rate: share of contacts with trained things that are called unknown.
-        known: trials of trained things.
-        strange: trials of things left out whole, and how many of them are called unknown.
+        novelty_rate: share of contacts with trained objects that are called unknown.
+        known: trials of trained objects.
+        strange: trials of objects left out whole, and how many of them are called unknown.
     """
 
     novelty_rate: float
@@ -259,7 +259,7 @@ def novelty(
         choice: of that task.
         features: names of the types.
         widths: columns of each; equal where None.
-        rates: of false alarms.
+        rates: novelty rates.
 
     Returns:
         An entry a rate; none where too few labels are left.

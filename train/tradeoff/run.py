@@ -1,4 +1,4 @@
-"""The whole of it: recordings and a board's figures in; picture, tables and ready settings out."""
+"""The whole trade-off: recordings and a board's figures in; picture, tables and settings out."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ def _vectors(
 def _early(
     dataset: DataSet, y: Labels, jobs: int
 ) -> tuple[dict[str, early.StoppingComparison], dict[str, Choice], list[early.Novelty]]:
-    """Early stopping of every task, what all trials choose, and things left out whole."""
+    """Early stopping of every task, what all trials choose, and objects left out whole."""
     X = np.stack([dataset.features(window, SAMPLES, NAMES) for window in DECISION_POINTS_S])
     columns = dataset.widths(SAMPLES)
     choose = Chooser(X[-1], y, GRIDS, dataset.names, columns)

@@ -182,11 +182,11 @@ def stopping(
 
 
 def unknown(task: str, found: Sequence[early.Novelty]) -> Section:
-    """How often contacts with known and with strange things are called unknown."""
+    """How often contacts with known and with new objects are called unknown."""
     table = Table(
         "unknown",
         f"Called unknown, of {task}",
-        ("false alarms %", "trained trials", "trials of objects left out", "of them unknown %"),
+        ("novelty rate %", "trained trials", "trials of objects left out", "of them unknown %"),
         [
             (
                 round(100 * one.novelty_rate, 1),

@@ -1,4 +1,4 @@
-"""What tells things that were never met: how force grows, with area and with motion.
+"""What recognises objects that were never met: how force grows, with area and with motion.
 
 | feature | unit | from |
 |---|---|---|
@@ -10,8 +10,8 @@
 | `force_motion`, its `_rate` | metre, metre/s | its sums of counts times row, column; the pose |
 | `log_stiffness` | log(newton/metre) | the skin's sum of counts over force-weighted motion |
 
-Logarithms make of a product a sum: what differs from thing to thing by a factor is a shift. Five
-times are enough for courses this smooth; more of them fit the things that were met.
+Logarithms turn a product into a sum: what differs between objects by a factor is a shift. Five
+times are enough for courses this smooth; more of them fit the objects that were met.
 """
 
 FEATURES = (

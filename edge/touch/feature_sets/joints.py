@@ -6,9 +6,9 @@
 | `joint_change_rate` | radian/s | the same |
 | `joint_angle`, at ten times | radian | the angles themselves |
 
-How far joints yield tells the thing that is touched. The angles themselves (`POSTURE`) tell a
-gripper the thing's size, and an arm where the thing stood: where each thing stood in a place of
-its own, they tell the thing for a reason that holds in that room alone.
+How far joints yield depends on the object that is touched. The angles themselves (`POSTURE`) give a
+gripper the object's size, and an arm its place: where each object stood in a place of its own, they
+recognise it for a reason that holds in that room alone.
 """
 
 FEATURES = ("joint_change@10", "joint_change_rate@10")

@@ -26,9 +26,9 @@ from train.simulate.plan import Build
 from train.simulate.state import State
 
 MARGIN = 0.19
-"""Of the flat strip: what it bears beyond the foundation under it, as a width over H."""
+"""What the flat strip bears beyond the foundation under it, as a width over H."""
 SPREAD = 0.55
-"""Of the load at first touch, which goes with a^2 as on a half space."""
+"""The same of the load at first touch, which goes with a^2 as on a half space."""
 
 
 def add(build: Build) -> None:

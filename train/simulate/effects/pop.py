@@ -17,9 +17,9 @@ from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 
 SLOPES = (1.0, 4.0, 16.0)
-"""Of the tangents, times k0."""
+"""Slopes of the tangents, as multiples of k0."""
 BREAKS = (1.0 / 3.0, 2.0 / 3.0)
-"""Depths at which they cross, times b."""
+"""Depths at which they cross, as multiples of b."""
 SEGMENTS = len(SLOPES) + 1
 
 
