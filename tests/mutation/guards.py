@@ -49,7 +49,7 @@ CONTACT, GRID = "edge/touch/contact.py", "edge/touch/grid.py"
 PIPELINE, PROJECTION = "train/pipeline.py", "train/projection.py"
 GRAPH, TRACK = "export/graph.py", "edge/touch/track.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
-TILT = "train/simulate/effects/tilt.py"
+TILT = "train/simulate/pivot_solver.py"
 
 GUARDS = (
     Guard(
@@ -341,15 +341,15 @@ GUARDS = (
     Guard(
         "the tilt's Newton steps are cut back",
         f"{TILT}:search",
-        "y = guarded(bed, lever, y, free, c, ~done)",
+        "size *= min(max(begin / (begin - end), 0.1), 0.9)",
         "pass",
         "tilt",
     ),
     Guard(
         "the tilt's loads come from the side with more digits",
         f"{TILT}:agree",
-        "force = np.where(stiff, (c[2] * d0 - c[1] * d1) / some, bed[0])",
-        "force = bed[0]",
+        "force = (at.c11 * d0 - at.c01 * d1) / det",
+        "force = found[0]",
         "tilt",
     ),
 )

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-
-Array = NDArray[np.float64]
+from train.simulate.contact import Array, total
 
 
 @dataclass(frozen=True)
@@ -147,10 +145,7 @@ def _turned(rotation: Array, axis: Array, sine: Array, cosine: Array) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Sum over the first axis, one term after the other: the same bits in any batch."""
-    total = a[0] * b[0]
-    for i in range(1, len(a)):
-        total = total + a[i] * b[i]
-    return np.asarray(total)
+    return total(a * b)
 
 
 def cross(a: Array, b: Array) -> Array:

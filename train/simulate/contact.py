@@ -11,11 +11,55 @@ or (F, M); C = (c00,) or (c00, c01, c11) is what a unit load takes off y within 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Coordinates = tuple[Array, ...]
+
+
+class Springs(NamedTuple):
+    """The springs of n trials, for a solver that takes them trial by trial.
+
+    Attributes:
+        gaps, stiffness: (n, C) metres at which a spring is touched, ascending; newtons a metre.
+        column: (n, C) which of the bed's springs each is.
+        weight, line_gap, lever: (L, n) the part of each line that is covered, metres by which
+            the face draws back there, metres from the contact's middle.
+        alive: (L, C, n) 1 where one of the bed's springs bears and 0 where it does not;
+            (0, 0, 0) if all do.
+        gain, load: (n,) and (L, n) of what answers to speed (`viscous`); (0,) and (0, 0) if
+            nothing does.
+    """
+
+    gaps: Array
+    stiffness: Array
+    column: NDArray[np.int64]
+    weight: Array
+    line_gap: Array
+    lever: Array
+    alive: Array
+    gain: Array
+    load: Array
+
+
+def sorted_springs(gaps: Array, stiffness: Array) -> Springs:
+    """The springs (C, n) of a bed by depth, without lines yet."""
+    column = np.argsort(gaps, axis=0, kind="stable")
+    none = np.zeros((0, 0))
+    return Springs(
+        gaps=np.ascontiguousarray(np.take_along_axis(gaps, column, axis=0).T),
+        stiffness=np.ascontiguousarray(np.take_along_axis(stiffness, column, axis=0).T),
+        column=np.ascontiguousarray(column.T.astype(np.int64)),
+        weight=none,
+        line_gap=none,
+        lever=none,
+        alive=np.zeros((0, 0, 0)),
+        gain=np.zeros(0),
+        load=none,
+    )
 
 
 def relieve(y: Coordinates, c: Coordinates, loads: Coordinates) -> Coordinates:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate.arm import Array
 from train.simulate.assemble import make_plan
+from train.simulate.contact import Array
 from train.simulate.engine import Batch, kind_of, run_batch
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SPREAD

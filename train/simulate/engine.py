@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
 from train.simulate import streams
-from train.simulate.arm import Array, Kinematics
+from train.simulate.arm import Kinematics
 from train.simulate.assemble import make_plan
 from train.simulate.base import equilibrium
+from train.simulate.contact import Array
 from train.simulate.plan import Plan
 from train.simulate.required_effects import required_effects
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Self, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.simulate.arm import Array, Kinematics, Pose
-from train.simulate.contact import Coordinates, touching
-from train.simulate.contact import total as sum_first
+from train.simulate.arm import Kinematics, Pose
+from train.simulate.contact import Array, Coordinates, Springs
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
 
 Own = TypeVar("Own")
@@ -38,24 +37,9 @@ class Bed:
     slopes: Array = field(init=False)
     intercepts: Array = field(init=False)
 
-    def forces(self, depths: Array) -> tuple[Array, Array]:
-        """(L, n) force and stiffness of each line at its depth (L, n)."""
-        some = touching(self.gaps, depths.max(axis=0))
-        if some.stop == 0:
-            return np.zeros_like(depths), np.zeros_like(depths)
-        inside = depths - self.gaps[some, None]
-        held = (inside > 0.0) * self.stiffness[some, None]
-        inside *= held
-        return sum_first(inside) * self.weight, sum_first(held) * self.weight
-
-    def take(self, where: NDArray[np.intp]) -> Self:
-        """The bed of some of the trials."""
-        part = object.__new__(type(self))
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and value.shape[-1] > 1:
-                value = value[..., where]
-            setattr(part, name, value)
-        return part
+    def lines_of(self, springs: Springs, lever: Array) -> Springs:
+        """The bed's springs with its lines as they are now, at their levers (L, n)."""
+        return springs._replace(weight=self.weight, line_gap=self.line_gap, lever=lever)
 
 
 @dataclass

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import Array, Coordinates, relieve
+from train.simulate.contact import Array, Coordinates, Springs, relieve
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 
@@ -65,12 +65,10 @@ class ViscousBed(Bed):
     gain: Array
     load: Array
 
-    def forces(self, depths: Array) -> tuple[Array, Array]:
-        """(L, n) force and stiffness of each line at its depth (L, n)."""
-        elastic, stiffness = super().forces(depths)
-        force = self.gain * elastic + self.load[self.lines]
-        held = (elastic > 0.0) & (force > 0.0)
-        return np.where(held, force, 0.0), np.where(held, self.gain * stiffness, 0.0)
+    def lines_of(self, springs: Springs, lever: Array) -> Springs:
+        """The bed's springs, with what answers to speed."""
+        lines = super().lines_of(springs, lever)
+        return lines._replace(gain=self.gain, load=self.load[self.lines])
 
 
 RANK = base.ORDER + 30
@@ -82,14 +80,14 @@ def add(build: Build) -> None:
     if any(function in (begin, begin_lines) for _, _, function in build.entries):
         return
     if "tilt" in build.effects:
-        from train.simulate.effects.tilt import line_depths
+        from train.simulate.effects.tilt import line_forces
 
         def relax_lines(state: State) -> None:
             """Each row's branches move on; a row that the face does not cover bears nothing."""
             own, bed = state.of(Branches), state.bed
             assert isinstance(bed, ViscousBed)
             force = np.zeros_like(own.load)
-            force[bed.lines] = bed.forces(line_depths(state))[0]
+            force[bed.lines] = line_forces(state)
             own.move_on(force)
             bed.load = own.load
 

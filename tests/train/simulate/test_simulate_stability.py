@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from train.simulate import contact
+from edge.errors import EdgeError
+from train.simulate import contact, pivot_solver
 from train.simulate.effects import tilt
 from train.simulate.motion import GRAVITY
-from train.simulate.state import Bed
 
 MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
 
@@ -237,13 +237,19 @@ class TestTraps:
         held = loads.sum(axis=(0, 1)) > 0.0
         np.testing.assert_allclose(shared[held], force[held], rtol=1e-14)
 
-    def test_newton_on_the_tilt_needs_its_line_search(self, monkeypatch):
+    def test_newton_on_the_tilt_needs_its_line_search(self):
         beds, free, c = tilt_cases(600, seed=1)
         left = tilt_error(beds, free, c, tilt_loads(beds, free, c))
         assert left.max() < 1e-9
-        monkeypatch.setattr(tilt, "guarded", lambda bed, lever, y, free, c, open_: y)
-        without = tilt_error(beds, free, c, tilt_loads(beds, free, c))
+        without = tilt_error(beds, free, c, tilt_loads(beds, free, c, guarded_rounds=0))
         assert (without > 1e-6).sum() >= 1
+
+    def test_a_tilt_that_is_not_found_is_refused(self, monkeypatch):
+        springs, free, c = tilt_cases(600, seed=1)
+        monkeypatch.setattr(tilt, "GUARDED_ROUNDS", 0)
+        nothing = np.zeros(600)
+        with pytest.raises(EdgeError, match=r"tilt of \d+ contacts was not found"):
+            tilt.search(springs, (nothing, nothing), free, c)
 
     def test_backward_euler_at_10_ms_loses_stick_slip_and_1_ms_keeps_it(self, tools):
         mass, mu_s, mu_k, speed = 1.0, 0.6, 0.3, 0.02
@@ -329,33 +335,44 @@ def tilt_cases(n, seed):
     lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
     c00 = 10.0 ** rng.uniform(-3, 0, n)
     c11 = 10.0 ** rng.uniform(-2, 0.5, n)
-    bed = Bed(
+    gaps = 0.046 * (1.0 - np.cos(angles)) + np.zeros(n)
+    stiffness = 10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1))
+    springs = contact.sorted_springs(gaps, stiffness)._replace(
         line_gap=lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
-        gaps=0.046 * (1.0 - np.cos(angles)) + np.zeros(n),
-        stiffness=10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1)),
         weight=np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
-        lines=slice(0, 16),
+        lever=lever,
     )
     free = (rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n))
     c = (c00, rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11), c11)
-    return (bed, lever), free, c
+    return springs, free, c
 
 
-def tilt_loads(beds, free, c):
+def tilt_loads(springs, free, c, guarded_rounds=tilt.GUARDED_ROUNDS):
     """The simulator's loads, searched for from none."""
     nothing = np.zeros_like(free[0])
-    return tilt.search(*beds, (nothing, nothing), free, c)
+    return pivot_solver.search(springs, (nothing, nothing), free, c, guarded_rounds)[:2]
 
 
-def tilt_error(beds, free, c, loads):
+def tilt_error(springs, free, c, loads):
     """Distance from the one answer, metres at the skin: the step that exact Newton would take.
 
     The energy is strictly convex, so a point with no step left is its minimum.
     """
-    y = (
-        free[0] - (c[0] * loads[0] + c[1] * loads[1]),
-        free[1] - (c[1] * loads[0] + c[2] * loads[1]),
-    )
-    bed, h = tilt.answer(*beds, y)
-    p = tilt.newton_step(c, tilt.residual(y, free, c, bed), h)
-    return np.abs(p[0]) + 0.1 * np.abs(p[1])
+    y0 = free[0] - (c[0] * loads[0] + c[1] * loads[1])
+    y1 = free[1] - (c[1] * loads[0] + c[2] * loads[1])
+    inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps.T
+    held = (inside > 0.0) * springs.stiffness.T * springs.weight[:, None]
+    force, k = (inside * held).sum(axis=1), held.sum(axis=1)
+    whole = k.sum(axis=0)
+    mean = (k * springs.lever).sum(axis=0) / np.where(whole > 0.0, whole, 1.0)
+    spread = (k * (springs.lever - mean) ** 2).sum(axis=0)
+    r0 = c[0] * (force.sum(axis=0) - loads[0]) + c[1] * ((force * springs.lever).sum(0) - loads[1])
+    r1 = c[1] * (force.sum(axis=0) - loads[0]) + c[2] * ((force * springs.lever).sum(0) - loads[1])
+    # (I + C H) p = r, about the mean lever, where H is diagonal.
+    c01 = c[1] + mean * c[2]
+    c00 = c[0] + mean * (c[1] + c01)
+    r0 = r0 + mean * r1
+    det = 1.0 + c00 * whole + c[2] * spread + (c00 * c[2] - c01 * c01) * whole * spread
+    p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r1) / det
+    p1 = ((1.0 + c00 * whole) * r1 - c01 * whole * r0) / det
+    return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)

@@ -12,7 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import Array, share_out, sort_bed, spring_loads, total, touching
+from train.simulate.contact import (
+    Array,
+    Springs,
+    share_out,
+    sort_bed,
+    spring_loads,
+    total,
+    touching,
+)
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 
@@ -35,17 +43,9 @@ class BubbleBed(Bed):
     alive: Array
     burst: bool
 
-    def forces(self, depths: Array) -> tuple[Array, Array]:
-        """(L, n) force and stiffness of each line at its depth (L, n)."""
-        some = touching(self.gaps, depths.max(axis=0))
-        if some.stop == 0:
-            return np.zeros_like(depths), np.zeros_like(depths)
-        alive = self.alive[self.lines, some].swapaxes(0, 1)
-        inside = depths - self.gaps[some, None]
-        held = (inside > 0.0) * self.stiffness[some, None]
-        held *= alive
-        inside *= held
-        return total(inside) * self.weight, total(held) * self.weight
+    def lines_of(self, springs: Springs, lever: Array) -> Springs:
+        """The bed's springs, without those that are gone."""
+        return super().lines_of(springs, lever)._replace(alive=self.alive[self.lines])
 
 
 def bubbles(state: State) -> BubbleBed:

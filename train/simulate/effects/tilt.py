@@ -1,9 +1,7 @@
 """The forearm pivots about the contact: a second coordinate, the angle against the face.
 
-Rows then press to different depths, a + lever * tilt, and the loads are a force and a moment.
-The energy of arm and bed is convex and piecewise quadratic in (a, tilt), so its minimum is the
-one answer; Newton's method finds it in a few rounds, and where it cycles between pieces a line
-search on the slope takes over (`guarded`).
+Rows then press to different depths, a + lever * tilt, and the loads are a force and a moment
+(`pivot_solver`).
 """
 
 from __future__ import annotations
@@ -11,21 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import EdgeError
-from train.simulate import base
+from train.simulate import base, pivot_solver
 from train.simulate.arm import cross, dot
-from train.simulate.contact import Array, Coordinates, total
+from train.simulate.contact import Array, Coordinates, Springs, sorted_springs
 from train.simulate.plan import Build
-from train.simulate.state import Bed, State
+from train.simulate.state import State
 
-ROUNDS = 8
-"""Plain Newton rounds before the line search takes over; two or three are usual."""
 GUARDED_ROUNDS = 5000
 """A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
-CLOSE = (1e-14, 1e-13)
-"""Metres and radians: a step below it is rounding."""
 
 
 @dataclass
@@ -35,11 +28,13 @@ class Tilt:
     Attributes:
         guess: loads with which the next step's search begins.
         settled: loads of the step before.
+        springs: the bed's, by depth.
         lever: (L, n) metres along the forearm from the face's middle to each line.
     """
 
     guess: Coordinates
     settled: Coordinates
+    springs: Springs
     lever: Array
 
 
@@ -55,7 +50,8 @@ def add(build: Build) -> None:
 def upright(state: State) -> None:
     """No load yet."""
     state.loads = (np.zeros(state.n), np.zeros(state.n))
-    state.keep(Tilt(guess=state.loads, settled=state.loads, lever=np.zeros((1, state.n))))
+    springs = sorted_springs(state.bed.gaps, state.bed.stiffness)
+    state.keep(Tilt(state.loads, state.loads, springs, np.zeros((1, state.n))))
 
 
 def pivot(state: State) -> None:
@@ -114,132 +110,29 @@ def remember(state: State) -> None:
     own.settled = loads
 
 
-def answer(bed: Bed, lever: Array, y: Coordinates) -> tuple[Coordinates, Coordinates]:
-    """Loads (F, M) at y, and the stiffness there: total, mean lever, spread about the mean."""
-    force, stiffness = bed.forces(y[0] + lever * y[1] - bed.line_gap)
-    whole = total(stiffness)
-    mean = total(stiffness * lever) / np.where(whole > 0.0, whole, 1.0)
-    off = lever - mean
-    off *= off
-    off *= stiffness
-    return (total(force), total(force * lever)), (whole, mean, total(off))
-
-
-def newton_step(c: Coordinates, r: Coordinates, h: Coordinates) -> Coordinates:
-    """p of (I + C H) p = r, in coordinates about the stiffness's mean lever, where H is
-    diagonal and the determinant a sum of positive terms: no digits are lost at 1e15 N/m."""
-    whole, mean, spread = h
-    c01 = c[1] + mean * c[2]
-    c00 = c[0] + mean * (c[1] + c01)
-    r0 = r[0] + mean * r[1]
-    det = 1.0 + c00 * whole + c[2] * spread + (c00 * c[2] - c01 * c01) * whole * spread
-    p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r[1]) / det
-    p1 = ((1.0 + c00 * whole) * r[1] - c01 * whole * r0) / det
-    return p0 - mean * p1, p1
-
-
-def residual(y: Coordinates, free: Coordinates, c: Coordinates, f: Coordinates) -> Coordinates:
-    """y - (free - C f)."""
-    return (
-        y[0] - free[0] + (c[0] * f[0] + c[1] * f[1]),
-        y[1] - free[1] + (c[1] * f[0] + c[2] * f[1]),
-    )
-
-
 def solve(state: State, free: Coordinates, c: Coordinates) -> Coordinates:
     """The loads (F, M) at which arm and bed agree."""
     own = state.of(Tilt)
-    return search(state.bed, own.lever, own.guess, free, c)
+    return search(state.bed.lines_of(own.springs, own.lever), own.guess, free, c)
 
 
-def search(
-    bed: Bed, lever: Array, guess: Coordinates, free: Coordinates, c: Coordinates
-) -> Coordinates:
-    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them."""
-    force, moment = guess
-    y: Coordinates = (
-        free[0] - (c[0] * force + c[1] * moment),
-        free[1] - (c[1] * force + c[2] * moment),
-    )
-    done = np.zeros(len(force), dtype=bool)
-    loads, h = answer(bed, lever, y)
-    for _ in range(ROUNDS):
-        p = newton_step(c, residual(y, free, c, loads), h)
-        # A trial that is done stays as it is, whatever its neighbours in the batch still need.
-        done |= (np.abs(p[0]) <= CLOSE[0]) & (np.abs(p[1]) <= CLOSE[1])
-        if done.all():
-            break
-        y = (np.where(done, y[0], y[0] - p[0]), np.where(done, y[1], y[1] - p[1]))
-        loads, h = answer(bed, lever, y)
-    else:
-        y = guarded(bed, lever, y, free, c, ~done)
-        loads, h = answer(bed, lever, y)
-    return agree(y, free, c, loads, h[0])
+def search(springs: Springs, guess: Coordinates, free: Coordinates, c: Coordinates) -> Coordinates:
+    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them.
 
-
-def agree(
-    y: Coordinates, free: Coordinates, c: Coordinates, bed: Coordinates, stiffness: Array
-) -> Coordinates:
-    """The loads at the solution, from the side that has more digits: a stiff bed's depth is
-    all rounding, while what the arm has given way is not."""
-    det = c[0] * c[2] - c[1] * c[1]
-    d0, d1 = free[0] - y[0], free[1] - y[1]
-    stiff = (c[0] * stiffness > 1.0) & (det > 0.0) & (bed[0] > 0.0)
-    some = np.where(det > 0.0, det, 1.0)
-    force = np.where(stiff, (c[2] * d0 - c[1] * d1) / some, bed[0])
-    moment = np.where(stiff, (c[0] * d1 - c[1] * d0) / some, bed[1])
-    held = force > 0.0
-    return np.where(held, force, 0.0), np.where(held, moment, 0.0)
-
-
-def guarded(
-    bed: Bed,
-    lever: Array,
-    y: Coordinates,
-    free: Coordinates,
-    c: Coordinates,
-    open_: NDArray[np.bool_],
-) -> Coordinates:
-    """Newton with a line search, for the trials `open_` (n,) that plain Newton left.
-
-    The slope of the energy along a step rises steadily, so a step that ends with the slope
-    turned uphill by more than half of what it began with is cut back along its secant.
+    Raises:
+        EdgeError: they were not found.
     """
-    where = np.flatnonzero(open_)
-    part, levers = bed.take(where), lever[..., where]
-    y_, free_ = tuple(v[where] for v in y), tuple(v[where] for v in free)
-    c_ = tuple(np.broadcast_to(v, open_.shape)[where] for v in c)
-    det = c_[0] * c_[2] - c_[1] * c_[1]
-
-    def slope(at: Coordinates, p: Coordinates) -> Array:
-        d0, d1 = at[0] - free_[0], at[1] - free_[1]
-        loads, _ = answer(part, levers, at)
-        g0 = (c_[2] * d0 - c_[1] * d1) / det + loads[0]
-        g1 = (c_[0] * d1 - c_[1] * d0) / det + loads[1]
-        return -(p[0] * g0 + p[1] * g1)
-
-    small = np.zeros(len(where), dtype=bool)
-    for _ in range(GUARDED_ROUNDS):
-        loads, h = answer(part, levers, y_)
-        p = newton_step(c_, residual(y_, free_, c_, loads), h)
-        small |= (np.abs(p[0]) <= CLOSE[0]) & (np.abs(p[1]) <= CLOSE[1])
-        if small.all():
-            break
-        begin = slope(y_, p)
-        size = np.where(small, 0.0, 1.0)
-        for _ in range(40):
-            end = slope((y_[0] - size * p[0], y_[1] - size * p[1]), p)
-            far = (end > 0.5 * np.abs(begin)) & ~small
-            if not far.any():
-                break
-            cut = np.clip(begin / np.where(far, begin - end, 1.0), 0.1, 0.9)
-            size = np.where(far, size * cut, size)
-        y_ = (y_[0] - size * p[0], y_[1] - size * p[1])
-    else:
+    force, moment, lost = pivot_solver.search(springs, guess, free, c, GUARDED_ROUNDS)
+    if lost.any():
         raise EdgeError(
-            f"the tilt of {int((~small).sum())} contacts was not found in {GUARDED_ROUNDS} rounds; "
+            f"the tilt of {int(lost.sum())} contacts was not found in {GUARDED_ROUNDS} rounds; "
             "make the skin, the object or the step less extreme"
         )
-    out = (y[0].copy(), y[1].copy())
-    out[0][where], out[1][where] = y_
-    return out
+    return force, moment
+
+
+def line_forces(state: State) -> Array:
+    """(L, n) newtons that each line bears."""
+    own = state.of(Tilt)
+    springs = state.bed.lines_of(own.springs, own.lever)
+    return np.asarray(pivot_solver.line_forces(springs, state.depth))

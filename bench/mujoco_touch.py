@@ -1,0 +1,329 @@
+"""Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and what it meets.
+
+The arm is Cody's chain with its masses on gravity-compensated links, driven as an impedance
+controller drives it. Each taxel that can meet anything is a pad on a spring along its normal, and
+reads what the spring bears. Things stand on a floor under gravity, or are clamped; what is soft is
+a wall of sprung blocks that pull their neighbours along, and a plant is a set of hinged stems.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.recording import Recording
+from edge.touch.arm import Chain
+from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS, COLUMN_ANGLES_DEG
+
+START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
+RATE_DEG_S = 20.0
+LEAD_S, LASTS_S, RATE_HZ, STEP_S = 0.3, 2.1, 100, 0.001
+PLACE_M = 0.10
+COUNTS_PER_NEWTON, THRESHOLD_COUNTS, ONSET_COUNTS = 1000.0, 40, 60
+RADIUS_M = 0.04604
+ROWS = 16
+FACING_DEG = 76.0
+"""Taxels whose normal lies farther from the push than this can't meet anything."""
+PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
+ABOVE_FLOOR_M = 0.30
+"""Of the middle of the contact."""
+FOOT_M = 0.16
+"""Length of what a thing stands on, along the push."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """What is touched.
+
+    Attributes:
+        kind: box, drum, foam, cushion, bale or plant.
+        mass_kg, floor, skin: and its friction on the floor and on the skin.
+        height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
+        below_m: how far a rigid face goes on below the middle of the contact; to the floor.
+        modulus_pa, thick_m: of what is soft; `sideways` its shear foundation, as a part of
+            modulus times thickness.
+        stems, stem_n_m: of a plant, each at the height of the contact.
+        seed: of a plant's shape.
+    """
+
+    kind: str
+    mass_kg: float = 1.0
+    floor: float = 0.4
+    skin: float = 0.4
+    height_m: float = 0.2
+    breadth_m: float = 0.1
+    below_m: float = ABOVE_FLOOR_M
+    modulus_pa: float = 8e3
+    thick_m: float = 0.1
+    sideways: float = 0.06
+    stems: int = 8
+    stem_n_m: float = 10.0
+    seed: int = 0
+
+    @property
+    def soft(self) -> bool:
+        """Whether it yields."""
+        return self.kind not in ("box", "drum")
+
+
+@dataclass(frozen=True)
+class Touch:
+    """How it is touched; what is not given is as it would be by a machine.
+
+    Attributes:
+        start_rad: (dof,) what is added to the arm's first angles.
+        place_m: where along the forearm, from the wrist.
+        aside_m, yaw_rad: how far beside the push it stands, and turned.
+        slope_rad: of the table, along the push.
+        taxel_n_m: stiffness of the pads.
+        noise: counts, and its stream.
+    """
+
+    thing: Thing
+    fixed: bool
+    start_rad: tuple[float, ...] = (0.0,) * 5
+    place_m: float = PLACE_M
+    aside_m: float = 0.0
+    yaw_rad: float = 0.0
+    slope_rad: float = 0.0
+    taxel_n_m: float = 10e3
+    noise: tuple[float, np.random.Generator] | None = None
+
+
+@dataclass
+class Touched:
+    """What happened: the recording, and what no skin can see.
+
+    Attributes:
+        force: (n,) newtons that the pads bear.
+        moved_m: (n,) how far the thing has moved at the height of the contact.
+    """
+
+    recording: Recording
+    force: NDArray[np.float64]
+    moved_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+
+def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
+    """The arm's bodies, and the (row, column) of each pad."""
+    masses = {1: (2.1, "0 0 -0.13"), 3: (1.5, "0 0 -0.12")}
+    pads, where = "", []
+    k, skin = touch.taxel_n_m, touch.thing.skin
+    for row in range(ROWS):
+        for column, angle in enumerate(COLUMN_ANGLES_DEG):
+            if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
+                continue
+            out = f"{math.cos(math.radians(angle))} {math.sin(math.radians(angle))} 0"
+            x, y = ((RADIUS_M - PAD_M) * float(v) for v in out.split()[:2])
+            pads += (
+                f'<body pos="{x} {y} {0.18432 - 0.0108 * row}"><joint name="p{len(where)}" '
+                f'type="slide" axis="{out}" stiffness="{k}" damping="{PAD_LOSS_S * k}" '
+                f'armature="{PAD_KG}"/>'
+                f'<geom type="sphere" size="{PAD_M}" mass="0.0005" contype="1" conaffinity="2" '
+                f'solref="0.002 1" friction="{skin} 0.005 0.0001"/></body>'
+            )
+            where.append((row, column))
+    xml, end, at = "", "", "0 0 0"
+    for i, joint in enumerate(chain.joints):
+        axis = " ".join(map(str, joint.axis))
+        xml += f'<body pos="{at}" gravcomp="1"><joint name="j{i}" axis="{axis}" '
+        xml += f'damping="{CODY_DAMPING[i]}" armature="0.004"/>'
+        mass, centre = masses.get(i, (0.05, "0 0 0"))
+        size = "0.03 0.09" if i in masses else "0.02 0.01"
+        xml += f'<geom type="capsule" size="{size}" pos="{centre}" mass="{mass}" '
+        xml += 'contype="0" conaffinity="0"/>'
+        end = "</body>" + end
+        at = " ".join(map(str, joint.translate))
+    return xml + pads + end, where
+
+
+def stems_xml(thing: Thing, skin: str) -> str:
+    """Stems on hinges at the foot, bending along the push."""
+    rng = np.random.default_rng(thing.seed)
+    hinge = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2
+    xml = ""
+    for _ in range(thing.stems):
+        x = 0.012 + rng.uniform(0.0, 0.08)
+        y = rng.uniform(-0.5, 0.5) * min(thing.breadth_m, 0.15)
+        length = rng.uniform(0.34, 0.5)
+        xml += (
+            f'<body pos="{x} {y} 0.02"><joint axis="0 1 0" stiffness="{hinge}" '
+            f'damping="{0.03 * hinge}" armature="0.0002"/><geom type="capsule" size="0.006 '
+            f'{length / 2}" pos="0 0 {length / 2}" mass="0.01" contype="2" conaffinity="1" '
+            f"{skin}/></body>"
+        )
+    return xml
+
+
+def blocks_xml(thing: Thing, skin: str) -> tuple[str, str]:
+    """A wall of sprung blocks, and the springs between neighbours: a Pasternak foundation."""
+    dz, dy = 0.016, 0.0216
+    rows = round(min(thing.height_m, 0.22) / dz)
+    cols = round(min(thing.breadth_m, 0.17) / dy) | 1
+    k = thing.modulus_pa * dz * dy / thing.thick_m
+    shear = thing.sideways * thing.modulus_pa * thing.thick_m
+    xml, between = "", ""
+    for r in range(rows):
+        for c in range(cols):
+            y, z = (c - cols // 2) * dy, ABOVE_FLOOR_M + (r - (rows - 1) / 2) * dz
+            xml += (
+                f'<body pos="0.004 {y} {z}"><joint name="b{r}_{c}" type="slide" axis="1 0 0" '
+                f'stiffness="{k}" damping="{0.06 * k + 0.1}" range="0 {thing.thick_m * 0.9}" '
+                f'limited="true"/><geom type="box" size="0.004 {dy / 2} {dz / 2}" mass="0.003" '
+                f'contype="2" conaffinity="1" {skin}/></body>'
+            )
+            for r2, c2, part in ((r + 1, c, dy / dz), (r, c + 1, dz / dy)):
+                if r2 < rows and c2 < cols:
+                    between += (
+                        f'<fixed stiffness="{shear * part}"><joint joint="b{r}_{c}" coef="1"/>'
+                        f'<joint joint="b{r2}_{c2}" coef="-1"/></fixed>'
+                    )
+    return xml, between
+
+
+def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str, str]:
+    """The thing, its face at `face` and turned by `push` radians about the vertical; and the
+    springs between its parts."""
+    thing = touch.thing
+    x, y, z = face
+    base, width = z - ABOVE_FLOOR_M, thing.breadth_m
+    half = (thing.below_m + thing.height_m / 2) / 2
+    middle = ABOVE_FLOOR_M + thing.height_m / 2 - half
+    skin = f'friction="{thing.skin} 0.005 0.0001"'
+    floor = f'friction="{thing.floor} 0.005 0.0001"'
+    between, back = "", FOOT_M / 2
+    if thing.kind in ("box", "drum"):
+        shape = (
+            f'type="box" size="{FOOT_M / 2} {width / 2} {half}" pos="{FOOT_M / 2} 0 {middle}"'
+            if thing.kind == "box"
+            else f'type="cylinder" size="{width / 2 + 0.08} {half}" '
+            f'pos="{width / 2 + 0.08} 0 {middle}"'
+        )
+        parts = f'<geom {shape} mass="{thing.mass_kg * 0.2}" contype="2" conaffinity="1" {skin}/>'
+    elif thing.kind == "plant":
+        parts = stems_xml(thing, skin)
+    else:
+        parts, between = blocks_xml(thing, skin)
+        back = 0.2
+    foot = f'<geom type="box" size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" '
+    foot += f'pos="{back} 0 0.004" mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" '
+    foot += f"{floor}/>"
+    free = "" if touch.fixed else "<freejoint/>"
+    return (
+        f'<body name="thing" pos="{x} {y} {base}" axisangle="0 0 1 {push}">{free}{foot}{parts}'
+        f'</body><geom type="plane" size="4 4 0.1" pos="0 0 {base}" contype="8" conaffinity="4" '
+        f"{floor}/>",
+        between,
+    )
+
+
+def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, int]]]:
+    """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are.
+
+    Raises:
+        InputError: MuJoCo is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("transfer needs MuJoCo: pip install --group bench") from None
+    chain = Chain.cody()
+    start = np.radians(START_DEG) + np.array(touch.start_rad)
+    rate = swing(chain)
+    pose, later = chain.pose(start + rate * LEAD_S), chain.pose(start + rate * (LEAD_S + 0.01))
+    on = np.array([0.0, 0.0, touch.place_m, 1.0])
+    point = (pose @ on)[:3]
+    speed = (later @ on)[:3] - point
+    heading = math.atan2(speed[1], speed[0])
+    ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+    across = pose[:3, :3].T @ ahead
+    arm, where = arm_xml(chain, math.degrees(math.atan2(across[1], across[0])), touch)
+    aside = np.array([-ahead[1], ahead[0], 0.0]) * touch.aside_m
+    thing, between = thing_xml(
+        touch, point + ahead * (RADIUS_M + 0.001) + aside, heading + touch.yaw_rad
+    )
+    gains = "".join(
+        f'<position joint="j{i}" kp="{k}"/>' for i, k in enumerate(CODY_STIFFNESS[: chain.dof])
+    )
+    fall = 9.81 * math.sin(touch.slope_rad), -9.81 * math.cos(touch.slope_rad)
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{STEP_S}" integrator="implicitfast" cone="elliptic" '
+        f'gravity="{fall[0] * ahead[0]} {fall[0] * ahead[1]} {fall[1]}"/><worldbody>{arm}{thing}'
+        f"</worldbody><tendon>{between}</tendon><actuator>{gains}</actuator></mujoco>"
+    )
+    return model, start, where
+
+
+def swing(chain: Chain) -> NDArray[np.float64]:
+    """(dof,) rad/s of the equilibrium point."""
+    rate = np.zeros(chain.dof)
+    rate[0] = math.radians(RATE_DEG_S)
+    return rate
+
+
+def simulate(touch: Touch) -> Touched:
+    """One touch, as the board would have recorded it.
+
+    Raises:
+        InputError: MuJoCo is not installed.
+    """
+    model, start, where = model_of(touch)
+    import mujoco
+
+    chain, thing = Chain.cody(), touch.thing
+    rate, dof = swing(chain), chain.dof
+    data = mujoco.MjData(model)
+    data.qpos[:dof] = start - np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) * rate
+    data.qvel[:dof] = rate
+    springs = [model.joint(f"p{i}").qposadr[0] for i in range(len(where))]
+    row, column = np.array(where).T
+    body = model.body("thing").id
+    mujoco.mj_forward(model, data)
+    frames, joints, forces, places = [], [], [], []
+    for _ in range(round(LASTS_S * RATE_HZ) + 1):
+        loads = np.zeros((ROWS, len(COLUMN_ANGLES_DEG)))
+        loads[row, column] = np.maximum(-touch.taxel_n_m * data.qpos[springs], 0.0)
+        counts = loads * COUNTS_PER_NEWTON
+        if touch.noise is not None:
+            size, generator = touch.noise
+            counts = counts + generator.normal(0.0, size, loads.shape)
+        frames.append(np.where(counts < 35.0, 0.0, np.minimum(counts, 17e3)).astype(np.uint16))
+        joints.append(data.qpos[:dof].copy())
+        forces.append(loads.sum())
+        turned = data.xmat[body].reshape(3, 3)
+        places.append(data.xpos[body] + ABOVE_FLOOR_M * turned[:, 2])
+        for _ in range(round(1.0 / (RATE_HZ * STEP_S))):
+            data.ctrl[:] = start + rate * data.time
+            mujoco.mj_step(model, data)
+    condition = "fixed" if touch.fixed else "movable"
+    soft = "soft" if thing.soft else "rigid"
+    meta = {
+        "labels": {
+            "category": f"{soft}-{condition}",
+            "mobility": condition,
+            "softness": soft,
+            "object": thing.kind,
+        },
+        "skin": {
+            **CODY_SKIN,
+            "counts_per_newton": COUNTS_PER_NEWTON,
+            "threshold_counts": THRESHOLD_COUNTS,
+            "onset_counts": ONSET_COUNTS,
+        },
+        "arm": chain.to_dict(),
+        "source": "MuJoCo, bench/mujoco_touch.py",
+    }
+    recording = Recording(
+        t=np.arange(len(frames)) / RATE_HZ,
+        frames=np.array(frames),
+        joints=np.array(joints),
+        valid=None,
+        meta=meta,
+    )
+    place = np.array(places) - places[0]
+    return Touched(recording, np.array(forces), np.hypot(place[:, 0], place[:, 1]))
