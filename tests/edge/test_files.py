@@ -114,8 +114,10 @@ def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeyp
 
 
 def test_the_longest_name_can_be_written(tmp_path):
-    with write_whole(tmp_path / ("a" * 255)) as file:
+    longest = tmp_path / ("a" * 255)
+    with write_whole(longest) as file:
         file.write(b"x")
+    assert longest.read_bytes() == b"x"
 
 
 def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):

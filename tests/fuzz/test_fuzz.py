@@ -5,6 +5,7 @@ from random import Random
 
 import pytest
 
+from edge.errors import EdgeError
 from tests.fuzz import mutate
 from tests.fuzz.__main__ import judged
 from tests.fuzz.readers import READERS, hostile
@@ -18,9 +19,14 @@ BY_NAME = {reader.name: reader for reader in READERS}
 def test_the_valid_files_are_accepted(reader, tmp_path):
     path = tmp_path / f"input{reader.suffix}"
     reader.more(path)
+    refusals = []
     for data in reader.seeds():
         path.write_bytes(data)
-        reader.read(path)
+        try:
+            reader.read(path)
+        except EdgeError as error:
+            refusals.append(str(error))
+    assert refusals == []
 
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)

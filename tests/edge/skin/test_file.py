@@ -9,25 +9,7 @@ from edge.errors import InputError
 from edge.skin import file as skinfile
 from edge.skin.calibration import calibration_text, dead_band, save_calibration, with_calibration
 from edge.skin.file import Reading, TaxelCalibration
-
-SMALL = """
-[skin]
-rows = 4
-cols = 6
-
-[signal]  # a comment that stays
-sign = -1
-
-[[bus]]
-device = 1
-kind = "ad7147"
-mux = 0x70
-block = [4, 3]
-chips = [
-  { channel = 0, address = 0x2C, first = [0, 0] },
-  { channel = 0, address = 0x2D, first = [0, 3] },
-]
-"""
+from tests.edge.skin.small import SMALL
 
 
 def test_cody_is_384_taxels_on_three_buses():

@@ -4,25 +4,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.skin import file as skinfile
-
-SMALL = """
-[skin]
-rows = 4
-cols = 6
-
-[signal]  # a comment that stays
-sign = -1
-
-[[bus]]
-device = 1
-kind = "ad7147"
-mux = 0x70
-block = [4, 3]
-chips = [
-  { channel = 0, address = 0x2C, first = [0, 0] },
-  { channel = 0, address = 0x2D, first = [0, 3] },
-]
-"""
+from tests.edge.skin.small import SMALL
 
 
 def test_first_and_block_number_the_stages_row_by_row():
