@@ -66,7 +66,7 @@ def remarks(file: SkinFile) -> Iterator[str]:
     if file.uncovered:
         yield f"{file.uncovered} taxels have no chip: they are never valid"
     if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
-        yield "pyserial is not installed here: run `pip install edge-classify[serial]`"
+        yield "pyserial is not installed here: run `pip install pyserial`"
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
 

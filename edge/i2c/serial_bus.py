@@ -146,7 +146,7 @@ class SerialBus:
             import serial
         except ImportError:
             raise InputError(
-                f"{self.name}: serial ports need pyserial; run `pip install edge-classify[serial]`"
+                f"{self.name}: serial ports need pyserial; run `pip install pyserial`"
             ) from None
         self._received.clear()
         try:

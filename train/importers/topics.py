@@ -17,7 +17,6 @@ several topics of a kind, the ones to use: `frames_topic` and `joints_topic`.
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 from collections.abc import Mapping
@@ -28,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import read_json
+from edge.config import parse_json, read_json
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.runtime.joint_stream import OLDEST_S
@@ -90,7 +89,7 @@ class Log:
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
         try:
-            message = json.loads(data)
+            message = parse_json(data, f"{self.path}: a message of {topic}")
             t = float(message.get("t", logged_s))
             if "q" in message:
                 q = np.asarray(message["q"], dtype=np.float64)
@@ -100,7 +99,7 @@ class Log:
                 self._frames.setdefault(topic, []).append((t, counts))
         except InputError:
             raise
-        except (AttributeError, TypeError, ValueError, RecursionError) as error:
+        except (AttributeError, OverflowError, TypeError, ValueError) as error:
             raise InputError(f"{self.path}: a message of {topic} cannot be used: {error}") from None
 
     def _pose(self, topic: str, t: float, names: list[str], q: NDArray[np.float64]) -> None:

@@ -62,6 +62,8 @@ class ClassifyNode(Node):
         chain, dof = self._model.info.chain, self._model.info.dof
         if fake:
             recording = edge.load(fake)
+            if chain is not None:
+                recording = recording.for_joints(chain.names, fake)
             file = skin_file(recording.layout)
             opened, playback = play(file, recording, clock=PacedClock())
             return opened, playback, playback.ends
