@@ -45,7 +45,7 @@ def add(build: Build) -> None:
     build.put("step", SETTLE, settle)
     build.put("sample", BEAR, bear)
     build.put("sample", IMAGE, image)
-    build.trace("depth_m", lambda state: state.depth[0])
+    build.trace("depth_m", deepest)
 
 
 def solve(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
@@ -237,6 +237,12 @@ def bear(state: State) -> None:
     """The force that the skin bears, and each line's depth."""
     state.force = state.loads[0]
     state.line_depth = state.depth[0] - state.bed.line_gap
+
+
+def deepest(state: State) -> Array:
+    """(n,) metres to which the deepest of the lines is pressed."""
+    covered = state.bed.weight > 0.0
+    return np.asarray(np.where(covered, state.line_depth, 0.0).max(axis=0))
 
 
 def image(state: State) -> None:

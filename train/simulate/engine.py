@@ -30,15 +30,13 @@ class Kind:
     effects: tuple[str, ...]
     curved: bool
     """Rows lie at different depths; a flat bed's law needs one line a column only."""
-    stems: int
 
 
 def kind_of(scene: Scene, item: SceneObject, condition: str) -> Kind:
     """What an object's trials have in common with others that can share their batch."""
     effects = tuple(required_effects(scene, item, condition))
     curved = "radius_m" in item.given and "tilt" not in effects
-    stems = int(item.values["stem_count"].low) if "stem_count" in item.values else 0
-    return Kind(effects, curved, stems)
+    return Kind(effects, curved)
 
 
 @dataclass(frozen=True)

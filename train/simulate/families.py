@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from edge.touch.layout import SkinLayout
 from train.simulate import streams
 from train.simulate.motion import GRAVITY
 from train.simulate.reader import Reader
@@ -19,14 +20,14 @@ DRAWS = 1000
 
 
 def draw_family(
-    read: Reader, table: Mapping[str, Any], seed: int, push_n: float
+    read: Reader, table: Mapping[str, Any], seed: int, push_n: float, skin: SkinLayout
 ) -> Iterator[dict[str, Any]]:
     """The objects, as [[object]] tables, of one [[family]].
 
     Each range of the family is drawn once an object, evenly in its logarithm (evenly where it
     begins at 0), by a stream of the family's name; its `kinetic_part` gives `friction_kinetic`.
-    An object that can be movable is drawn until `push_n` newtons move it; a family that is too soft
-    to pass that on gives a `push_n` of its own.
+    An object that can be movable is drawn until `push_n` newtons move it, or as many as it passes
+    on; a family may give a `push_n` of its own.
 
     Raises:
         InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
@@ -49,8 +50,11 @@ def draw_family(
             if "friction_static" in drawn:
                 share = _draw(generator, part.low, part.high)
                 drawn["friction_kinetic"] = drawn["friction_static"] * share
-            hold = drawn.get("friction_static", 0.0) * drawn.get("mass_kg", 0.0) * GRAVITY
-            if not movable or hold <= push_n:
+            floor = drawn.get("friction_static", 0.0)
+            hold = floor * drawn.get("mass_kg", 0.0) * GRAVITY
+            # The skin may press down what it pushes, as far as it holds on to it.
+            level = 1.0 - floor * drawn.get("skin_friction", 0.0)
+            if not movable or hold <= level * min(push_n, passed_on(drawn, skin)):
                 break
         else:
             raise read.fail(
@@ -59,6 +63,25 @@ def draw_family(
             )
         whole = {k: round(drawn[k]) for k in WHOLE if k in drawn}
         yield {**others, "name": f"{name} {number + 1:02d}", **drawn, **whole}
+
+
+PRESSED_M = 0.06
+"""How deep the forearm is in a soft thing soon enough to move it within the window, [derived]: the
+arm comes 0.15 m a second and gives way itself."""
+
+
+def passed_on(drawn: Mapping[str, float], skin: SkinLayout) -> float:
+    """The newtons that an object passes on to its foot: what presses stems, or an elastic layer
+    (`effects.foundation`), so deep; without limit where it is stiffer."""
+    if "stem_n_m" in drawn and "stem_count" in drawn:
+        return round(drawn["stem_count"]) * drawn["stem_n_m"] * PRESSED_M
+    if "modulus_pa" in drawn and "depth_m" in drawn:
+        along = skin.pitch_m[0] if isinstance(skin.pitch_m, tuple) else skin.pitch_m or 0.0
+        length = min(drawn.get("width_m", math.inf), skin.rows * along)
+        half_width = math.sqrt(2.0 * (skin.radius_m or 0.0) * PRESSED_M)
+        per_length = 4.0 / 3.0 * drawn["modulus_pa"] / drawn["depth_m"] * PRESSED_M * half_width
+        return length * per_length
+    return math.inf
 
 
 def _draw(generator: np.random.Generator, low: float, high: float) -> float:

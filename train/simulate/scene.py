@@ -92,7 +92,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     skin, taxel = _skin(read, read.table(table.get("skin", {}), "skin"))
     spread = _fields(read, table.get("spread", {}), "spread", schema.SPREAD)
     labels = _fields(read, table.get("labels", {}), "labels", schema.LABELS)
-    objects = _objects(read, table, seed, labels["push_n"])
+    objects = _objects(read, table, seed, labels["push_n"], skin)
     add, leave_out, settings = _effects(read, table.get("effects", {}))
     scene = Scene(
         name=read.text(table.get("name", Path(where).stem or "scene"), "name"),
@@ -260,7 +260,7 @@ def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
 
 
 def _objects(
-    read: Reader, table: Mapping[str, Any], seed: int, push_n: float
+    read: Reader, table: Mapping[str, Any], seed: int, push_n: float, skin: SkinLayout
 ) -> tuple[SceneObject, ...]:
     entries: dict[str, list[object]] = {}
     for key in ("object", "family"):
@@ -278,7 +278,9 @@ def _objects(
                 *(
                     member
                     for i, entry in enumerate(entries["family"])
-                    for member in draw_family(read, read.table(entry, f"family {i}"), seed, push_n)
+                    for member in draw_family(
+                        read, read.table(entry, f"family {i}"), seed, push_n, skin
+                    )
                 ),
             ]
         )

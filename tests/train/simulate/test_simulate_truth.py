@@ -107,6 +107,31 @@ class TestFamilies:
             assert 0.8 * mu <= o.values["friction_kinetic"].low <= 0.95 * mu
             assert o.conditions == ("fixed", "movable")
 
+    def test_what_the_skin_presses_down_as_it_pushes_is_harder_to_move(self):
+        foam = {**FAMILY, "family": "foam", "friction_static": [0.3, 1.0], "skin_friction": 0.9}
+        for o in scene(families=[{**foam, "count": 40}]).objects:
+            mu, mass = o.values["friction_static"].low, o.values["mass_kg"].low
+            assert mu * mass * 9.80665 <= 6.0 * (1.0 - 0.9 * mu)
+
+    def test_a_plant_is_no_heavier_than_its_stems_can_push(self):
+        plant = {**FAMILY, "family": "foliage", "stem_count": [5, 30], "stem_n_m": [1.0, 50.0]}
+        objects = scene(families=[{**plant, "count": 40}]).objects
+        for o in objects:
+            mu, mass = o.values["friction_static"].low, o.values["mass_kg"].low
+            stems, stiffness = o.values["stem_count"].low, o.values["stem_n_m"].low
+            assert mu * mass * 9.80665 <= min(6.0, stems * stiffness * 0.06)
+        assert len({o.values["stem_count"].low for o in objects}) > 5
+
+    def test_a_plant_is_as_it_would_be_among_plants_of_as_many_stems(self):
+        plants = [
+            {"name": f"p{n}", "family": "foliage", "conditions": ["fixed"], "stem_count": n}
+            for n in (6, 20)
+        ]
+        together = dict(simulate(scene(*plants)))
+        for plant in plants:
+            for name, trial in simulate(scene(plant)):
+                assert trial.frames.tobytes() == together[name].frames.tobytes()
+
     def test_the_draws_are_the_familys_own(self):
         other = {**FAMILY, "name": "trunk"}
         both = scene(families=[other, FAMILY])

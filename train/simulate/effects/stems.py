@@ -46,16 +46,17 @@ def add(build: Build) -> None:
 def plant(state: State) -> None:
     """Where the stems stand: (stems, n) depths, rows, columns and stiffnesses."""
     values = state.values
-    count = int(values["stem_count"][0])
+    counts = values["stem_count"].astype(np.int64)
     n, rows = state.n, state.skin.rows
-    shape = (count, n)
-    depth, along, around, stiffness = (np.empty(shape) for _ in range(4))
-    for i, trial in enumerate(state.trials):
+    shape = (int(counts.max()), n)
+    # Where a plant has fewer stems than its neighbours in the batch, the others weigh nothing.
+    depth, along, around, stiffness = np.ones(shape), *(np.zeros(shape) for _ in range(3))
+    for i, (trial, count) in enumerate(zip(state.trials, counts, strict=True)):
         generator = streams.stream(state.scene.seed, "stems", trial.key, trial.number)
-        depth[:, i] = generator.random(count)
-        along[:, i] = generator.random(count)
-        around[:, i] = generator.integers(-1, 2, count)
-        stiffness[:, i] = np.exp(0.3 * generator.standard_normal(count))
+        depth[:count, i] = generator.random(count)
+        along[:count, i] = generator.random(count)
+        around[:count, i] = generator.integers(-1, 2, count)
+        stiffness[:count, i] = np.exp(0.3 * generator.standard_normal(count))
     depth -= depth.min(axis=0)
     state.bed = Bed(
         gaps=np.zeros((1, n)),
