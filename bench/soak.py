@@ -26,7 +26,7 @@ from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
-from edge.runtime.touch_map import events_on_map, load, map_writer
+from edge.runtime.touch_map import TouchMap, events_on_map, map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.touch.track import MAX_CONTACTS
@@ -100,7 +100,7 @@ def main() -> int:
                     flush=True,
                 )
         lines.close()
-        placed = sum(1 for _ in load(place))
+        placed = sum(1 for _ in TouchMap(place))
     print(f"{placed} contacts on the map")
     lost = sum(lines.lost.values()) + loop.schedule.missed
     flat = before is not None and largest - before[0] <= GROWTH_KB and now[1] == before[1]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset, Release
@@ -39,16 +39,6 @@ class _Waiting:
     tasks: list[str]
     runs: dict[str, tuple[str, int]] = field(default_factory=dict)
     """By task, the label of the last decision points in a row that were sure, and their number."""
-
-
-class _Answer(NamedTuple):
-    """The answer to one task."""
-
-    label: str | None
-    confidence: float
-    flags: tuple[str, ...]
-    stopped_by: str | None = None
-    decision: Decision | None = None
 
 
 class Classifier:
@@ -257,43 +247,30 @@ class Classifier:
             )
             if raised
         )
+        position = None
+        if self._max_contacts > 1 and (at := contact.position()) is not None:
+            x, y, z = (round(value, 6) for value in at)
+            position = x, y, z
+        number = self._named(waiting.number)
+        answers = [
+            Decided(task, None, 0.0, window_s, contact.onset_s, 0.0, flags, contact=number,
+                    position=position)
+            for task in waiting.tasks
+        ]  # fmt: skip
         try:
             vector = feature_vector(contact.series(), window_s, info.samples, info.features)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
-            none = _Answer(None, 0.0, (*flags, "out_of_range"))
-            answers = dict.fromkeys(waiting.tasks, none)
+            answers = [replace(one, flags=(*flags, "out_of_range")) for one in answers]
         else:
             novel = self._novel(decision_point, decisions)
-            answers = {}
-            for task in waiting.tasks:
-                answer = self._answer(waiting, task, decisions[task], flags, novel)
-                if answer is not None:
-                    answers[task] = answer
+            found = [self._answer(waiting, one, decisions[one.task], novel) for one in answers]
+            answers = [one for one in found if one is not None]
         waiting.decision_point += 1
-        waiting.tasks = [task for task in waiting.tasks if task not in answers]
-        position = None
-        if self._max_contacts > 1 and (at := contact.position()) is not None:
-            x, y, z = (round(value, 6) for value in at.tolist())
-            position = x, y, z
+        settled = [one.task for one in answers]
+        waiting.tasks = [task for task in waiting.tasks if task not in settled]
         latency_ms = round((time.perf_counter() - began) * 1e3, 3)
-        return [
-            Decided(
-                task,
-                answer.label,
-                answer.confidence,
-                window_s,
-                contact.onset_s,
-                latency_ms,
-                answer.flags,
-                error=self.error if answer.stopped_by is not None else None,
-                stopped_by=answer.stopped_by,
-                contact=self._named(waiting.number),
-                position=position,
-                decision=answer.decision,
-            )
-            for task, answer in answers.items()
-        ]
+        return [replace(one, latency_ms=latency_ms) for one in answers]
 
     def _novel(self, decision_point: int, decisions: dict[str, Decision]) -> float:
         """The smallest novelty rate at which the contact counts as unknown."""
@@ -303,48 +280,45 @@ class Classifier:
         return novelty.rate(decision_point, float(decisions[novelty.task].distances[0]))
 
     def _answer(
-        self,
-        waiting: _Waiting,
-        task: str,
-        decision: Decision,
-        flags: tuple[str, ...],
-        novel: float,
-    ) -> _Answer | None:
+        self, waiting: _Waiting, none: Decided, decision: Decision, novel: float
+    ) -> Decided | None:
         """A task's answer at a decision point; None where the task goes on waiting.
 
         Args:
+            waiting: the contact.
+            none: an answer to the task that has no label yet.
+            decision: the model's.
             novel: from `_novel`.
         """
-        if decision.distances[0] == 0.0:
-            flags = (*flags, AS_TRAINED)
+        flags = (*none.flags, AS_TRAINED) if decision.distances[0] == 0.0 else none.flags
+        label, confidence = decision.label, decision.confidence
         if self.error is None:
-            if decision.tie:
-                flags = (*flags, "tie")
-            return _Answer(decision.label, decision.confidence, flags, decision=decision)
+            flags = (*flags, "tie") if decision.tie else flags
+            return replace(none, label=label, confidence=confidence, flags=flags, decision=decision)
         assert decision.label_distances is not None
-        at = waiting.decision_point
-        labels = self.model.info.tasks[task].labels
-        confidence = self.model.info.stopping[task].confidence(
-            at, decision.label_distances.tolist(), labels.index(decision.label)
+        info, at, rule = self.model.info, waiting.decision_point, self._rules[none.task]
+        confidence = info.stopping[none.task].confidence(
+            at, decision.label_distances.tolist(), info.tasks[none.task].labels.index(label)
         )
-        rule = self._rules[task]
-        sure = rule is not None and self._sure(waiting, task, decision.label, confidence, rule)
+        sure = rule is not None and self._sure(waiting, none.task, label, confidence, rule)
         last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
         if not sure and at < last and "short" not in flags:
             return None
         unknown = novel <= self.novelty_rate
         if unknown:
-            flags = (*flags, "unknown")
+            label, confidence, flags = UNKNOWN, 1.0 - novel, (*flags, "unknown")
         elif rule is not None and not sure and not rule.fixed:
             flags = (*flags, "unsure")
         if rule is None:
             flags = (*flags, "uncertified")
-        return _Answer(
-            UNKNOWN if unknown else decision.label,
-            round(1.0 - novel if unknown else confidence, 6),
-            flags,
-            None if rule is None else "confidence" if sure else "window",
-            decision,
+        return replace(
+            none,
+            label=label,
+            confidence=round(confidence, 6),
+            flags=flags,
+            error=None if rule is None else self.error,
+            stopped_by=None if rule is None else "confidence" if sure else "window",
+            decision=decision,
         )
 
     @staticmethod

@@ -159,16 +159,6 @@ class TouchMap:
             return
         raise InputError(f"{self.path}: not a map; give what `run --map` wrote")
 
-    @property
-    def frame(self) -> str:
-        """The frame in which positions are given."""
-        return self.head.frame
-
-    @property
-    def unit(self) -> str:
-        """The unit of positions."""
-        return self.head.unit
-
     def _entries(self) -> Iterator[tuple[int, dict[str, Any]]]:
         with open_regular(self.path, LARGEST_BYTES) as file:
             number = 0
@@ -222,8 +212,3 @@ class TouchMap:
                 yield waiting.pop(key)
             elif len(waiting) > MOST_OPEN:
                 del waiting[next(iter(waiting))]
-
-
-def load(path: str | os.PathLike[str]) -> TouchMap:
-    """Open a map for reading, as `TouchMap`."""
-    return TouchMap(path)

@@ -261,16 +261,15 @@ class Contact:
             return point
         return None if joints is None else self.chain.point(joints, point)
 
-    def position(self) -> NDArray[np.float64] | None:
-        """(3,) where the region's centroid was last seen.
+    def position(self) -> Vector | None:
+        """(x, y, z) where the region's centroid was last seen.
 
         Metres (taxels where the pitch is unknown), in the frame of the arm's base; without an
         arm in that of the link that carries the skin. None where joint angles were not known.
         """
         if self.region is None:
             return None
-        position = self._located(self.region.centroid, self.joints)
-        return None if position is None else np.array(position)
+        return self._located(self.region.centroid, self.joints)
 
     def series(self) -> FeatureSeries:
         """What was measured so far; later frames leave it as it is."""

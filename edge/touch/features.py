@@ -232,7 +232,7 @@ class _Course:
         series, zone, quantity = self._series, feature.zone, feature.quantity
         values: NDArray[Any] | None = None
         if quantity == "motion":
-            values = series.contact_motion
+            values = series.motion
         elif quantity == "force_motion":
             values = series.force_motion
         elif quantity == "regions":
@@ -240,7 +240,7 @@ class _Course:
         elif (zone, quantity) == ("contact", "max_force"):
             values = series.max_force
         elif (zone, quantity) == ("contact", "area"):
-            values = series.contact_area
+            values = series.area
         elif zone in series.zones:
             if zone not in self._zones:
                 self._zones[zone] = _Zone(series.zones[zone], series)

@@ -210,7 +210,7 @@ def test_a_header_that_claims_more_than_the_file_holds_allocates_nothing(tmp_pat
         load(path)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_damaged_files_are_refused_or_read_but_never_crash(good_bytes, tmp_path_factory, data):
     """Cut short, or with bytes changed anywhere."""
@@ -244,7 +244,7 @@ json_values = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     labels=json_values,
     skin=st.dictionaries(

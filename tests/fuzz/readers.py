@@ -222,9 +222,9 @@ def maps() -> list[bytes]:
 
 def read_map(path: Path) -> None:
     """Load it."""
-    from edge.runtime.touch_map import load
+    from edge.runtime.touch_map import TouchMap
 
-    list(load(path))
+    list(TouchMap(path))
 
 
 def scenes() -> list[bytes]:

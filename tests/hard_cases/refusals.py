@@ -120,7 +120,7 @@ def touch_map(bad: float, key: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "map.jsonl"
         path.write_text(f"{json.dumps(head)}\n{json.dumps(touch)}\n")
-        list(touchmap.load(path))
+        list(touchmap.TouchMap(path))
 
 
 def csv_frames(bad: float, named: bool) -> None:

@@ -105,7 +105,7 @@ def test_a_column_without_variance_gets_no_weight():
     assert not axes[:, [7, 90]].any()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     seed=st.integers(0, 100),
     scaling=st.sampled_from(SCALINGS),

@@ -53,11 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
         model = None if arguments.model is None else Model(arguments.model)
         comparison.draw([(path, load(path)) for path in arguments.recording], out, model=model)
     elif Path(first).suffix != ".npz":
-        from edge.runtime import touch_map
+        from edge.runtime.touch_map import TouchMap
         from train.draw import touch_map as picture
 
         info = None if arguments.model is None else Model(arguments.model).info
-        picture.draw(touch_map.load(first), out, first, arguments.task, info)
+        picture.draw(TouchMap(first), out, first, arguments.task, info)
     else:
         from train.draw.recording import draw
 

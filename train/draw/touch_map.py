@@ -90,15 +90,17 @@ def draw(
                 linewidths=0.6,
                 label=f"{label} ({int(those.sum())})",
             )
-        unit = "m" if found.unit == "metre" else found.unit
+        unit = "m" if found.head.unit == "metre" else found.head.unit
         axis.set(xlabel=f"{'xyz'[across]} ({unit})", ylabel=f"{'xyz'[up]} ({unit})", title=view)
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(0.15)
+        axis.locator_params(nbins=6)
         axis.grid(alpha=0.3)
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, title=chosen, loc="outside right upper")
     count = len(touches)
-    figure.suptitle(f"{count} contact{'s' * (count != 1)} in the frame of {found.frame}")
+    frame = "the skin" if found.head.frame == "skin" else found.head.frame
+    figure.suptitle(f"{count} contact{'s' * (count != 1)} in the frame of {frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
     plt.close(figure)

@@ -225,7 +225,7 @@ def test_a_graph_that_onnx_runtime_refuses_is_refused_in_one_sentence(altered):
         Model(altered(attributed))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_damaged_models_are_refused_or_run_but_never_crash(data, exported, tmp_path_factory):
     """Bytes changed near the start or end, where structure and metadata lie, or cut short."""

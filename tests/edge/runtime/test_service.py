@@ -58,7 +58,7 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(manager, t
     assert out.endswith("\n")
     lines = [json.loads(line) for line in out.splitlines()]
     assert lines[-1]["event"] == "end"
-    assert len(list(touchmap.load(place))) == len(
+    assert len(list(touchmap.TouchMap(place))) == len(
         {line["contact"] for line in lines if line["event"] == "decision"}
     )
 

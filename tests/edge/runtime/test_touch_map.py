@@ -132,8 +132,8 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, capsys):
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     decisions = [line for line in lines if line["event"] == "decision"]
     assert len({line["contact"] for line in decisions}) == 2
-    found = touchmap.load(place)
-    assert (found.frame, found.unit) == (Model(demo.MODEL).info.chain.base, "metre")
+    found = touchmap.TouchMap(place)
+    assert found.head[:2] == (Model(demo.MODEL).info.chain.base, "metre")
     first, second = touches = list(found)
     assert first.labels == {
         "category": "rigid-fixed",
@@ -195,13 +195,13 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     others = [{**event, "task": t, "label": t, "flags": ["short"]} for t in ("category", "object")]
     onset = {"event": "onset", "contact": 1, "onset_s": 0.5}
     write(path, info, [onset, event])
-    assert not list(touchmap.load(path))  # two tasks are still open
+    assert not list(touchmap.TouchMap(path))  # two tasks are still open
     path.unlink()
     write(path, info, [onset, event, *others, {**event, "contact": 2, "place": None}])
     with path.open("a") as damaged:
         damaged.write('{"event": "decision", "pla')
     write(path, info, [event, *others])
-    first, second = touchmap.load(path)
+    first, second = touchmap.TouchMap(path)
     assert first == second
     assert first.place == (0.1, 0.2, 0.3)
     assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
@@ -227,7 +227,7 @@ def test_what_is_not_a_map_is_named(tmp_path, text, sentence):
     path = tmp_path / "some.jsonl"
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
-        list(touchmap.load(path))
+        list(touchmap.TouchMap(path))
 
 
 def test_a_file_that_is_not_a_map_is_not_written_to(tmp_path):
@@ -252,7 +252,7 @@ def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(tmp
     path = tmp_path / "map.jsonl"
     path.write_text(left)
     write(path, Model(demo.MODEL).info, [])
-    assert list(touchmap.load(path)) == []
+    assert list(touchmap.TouchMap(path)) == []
 
 
 def test_a_full_disk_costs_lines_and_not_decisions():

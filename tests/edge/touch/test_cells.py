@@ -20,7 +20,7 @@ def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(shape, side
     assert count <= MOST_CELLS
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 1 << 32),
     shape=st.sampled_from([(3, 5), (16, 24), (17, 31), (1, 700)]),

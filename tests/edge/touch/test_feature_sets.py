@@ -249,7 +249,7 @@ def test_every_nth_frame_of_a_series_has_all_that_was_measured():
     assert len(feature_vector(thin, 1.0, 5, wanted)) == sum(widths(wanted, 5, SKIN, 2))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     peaks=st.lists(st.integers(10, 65535), min_size=5, max_size=5),
     transform=st.sampled_from(TRANSFORMS),

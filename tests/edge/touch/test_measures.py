@@ -80,7 +80,7 @@ def frame_of(seed: int, shape, density=0.4, high=65535) -> Frame:
     return Frame(0.0, counts.astype(np.uint16), valid=rng.random(shape) < 0.9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 1 << 32),
     density=st.sampled_from([0.05, 0.3, 0.6, 1.0]),
@@ -149,7 +149,7 @@ def value(layout: SkinLayout, counts, name: str) -> float:
     return vector[0]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 1 << 32), density=st.sampled_from([0.1, 0.5, 1.0]))
 def test_moments_are_those_of_exact_arithmetic(seed, density):
     counts = frame_of(seed, FLAT.shape, density).counts.astype(int)

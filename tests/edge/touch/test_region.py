@@ -118,7 +118,7 @@ def test_adversarial_frames_agree_with_scipy(name, wraps, connectivity):
     assert by_us(*given) == by_scipy(*given)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data(), st.integers(1, 18), st.integers(1, 26), st.booleans(), st.sampled_from([4, 8]))
 def test_random_frames_agree_with_scipy(data, rows, cols, wraps, connectivity):
     seed = data.draw(st.integers(0, 2**32 - 1))

@@ -159,7 +159,7 @@ def paths(table, prefix=()):
     return found
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.sampled_from([*paths(GOOD), *(("object", 0, k) for k in ("width_m", "cover_n_m"))]),
     LEAVES,
