@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import errno
+import gc
 import io
 import logging
 import os
@@ -185,6 +187,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     return dispatch(top, words)
 
+
+# The interpreter's last collection would visit all that was ever imported, and a program that is
+# told to end takes twice as long.
+atexit.register(gc.freeze)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -78,6 +78,10 @@ def event_text(line: Mapping[str, Any]) -> str:
         period = line["period_ms"]
         kept = f", period {period['p50']:g} ms (p99 {period['p99']:g})" if period else ""
         return f"{line['frames']} frames{kept}, {line['missed_ticks']} missed"
+    if kind == "saved":
+        said = ", ".join(f"{task}={label}" for task, label in line["labels"].items())
+        cut = "" if line["complete"] else "; cut short, as reading ended first"
+        return f"{line['file']}: {line['seconds']:g} s, {line['frames']} frames, {said}{cut}"
     return "no contact" if kind == "no_contact" else json_line(line)
 
 

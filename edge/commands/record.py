@@ -20,6 +20,7 @@ from edge.commands.source import Opened, open_joints, open_skin
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
+from edge.runtime.event_writer import Lines
 from edge.skin.loop import Loop, stop_on
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
@@ -171,7 +172,7 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
 
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
-    labels, output = dict(arguments.label), Output.of(arguments)
+    labels = dict(arguments.label)
     if not labels:
         raise InputError(
             "give --label TASK=LABEL: nothing can be learnt from a trial without a label"
@@ -189,10 +190,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--dof {arguments.dof}: {arguments.arm} has {dof} joints")
     if arguments.joints is not None and dof is None:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
+    virtual = arguments.fake is not None and not arguments.real_time
     with (
-        stop_on(signal.SIGINT) as stop,
+        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
         open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
         open_joints(arguments, opened, arm, dof) as joints,
+        Lines(
+            form=Output.of(arguments).line,
+            patient=lambda: virtual and not stop.asked,
+        ) as lines,
     ):
         if arm is not None and arguments.joints is None:
             have = opened.playback.dof if opened.playback is not None else None
@@ -214,14 +220,14 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames = trials.push(frame)
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, names, output, complete=True)
+                _save(frames, arguments.out, labels, opened, arm, names, lines, complete=True)
                 done += 1
                 if done == wanted:
                     break
         else:
             frames = trials.rest()
             if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, names, output, complete=False)
+                _save(frames, arguments.out, labels, opened, arm, names, lines, complete=False)
                 done += 1
     if done == 0:
         LOG.warning("there was no contact, so nothing was saved")
@@ -236,7 +242,7 @@ def _save(
     opened: Opened,
     arm: Chain | None,
     names: Sequence[str] | None,
-    output: Output,
+    lines: Lines,
     *,
     complete: bool,
 ) -> None:
@@ -252,9 +258,9 @@ def _save(
     }
     if arm is not None:
         meta["arm"] = arm.to_dict()
-    if names is not None and all(frame.joints is not None for frame in frames):
-        meta["joint_names"] = list(names)
     trial = recording(frames, meta)
+    if names is not None and trial.joints is not None:
+        trial.meta["joint_names"] = list(names)
     while True:
         try:
             save(path, trial, overwrite=False)
@@ -277,6 +283,4 @@ def _save(
         "missing_taxels": trial.valid is not None,
         "complete": complete,
     }
-    said = ", ".join(f"{task}={label}" for task, label in labels.items())
-    cut = "" if complete else "; cut short, as reading ended first"
-    output.event(event, f"{path}: {event['seconds']:g} s, {len(frames)} frames, {said}{cut}")
+    lines.write([event])

@@ -22,8 +22,8 @@ from edge.errors import InputError
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
-CLOSE_S = 1.0
-"""How long the lines that still wait at the end are given to leave."""
+CLOSE_S, STUCK_S = 1.0, 0.03
+"""How long the lines that still wait at the end are given to leave, and how long one of them."""
 PATIENCE_S = 0.05
 """How often someone who waits for a reader asks whether to go on waiting."""
 UNREAD = "nobody reads them"
@@ -82,6 +82,7 @@ class LineWriter:
         self._write = write
         self._lines: queue.Queue[bytes | None] = queue.Queue(MOST_LINES)
         self._closed = False
+        self._done = 0
         self._thread = threading.Thread(target=self._work, name=f"lines to {name}", daemon=True)
         self._thread.start()
 
@@ -108,17 +109,23 @@ class LineWriter:
                 self.unwanted = self.unwanted or isinstance(error, BrokenPipeError)
                 self.gone = self.gone or self.unwanted or isinstance(error, ValueError)
                 self.problem = self.problem or getattr(error, "strerror", "") or str(error)
+            self._done += 1
 
     def close(self, patient: Patience = impatient) -> None:
-        """Write what waits, for a second at most or as long as `patient`; twice is fine."""
+        """Write what waits, as long as lines leave and for a second at most, or as long as
+        `patient`; twice is fine."""
         if self._closed:
             return
         self._closed = True
-        ends = time.monotonic() + CLOSE_S
-        while self._thread.is_alive() and (patient() or time.monotonic() < ends):
+        now = time.monotonic()
+        ends, moved, done = now + CLOSE_S, now, self._done
+        while self._thread.is_alive() and (patient() or now < min(ends, moved + STUCK_S)):
             with suppress(queue.Full):
                 self._lines.put_nowait(None)  # one is enough, but the queue may have been full
-            self._thread.join(PATIENCE_S)
+            self._thread.join(STUCK_S / 3)
+            now = time.monotonic()
+            if self._done > done:
+                moved, done = now, self._done
         if self._thread.is_alive():
             self.gone = True
             self.lost += self._lines.qsize()

@@ -1,11 +1,13 @@
 """check, scan, calibrate, record, run and view, as a user runs them, over the fake."""
 
 import json
+import os
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import pytest
 
 from edge import recording
 from edge.cli import main
+from edge.commands.record import Trials
 from edge.recording import Recording
 from edge.skin import file as skinfile
 
@@ -285,6 +288,51 @@ def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
     np.testing.assert_allclose(trial.t, np.arange(141) * 0.01, atol=1e-9)
     assert trial.layout == source.layout
     assert trial.valid is None
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
+    edge, recordings, tmp_path, monkeypatch, number
+):
+    push, pushed = Trials.push, []
+
+    def interrupted(trials, frame):
+        pushed.append(frame)
+        if len(pushed) == 61:
+            signal.raise_signal(number)
+        return push(trials, frame)
+
+    monkeypatch.setattr(Trials, "push", interrupted)
+    status, (event,), _ = edge("record", "--fake", recordings / "soft_1.npz", "--label",
+                               "object=foam", "--out", tmp_path, "--lead", 0.1)  # fmt: skip
+    assert (status, event["complete"], len(pushed)) == (0, False, 61)
+    # Onset is at frame 20.
+    source = recording.load(recordings / "soft_1.npz").frames
+    np.testing.assert_array_equal(recording.load(event["file"]).frames, source[10:61])
+
+
+def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
+    out, (reading, writing) = tmp_path / "trials", os.pipe()
+    os.set_blocking(writing, False)
+    for size in (4096, 1):
+        with suppress(BlockingIOError):
+            while True:
+                os.write(writing, b"x" * size)
+    os.set_blocking(writing, True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "edge.cli", "record", "--fake", str(parted),
+         "--loop", "--label", "object=a", "--out", str(out)],
+        cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while len(list(out.glob("a-*.npz"))) < 3:
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    os.close(reading)
+    os.close(writing)
+    assert process.returncode == 0
+    assert "lines could not be sent to stdout: nobody reads them" in err
 
 
 def test_record_saves_one_trial_a_contact_and_never_overwrites(edge, parted, tmp_path):
