@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from edge.touch.feature_sets import SETS, expand
 from train.evaluate import NEIGHBOURS, SHRINKAGES, Labels, SearchGrid
 from train.pipeline import Choice
-from train.projection import KINDS, SCALINGS
+from train.projection import KINDS
 
 PLAIN = (
     ("paper",),
@@ -141,27 +141,22 @@ def groupable(labels: NDArray[np.str_], groups: NDArray[np.str_]) -> bool:
     )
 
 
-def order(choices: Sequence[Choice], widths: Mapping[str, int], rows: int) -> NDArray[np.int64]:
-    """(candidates,) their places by cost, the cheapest 0.
+def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.int64]:
+    """(candidates,) how dear the features and projection of each are, from 0.
 
-    A kilobyte of the model counts as much as a microsecond of each frame; of equal ones the
-    larger shrinkage and the smaller k come first.
+    By the weights of the largest projection that they may take: these are the numbers that are
+    fitted, stored on the board and multiplied for a decision. What following a contact costs more
+    with one set than with another, microseconds of each frame, decides between equal ones.
 
     Args:
         choices: the candidates.
         widths: columns of each feature.
-        rows: training trials.
     """
-    keys = []
-    for choice in choices:
-        columns = sum(widths[name] for name in choice.features or widths)
-        price = sum(
-            one.price_us for one in SETS.values() if set(one.features) <= set(choice.features)
-        )
-        kilobytes = 8 * (columns + rows) * choice.components / 1024
-        keys.append(
-            (price + kilobytes, -choice.shrinkage, choice.k, SCALINGS.index(choice.scaling))
-        )
-    places = np.empty(len(keys), dtype=np.int64)
-    places[sorted(range(len(keys)), key=lambda i: keys[i])] = np.arange(len(keys))
-    return places
+    sizes: dict[tuple[tuple[str, ...], str], tuple[int, float]] = {}
+    kinds = [(choice.features, choice.projection) for choice in choices]
+    for kind, choice in zip(kinds, choices, strict=True):
+        weights = choice.components * sum(widths[name] for name in choice.features or widths)
+        price = sum(one.price_us for one in SETS.values() if set(one.features) <= set(kind[0]))
+        sizes[kind] = max(sizes.get(kind, (0, 0.0)), (weights, price))
+    places = {kind: place for place, kind in enumerate(sorted(sizes, key=lambda one: sizes[one]))}
+    return np.array([places[kind] for kind in kinds], dtype=np.int64)

@@ -258,32 +258,35 @@ class Table:
     def chosen(
         self,
         task: str,
-        order: NDArray[np.int64] | None = None,
+        cost: NDArray[np.int64] | None = None,
         among: NDArray[np.int64] | None = None,
+        margin: float = 0.0,
     ) -> int:
         """The candidate chosen by all trials; see `choose`."""
-        return choose(self.held_out(task), order, among)
+        return choose(self.held_out(task), cost, among, margin)
 
     def without(
         self,
         task: str,
         fold: int,
-        order: NDArray[np.int64] | None = None,
+        cost: NDArray[np.int64] | None = None,
         among: NDArray[np.int64] | None = None,
+        margin: float = 0.0,
     ) -> int:
         """The candidate chosen without the trials of a fold."""
-        return choose(self.right[task][fold][:, self.folds != fold], order, among)
+        return choose(self.right[task][fold][:, self.folds != fold], cost, among, margin)
 
     def nested(
         self,
         task: str,
-        order: NDArray[np.int64] | None = None,
+        cost: NDArray[np.int64] | None = None,
         among: NDArray[np.int64] | None = None,
+        margin: float = 0.0,
     ) -> Result:
         """The accuracy of the choice itself; see `choose`."""
         right, picked = 0, []
         for fold in range(int(self.folds.max()) + 1):
-            cell = self.without(task, fold, order, among)
+            cell = self.without(task, fold, cost, among, margin)
             right += int(self.right[task][fold][cell, self.folds == fold].sum())
             picked.append(cell)
         cell = int(np.bincount(picked).argmax())
@@ -293,29 +296,33 @@ class Table:
 
 def choose(
     right: NDArray[np.bool_],
-    order: NDArray[np.int64] | None = None,
+    cost: NDArray[np.int64] | None = None,
     among: NDArray[np.int64] | None = None,
+    margin: float = 0.0,
 ) -> int:
-    """The best candidate; or the cheapest that is not worse by more than a standard error.
+    """The best candidate; or the best of the cheapest that are not worse by a standard error.
 
     The error is that of the difference to the best one on the same trials: two candidates that
     err on the same trials are told apart more finely than by their accuracies' own errors.
 
     Args:
         right: (candidates, n) answers of each.
-        order: (candidates,) rising with cost; without it the best is taken, of equal ones the
-            first.
+        cost: (candidates,) of each; of those of equal cost the best counts, of equally good ones
+            the first. Without it the best of all is taken.
         among: the candidates to choose from; all where None.
+        margin: accuracy that is given up for less cost in any case.
     """
     places = np.arange(len(right)) if among is None else among
     means = right[places].mean(axis=1)
-    if order is None:
+    if cost is None:
         return int(places[means.argmax()])
-    # Of equally good ones the cheapest is what others are measured against.
-    best = places[np.lexsort((order[places], -means))[0]]
-    worse = right[best].astype(np.int64) - right[places]
-    within = worse.mean(axis=1) <= worse.std(axis=1) / np.sqrt(right.shape[1])
-    return int(places[within][order[places[within]].argmin()])
+    costs = np.unique(cost[places])  # rising
+    best = np.array([np.where(cost[places] == one, means, -1.0).argmax() for one in costs])
+    answers = right[places[best]].astype(np.int64)
+    worse = answers[means[best].argmax()] - answers
+    error = worse.std(axis=1) / np.sqrt(right.shape[1])
+    within = worse.mean(axis=1) <= np.maximum(error, margin)
+    return int(places[best[within.argmax()]])
 
 
 def evaluate(

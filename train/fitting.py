@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
-from train.candidates import Candidate, candidates, groupable, order
+from train.candidates import Candidate, candidates, costs, groupable
 from train.crossval import jobs_here
 from train.dataset import NO_CONTACT, DataSet, load_trials, read
 from train.evaluate import Result, SearchGrid, Table, evaluate, group_folds, stratified_folds
@@ -38,6 +38,11 @@ before any contact, the data leak."""
 GROUP_FOLDS, FEW = 20, 300
 """Groups left out one at a time, as far as so many fit up to so many trials; ten parts beyond."""
 FEWEST_TRIALS = 3
+UNSEEN_SHRINKAGE = 0.1
+"""The least where whole groups are left out: what tells things never met must not hang on
+differences that are small beside the features' spread."""
+UNSEEN_MARGIN = 0.01
+"""Accuracy on left-out groups within which the cheaper candidate is taken."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +118,9 @@ def fit(
 ) -> Fitted:
     """Choose and fit every task of some recordings.
 
-    What is None is chosen per task among `train.candidates`: the cheapest candidate that is not
-    worse than the best by more than a standard error, on trials that its fits had not seen.
+    What is None is chosen per task among `train.candidates`: the features and projection of the
+    fewest weights that are not worse than the best by more than a standard error, on trials that
+    their fits had not seen, with the scaling, shrinkage, components and k that are best there.
 
     Args:
         data: recordings, folders of them, or a data set that was loaded for the features.
@@ -193,7 +199,8 @@ def fit(
     if points:
         at_points = np.stack([dataset.features(s, samples) for s in points])
         sequential = SequentialClassifier(choices, points, names, jobs=jobs, widths=widths)
-        sequential.fit(at_points, y, trials.folds, _without_folds(trials, dataset, samples))
+        without = _without_folds(trials, dataset, samples, chosen)
+        sequential.fit(at_points, y, trials.folds, without)
         classifier = sequential.decision_points_[-1]
     else:
         classifier = ContactClassifier(choices, names, widths).fit(X, y)
@@ -244,8 +251,14 @@ def _choose(
         if groups is not None and task != leave_out and groupable(labels, groups)
     }
     grids = [grid for one in found for grid in one.grids]
+    names = widths.keys()
 
-    def table(part: Mapping[str, NDArray[np.str_]], folds: NDArray[np.int64], what: str) -> Table:
+    def table(
+        part: Mapping[str, NDArray[np.str_]],
+        folds: NDArray[np.int64],
+        grids: Sequence[SearchGrid],
+        what: str,
+    ) -> Table:
         return evaluate(
             X,
             part,
@@ -258,39 +271,63 @@ def _choose(
         )
 
     folds = stratified_folds(y[finest], QUICK_FOLDS if quick else 10)
-    trials = table(y, folds, "choosing")
+    trials = table(y, folds, grids, "choosing")
     whole = None
     if by_group and groups is not None:
         count = QUICK_FOLDS if quick else GROUP_FOLDS if len(X) <= FEW else 10
-        whole = table(y if _products(grids) else by_group, group_folds(groups, count), leave_out)
+        own = y if any(grid.targets for grid in grids) else by_group
+        whole = table(own, group_folds(groups, count), [_unseen(g) for g in grids], leave_out)
     out: dict[str, Chosen] = {}
     for task in y:
         missed = partial(_with_untouched, dataset.untouched_labels(task))
-        apart = whole if whole is not None and task in by_group else trials
+        grouped = whole is not None and task in by_group
+        apart, margin = (whole, UNSEEN_MARGIN) if grouped and whole else (trials, 0.0)
         choices = apart.choices[task]
-        rank = order(choices, widths, len(X))
+        among = _among(trials.choices[task], names, grouped)
+        prices, alike = costs(choices, widths), costs(trials.choices[task], widths)
         parts = [_of(one, choices) for one in found]
         out[task] = Chosen(
-            choices[apart.chosen(task, rank)],
-            missed(apart.nested(task, rank)),
-            missed(trials.nested(task, rank)),
-            leave_out if apart is whole else TRIAL,
-            tuple(missed(apart.nested(task, rank, part)) for part in parts),
-            tuple(choices[apart.chosen(task, rank, part)] for part in parts),
+            choices[apart.chosen(task, prices, margin=margin)],
+            missed(apart.nested(task, prices, margin=margin)),
+            missed(trials.nested(task, alike, among, margin)),
+            leave_out if grouped else TRIAL,
+            tuple(missed(apart.nested(task, prices, part)) for part in parts),
+            tuple(choices[apart.chosen(task, prices, part)] for part in parts),
         )
     return out, trials
 
 
-def _without_folds(trials: Table, dataset: DataSet, samples: int) -> list[dict[str, Choice]]:
+def _unseen(grid: SearchGrid) -> SearchGrid:
+    """The candidates of a grid for things never met."""
+    least = [one for one in grid.shrinkages if one >= UNSEEN_SHRINKAGE]
+    return replace(grid, shrinkages=tuple(least))
+
+
+def _among(choices: Sequence[Choice], names: Set[str], unseen: bool) -> NDArray[np.int64]:
+    """The places of those that take no feature but some, and may tell things never met."""
+    return np.flatnonzero(
+        [
+            set(choice.features) <= names
+            and (not unseen or choice.projection == "pca" or choice.shrinkage >= UNSEEN_SHRINKAGE)
+            for choice in choices
+        ]
+    )
+
+
+def _without_folds(
+    trials: Table, dataset: DataSet, samples: int, chosen: Mapping[str, Chosen]
+) -> list[dict[str, Choice]]:
     """{task: what is chosen without it} of each fold, of the features that the model takes."""
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
     out: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
     for task, choices in trials.choices.items():
-        among = np.flatnonzero([set(choice.features) <= set(widths) for choice in choices])
-        rank = np.zeros(len(choices), dtype=np.int64)
-        rank[among] = order([choices[i] for i in among], widths, len(trials.folds))
-        for fold, chosen in enumerate(out):
-            chosen[task] = choices[trials.without(task, fold, rank, among)]
+        unseen = chosen[task].left_out != TRIAL
+        among = _among(choices, widths.keys(), unseen)
+        prices = np.zeros(len(choices), dtype=np.int64)
+        prices[among] = costs([choices[i] for i in among], widths)
+        margin = UNSEEN_MARGIN if unseen else 0.0
+        for fold, taken in enumerate(out):
+            taken[task] = choices[trials.without(task, fold, prices, among, margin)]
     return out
 
 
@@ -317,10 +354,6 @@ def _with_untouched(labels: Sequence[str], found: Result) -> Result:
     """Touches that were missed are wrong; recordings of none in which none was found are right."""
     right = found.right + list(labels).count(NO_CONTACT)
     return replace(found, right=right, total=found.total + len(labels))
-
-
-def _products(grids: Sequence[SearchGrid]) -> bool:
-    return any(grid.targets for grid in grids)
 
 
 def _of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from edge.touch.feature_sets import expand
-from train.candidates import WITH_JOINTS, candidates, groupable, order, products
+from edge.touch.feature_sets import SETS, expand
+from train.candidates import WITH_JOINTS, candidates, costs, groupable, products
 from train.pipeline import Choice
 
 TASKS = {
@@ -41,11 +41,21 @@ def test_whole_objects_can_be_left_out_where_each_class_has_several():
     assert not groupable(np.full(12, "x"), objects)
 
 
-def test_fewer_multiplications_then_more_shrinkage_then_fewer_neighbours_are_cheaper():
+def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
     choices = [
         Choice("IV", 3, 1, "lda", 0.1, ("a", "b")),
-        Choice("IV", 3, 1, "lda", 1.0, ("a", "b")),
+        Choice("IV", 3, 5, "lda", 1.0, ("a", "b")),
         Choice("IV", 3, 1, "lda", 0.1, ("a",)),
-        Choice("IV", 3, 3, "lda", 1.0, ("a", "b")),
+        Choice("I", 2, 1, "pca", 0.1, ("a",)),
+        Choice("IV", 20, 1, "pca", 0.1, ("a",)),
     ]
-    assert order(choices, {"a": 10, "b": 10}, 50).tolist() == [3, 1, 0, 2]
+    assert costs(choices, {"a": 10, "b": 11}).tolist() == [1, 1, 0, 2, 2]
+
+
+def test_of_equally_many_weights_those_that_are_followed_sooner_are_cheaper():
+    moments, contact = SETS["moments"].features, SETS["contact"].features
+    choices = [Choice("IV", 1, 1, "lda", features=names) for names in (moments, contact)]
+    alike = dict.fromkeys(moments, 1) | dict.fromkeys(contact, len(moments) // len(contact))
+    dearer = SETS["moments"].price_us > SETS["contact"].price_us
+    assert len(moments) % len(contact) == 0
+    assert costs(choices, alike).tolist() == [int(dearer), int(not dearer)]

@@ -135,6 +135,16 @@ def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
     assert choose(right) == 2
     assert choose(right, np.array([0, 1, 2])) == 1
     assert choose(right, np.array([0, 2, 1])) == 2
+    assert choose(right, np.array([0, 1, 2]), margin=0.2) == 0
+    assert choose(right, np.array([0, 1, 2]), np.array([0, 2])) == 2
+
+
+def test_of_candidates_that_cost_the_same_the_best_is_chosen():
+    """By how it is better the error of a difference does not ask: nothing is saved by the other."""
+    right = np.ones((4, 100), dtype=bool)
+    right[0, :3] = right[1, 2:4] = right[2, 4:6] = False
+    right[3, 50:] = False
+    assert choose(right, np.array([1, 1, 1, 0])) == 1
 
 
 def test_processes_do_not_change_the_table():
