@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +13,8 @@ from tqdm import tqdm
 
 from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
-from edge.recording import Recording, save
+from edge.recording import Recording, load, save
+from train.commands.thresholds import found, proposed
 from train.importers import names
 
 ZERO_FRAMES = 3
@@ -21,7 +23,8 @@ ZERO_FRAMES = 3
 HELP = "turn another lab's data into recordings"
 DESCRIPTION = (
     "Writes one recording per trial; existing files of the same name are "
-    "replaced. "
+    "replaced. Where the data say no thresholds, those that `python -m train thresholds` proposes "
+    "are written. "
     "To add a format, see train/importers/__init__.py."
 )
 
@@ -44,14 +47,34 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the recordings."""
     arm = open_arm(arguments)
     trials = import_module(f"train.importers.{arguments.format}").trials(arguments.file, arm)
-    n = 0
+    n, without = 0, []
     for name, recording in tqdm(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
             raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
-        save(arguments.out / f"{name}.npz", zeroed(recording) if arguments.zero else recording)
+        path = arguments.out / f"{name}.npz"
+        save(path, zeroed(recording) if arguments.zero else recording)
+        if "threshold_counts" not in recording.meta.get("skin", {}):
+            without.append(path)
         n += 1
     print(f"{n} recordings in {arguments.out}")
+    if without:
+        print(set_thresholds(without))
     return 0
+
+
+def set_thresholds(paths: Sequence[Path]) -> str:
+    """Write the thresholds that the recordings' noise proposes into them; what was done."""
+    recordings = [load(path) for path in paths]
+    threshold, onset = proposed(recordings)
+    for path, recording in zip(paths, recordings, strict=True):
+        skin = {"threshold_counts": threshold, "onset_counts": onset}
+        meta = {**recording.meta, "skin": {**recording.meta.get("skin", {}), **skin}}
+        save(path, replace(recording, meta=meta))
+    touched, _ = found(recordings, threshold, onset)
+    return (
+        f"threshold {threshold} and onset {onset} counts, from the noise before contact: "
+        f"{touched} of {len(paths)} have a contact; `python -m train thresholds` compares others"
+    )
 
 
 def zeroed(recording: Recording) -> Recording:
