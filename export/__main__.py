@@ -29,9 +29,9 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(
         prog="export",
         description="Fits a model for every task that the recordings' labels share, and writes "
-        "OUT/model.onnx and OUT/golden.npz. What is not given is chosen per task: of the features, "
-        "projections and their numbers the cheapest whose accuracy on trials that its fits have "
-        "not seen is within a standard error of the best.",
+        "OUT/model.onnx and OUT/golden.npz. What is not given is chosen per task: the features and "
+        "projection of the fewest weights whose accuracy on trials that their fits have not seen "
+        "is within a standard error of the best, with the numbers that are best there.",
     )
     top.add_argument(
         "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"

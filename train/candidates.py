@@ -23,13 +23,19 @@ PLAIN = (
 )
 """Sets of features that any skin gives, each a candidate."""
 WITH_JOINTS = (
+    ("paper",),
     ("contact", "joints"),
     ("moments", "joints"),
+    ("contact", "moments", "joints"),
+    ("taxels",),
+    ("sqrt_taxels",),
     ("contact", "joints", "posture"),
     ("moments", "joints", "posture"),
 )
-"""Those of recordings that have joint angles."""
-QUICK = (("paper",), ("contact",), ("moments",))
+"""Those of recordings that have joint angles, whose changes cost nothing to follow and tell how far
+the thing gave way."""
+QUICK = 3
+"""The first of them."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
 QUICK_SHRINKAGES = (0.3, 0.03)
 DISCRIMINANT_NEIGHBOURS = (1, 3, 5)
@@ -77,7 +83,7 @@ def candidates(
     if features is not None:
         every: Sequence[tuple[str, ...]] = (tuple(features),)
     else:
-        every = QUICK if quick else PLAIN + (WITH_JOINTS if joints else ())
+        every = (WITH_JOINTS if joints else PLAIN)[: QUICK if quick else None]
     found = []
     for sets in every:
         names = expand(sets)

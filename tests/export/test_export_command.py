@@ -17,10 +17,10 @@ def test_the_report_says_what_was_chosen_among_and_what_was_chosen(recordings, t
     out = capsys.readouterr()
     lines = out.err.splitlines()
     rows = [line for line in lines if line.startswith(("paper ", "contact ", "moments "))]
-    assert [row.split()[:2] for row in rows] == [
+    assert [row[:22].split() for row in rows] == [
         ["paper", "pca"],
-        ["contact", "lda"],
-        ["moments", "lda"],
+        ["contact", "joints", "lda"],
+        ["moments", "joints", "lda"],
     ]
     assert sum(row.count("*") for row in rows) == 2  # one a task
     told = [line for line in lines if line.startswith(("category:", "object:"))]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from edge.touch.feature_sets import SETS, expand
-from train.candidates import WITH_JOINTS, candidates, costs, groupable, products
+from train.candidates import PLAIN, WITH_JOINTS, candidates, costs, groupable, products
 from train.pipeline import Choice
 
 TASKS = {
@@ -21,9 +21,9 @@ def test_a_task_is_the_product_of_two_others_where_their_labels_say_so():
 
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():
-    without = {one.sets for one in candidates(TASKS)}
-    with_joints = {one.sets for one in candidates(TASKS, joints=True)}
-    assert with_joints - without == set(WITH_JOINTS)
+    assert {one.sets for one in candidates(TASKS)} == set(PLAIN)
+    assert {one.sets for one in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
+    assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
 
 def test_what_is_given_is_fixed():
