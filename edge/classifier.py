@@ -65,7 +65,8 @@ class Classifier:
     "unknown": the contact is unlike everything in training) and `unsure` (the window ended before
     the confidence was reached).
 
-    Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended
+    Flags of a decision: `tie` (another label had as many votes), `close` (two of the nearest
+    training trials are equally far but for rounding), `short` (the stream ended
     inside the window; the last values were held), `missing_taxels` (taxels could not be read),
     `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
     measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
@@ -291,6 +292,7 @@ class Classifier:
             novel: from `_novel`.
         """
         flags = (*none.flags, AS_TRAINED) if decision.distances[0] == 0.0 else none.flags
+        flags = (*flags, "close") if decision.close else flags
         label, confidence = decision.label, decision.confidence
         if self.error is None:
             flags = (*flags, "tie") if decision.tie else flags

@@ -10,7 +10,7 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from train.projection import Grid
+from train.projection import FINE, Grid
 
 OPSET = 18
 
@@ -52,9 +52,11 @@ class Builder:
         return self.node("Gather", [stack, self.decision_point], axis=0)
 
     def by_decision_point_small(self, values: Sequence[Any]) -> str:
-        """As `by_decision_point`, of numbers that float32 holds exactly: half the memory."""
-        small = [np.asarray(value).astype(np.float32) for value in values]
-        assert all((a == b).all() for a, b in zip(small, values, strict=True))
+        """As `by_decision_point`; in half the memory where float32 holds the numbers exactly."""
+        with np.errstate(over="ignore"):
+            small = [np.asarray(value).astype(np.float32) for value in values]
+        if len(values) == 1 or not np.array_equal(small, values):
+            return self.by_decision_point(values)
         return self.node("Cast", [self.by_decision_point(small, np.float32)], to=TensorProto.DOUBLE)
 
     def taken(self, x: str, columns: NDArray[np.int64], width: int) -> str:
@@ -110,30 +112,44 @@ class Affine(Protocol):
     weights_: NDArray[np.float64]
 
 
-def project(build: Builder, x: str, decision_points: Sequence[Affine]) -> str:
-    """Features (n, p) to coordinates (n, c); see `train.projection.Projection`."""
+def project(
+    build: Builder, x: str, decision_points: Sequence[Affine], reach: str = ""
+) -> tuple[str, str]:
+    """Features (n, p) to coordinates (n, c); see `train.projection.Projection`.
+
+    Gains and weights carry the grid's unit, a power of two: no bit of a coordinate changes.
+
+    Args:
+        build: takes the nodes.
+        x: name of the features.
+        decision_points: a projection for each.
+        reach: name to give to the second result.
+
+    Returns:
+        The coordinates, and (n,) the length of the scaled differences in units of the grid.
+    """
     d = build.node("Sub", [x, build.by_decision_point([p.mean_ for p in decision_points])])
-    if not all((p.gain_ == 1.0).all() for p in decision_points):
-        d = build.node("Mul", [d, build.by_decision_point([p.gain_ for p in decision_points])])
-    grids = [
-        build.by_decision_point([p.grid_.high for p in decision_points]),
-        build.by_decision_point([p.grid_.low for p in decision_points]),
-    ]
-    halves = []
-    for step in grids:
-        half = build.node("Sub", [build.node("Add", [d, step]), step])
-        halves.append(half)
-        if step == grids[0]:
-            d = build.node("Sub", [d, half])
-    weights = widened([p.weights_ for p in decision_points])
-    # Components are multiples of 2^-WEIGHT_BITS, which float32 holds.
-    weighing = (
-        build.by_decision_point(weights)
-        if len(weights) == 1
-        else build.by_decision_point_small(weights)
+    for factors in _gains(decision_points):
+        d = build.node("Mul", [d, build.by_decision_point(factors)])
+    length = build.node("ReduceL2", [d, build.ints(1)], reach, keepdims=0)
+    high = build.node("Round", [d])
+    fine = build.constant(FINE)
+    low = build.node("Sub", [build.node("Add", [build.node("Sub", [d, high]), fine]), fine])
+    weights = build.by_decision_point_small(
+        widened([p.weights_ * p.grid_.unit for p in decision_points])
     )
-    high, low = (build.node("MatMul", [half, weighing]) for half in halves)
-    return build.node("Add", [high, low])
+    halves = [build.node("MatMul", [half, weights]) for half in (high, low)]
+    return build.node("Add", halves), length
+
+
+def _gains(decision_points: Sequence[Affine]) -> list[list[Any]]:
+    """Gains over the grids' units; one after the other where float64 holds no quotient."""
+    units = [p.grid_.unit for p in decision_points]
+    with np.errstate(over="ignore"):
+        gains = [p.gain_ / unit for p, unit in zip(decision_points, units, strict=True)]
+    if np.isfinite(gains).all():
+        return [gains]
+    return [[p.gain_ for p in decision_points], [1.0 / unit for unit in units]]
 
 
 def widened(arrays: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:

@@ -22,6 +22,7 @@ VECTORS = 256
 BOUNDS = {
     "scores": 1e-15,
     "distances": 1e-12,
+    "next": 1e-12,
     "label_distances": 1e-12,
     "features": 1e-12,
     "time_s": 1e-9,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,9 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.onnx_file import check
 from export.build import OPSET, Builder, project, widened
+from train.distance import resolution
 from train.pipeline import NEAREST_OF_LABEL, ContactClassifier, Space
+from train.projection import HALF_BITS
 from train.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -54,11 +57,9 @@ def _by_first(build: Builder, running: str, components: int, axis: int) -> str:
     return build.node("Gather", [running, build.constant(components - 1, np.int64)], axis=axis)
 
 
-def _nearest(
-    build: Builder, squares: str, k: int, outputs: tuple[str, str] = ("", "")
-) -> list[str]:
+def _nearest(build: Builder, squares: str, k: int) -> list[str]:
     """Squared distances and rows (n, k) of the nearest, every row measured directly."""
-    return build.nodes("TopK", [squares, build.ints(k)], list(outputs), largest=0, sorted=1)
+    return build.nodes("TopK", [squares, build.ints(k)], ["", ""], largest=0, sorted=1)
 
 
 def _unit(rows: NDArray[np.float64]) -> float:
@@ -72,13 +73,7 @@ def _unit(rows: NDArray[np.float64]) -> float:
     return math.ldexp(1.0, 1 - math.frexp(longest)[1])
 
 
-def _shortlisted(
-    build: Builder,
-    z: str,
-    rows: Sequence[NDArray[np.float64]],
-    k: int,
-    outputs: tuple[str, str] = ("", ""),
-) -> list[str]:
+def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k: int) -> list[str]:
     """As `_nearest`, where a float32 product first picks the rows worth measuring.
 
     With b a training row and q the query, |b - q|^2 - |q|^2 = |b|^2 - 2 b.q is computed in
@@ -140,7 +135,7 @@ def _shortlisted(
     near_squares, near_rows = build.nodes(
         "If",
         [build.node("Cast", [all_sure], to=TensorProto.BOOL)],
-        list(outputs),
+        ["", ""],
         then_branch=then,
         else_branch=other,
     )
@@ -152,7 +147,12 @@ def _shortlisted(
 
 
 def _first(build: Builder, values: str, have: int, want: int, output: str = "") -> str:
-    """The first `want` of `have` columns; those of a task's output are named `output`."""
+    """The first `want` of `have` columns; where there are fewer, one more that is infinite.
+
+    Those of a task's output are named `output`.
+    """
+    if have < want:
+        return build.node("Pad", [values, build.ints(0, 0, 0, 1), build.constant(np.inf)], output)
     if have == want:
         return build.node("Identity", [values], output) if output else values
     ints = [build.ints(i) for i in (0, want, 1)]
@@ -162,24 +162,20 @@ def _first(build: Builder, values: str, have: int, want: int, output: str = "") 
 def _decide(
     build: Builder, task: str, labels: NDArray[np.int64], classes: int, k: int, near: list[str]
 ) -> None:
-    """Squared distances and rows of the neighbours to the four outputs of a task."""
+    """Squared distances (n, k + 1) and rows (n, k) to a task's outputs."""
     squares, rows = near
-    build.node("Sqrt", [squares], f"{task}_distances")
+    roots = build.node("Sqrt", [squares])
+    distances, _ = build.nodes(
+        "Split", [roots, build.ints(k, 1)], [f"{task}_distances", f"{task}_next"], axis=1
+    )
     said = build.node("Gather", [build.constant(labels, np.int64), rows])
     # A distance that is no number, or none that float64 holds, votes for nothing: class -1,
     # whose row of the votes (the last one) is empty.
-    known = build.node("LessOrEqual", [squares, build.constant(LARGEST)])
+    known = build.node("LessOrEqual", [distances, build.constant(LARGEST)])
     said = build.node("Where", [known, said, build.constant(-1, np.int64)])
-    # A power of two divides without rounding, so its ballots may already be shares.
-    share = 1.0 / k if k & (k - 1) == 0 else 1.0
-    ballots = build.constant(np.vstack([share * np.eye(classes), np.zeros((1, classes))]))
+    ballots = build.constant(np.vstack([np.eye(classes), np.zeros((1, classes))]))
     cast = build.node("Gather", [ballots, said])
-    axis = build.ints(1)
-    if share == 1.0 and k > 1:
-        votes = build.node("ReduceSum", [cast, axis], keepdims=0)
-        build.node("Div", [votes, build.constant(float(k))], f"{task}_scores")
-    else:
-        votes = build.node("ReduceSum", [cast, axis], f"{task}_scores", keepdims=0)
+    votes = build.node("ReduceMean", [cast, build.ints(1)], f"{task}_scores", keepdims=0)
     if k <= 2:
         # Two neighbours agree or tie: either way the nearest has it.
         build.node("Gather", [said, build.constant(0, np.int64)], f"{task}_label", axis=1)
@@ -187,8 +183,7 @@ def _decide(
     # The first neighbour whose class has the most votes is the nearest of the tied.
     own = build.node("GatherElements", [votes, said], axis=1)
     place = build.node("ArgMax", [own], axis=1, keepdims=1)
-    label = build.node("GatherElements", [said, place], axis=1)
-    build.node("Squeeze", [label, axis], f"{task}_label")
+    build.node("GatherND", [said, place], f"{task}_label", batch_dims=1)
 
 
 def _decision_points(model: ContactClassifier | SequentialClassifier) -> list[ContactClassifier]:
@@ -213,14 +208,19 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         key = (choice.space(task), kept[task])
         if key not in groups or choice.k > model.choices[groups[key]].k:
             groups[key] = task
-    points = {
+    alone = names["reach"] if len(last.projections_) == 1 else ""
+    projected = {
         space: project(
             build,
             build.taken(x, last.columns_[space], last.n_features_in_),
             [m.projections_[space] for m in decision_points],
+            alone,
         )
         for space in last.projections_
     }
+    points = {space: z for space, (z, _) in projected.items()}
+    if not alone:
+        build.node("Max", [reach for _, reach in projected.values()], names["reach"])
     tasks = {task: names[f"{task}_label"].removesuffix("_label") for task in model.choices}
     near: dict[tuple[Space, int], list[str]] = {}
     running: dict[Space, str] = {}
@@ -228,27 +228,25 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     early = isinstance(model, SequentialClassifier)
     for (space, components), most in groups.items():
         rows = widened([m.rows_[space] for m in decision_points])
-        have, k = rows[0].shape[1], model.choices[most].k
-        # The rows of the task that asks for most neighbours are its output as they are.
-        outputs = ("", f"{tasks[most]}_neighbours")
+        # The one after those that vote shows how near it came.
+        have, k = rows[0].shape[1], min(model.choices[most].k + 1, len(rows[0]))
         # A shortlist of most rows saves nothing, nor does one where each label's distance is asked.
         if not early and len(rows[0]) >= SHORTLIST_ROWS and 2 * (k + SHORTLIST) <= len(rows[0]):
             z = _first(build, points[space], have, components)
-            found = _shortlisted(build, z, [r[:, :components] for r in rows], k, outputs)
+            found = _shortlisted(build, z, [r[:, :components] for r in rows], k)
         else:
             if space not in running:
                 running[space] = _running(build, _gaps(build, points[space], rows), 1)
             measured = _by_first(build, running[space], components, 1)
             all_squares[space, components] = measured
-            found = _nearest(build, measured, k, outputs)
+            found = _nearest(build, measured, k)
         near[space, components] = found
     for task, choice in model.choices.items():
         key = (choice.space(task), kept[task])
-        have = model.choices[groups[key]].k
+        have = min(model.choices[groups[key]].k + 1, len(last.labels_[task]))
         squares, rows_of = near[key]
-        if groups[key] != task:
-            rows_of = _first(build, rows_of, have, choice.k, f"{tasks[task]}_neighbours")
-        squares = _first(build, squares, have, choice.k)
+        rows_of = _first(build, rows_of, have, choice.k, f"{tasks[task]}_neighbours")
+        squares = _first(build, squares, have, choice.k + 1)
         classes = len(last.classes_[task])
         _decide(build, tasks[task], last.labels_[task], classes, choice.k, [squares, rows_of])
         if early:
@@ -278,6 +276,17 @@ def _label_distances(
     build.node("Div", [total, build.constant(counts.astype(np.float64))], output)
 
 
+def _resolution(model: ContactClassifier | SequentialClassifier, task: str) -> tuple[float, float]:
+    """`train.distance.resolution` of a task, the coarsest of its decision points."""
+    found = []
+    for decision_point in _decision_points(model):
+        projection = decision_point.projections_[decision_point.spaces_[task]]
+        weights = projection.weights_[:, : decision_point.components_[task]]
+        found.append(resolution(weights, projection.grid_.unit * 2.0**HALF_BITS))
+    fixed, part = zip(*found, strict=True)
+    return max(fixed), max(part)
+
+
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for task, choice in model.choices.items():
@@ -287,9 +296,11 @@ def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str,
             (f"{task}_scores", DoubleTensorType([None, classes])),
             (f"{task}_distances", DoubleTensorType([None, choice.k])),
             (f"{task}_neighbours", Int64TensorType([None, choice.k])),
+            (f"{task}_next", DoubleTensorType([None, 1])),
         ]
         if isinstance(model, SequentialClassifier):
             found.append((f"{task}_label_distances", DoubleTensorType([None, classes])))
+    found.append(("reach", DoubleTensorType([None])))
     return found
 
 
@@ -361,6 +372,13 @@ def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) ->
         # answered at the full window.
         full = np.array([len(model.decision_points_) - 1], dtype=np.int64)
         proto.graph.initializer.append(numpy_helper.from_array(full, "decision_point"))
+    info = replace(
+        info,
+        tasks={
+            task: replace(entry, resolution=_resolution(model, task))
+            for task, entry in info.tasks.items()
+        },
+    )
     proto.ir_version = IR_VERSION
     proto.producer_name = "edge-classify"
     proto.doc_string = "scaler, PCA and k-NN of a touch; see the metadata"

@@ -1,7 +1,7 @@
 """Nearest neighbours, and all tasks of a model together.
 
-The arithmetic of a fitted `ContactClassifier` is what the ONNX graph does; `export/graph.py`
-writes it down.
+A fitted `ContactClassifier` finds the neighbours that its ONNX graph finds: both measure by
+`train.distance`. `export/graph.py` writes the graph down.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Scaling and projection of feature vectors, as a scikit-learn transformer.
 
-The arithmetic of a fitted `Projection` is what the ONNX graph does, operation by operation;
-`export/build.py` writes it down.
+A fitted `Projection` gives the coordinates of the ONNX graph, to the bit where sums are exact (see
+there); `export/build.py` writes it down.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ SCALINGS = ("none", "I", "II", "III", "IV", "V")
 WEIGHT_BITS = 20
 """Components of up to 128 columns are multiples of 2 ** -WEIGHT_BITS; see `Projection`."""
 HALF_BITS = 26
+FINE = 1.5 * 2.0 ** (52 - HALF_BITS)
+"""Added and taken away again, it rounds to 2^-`HALF_BITS`."""
 MOST_COLUMNS = 1 << 12
 """Beyond them too few bits are left for the components."""
 RANGE = 4.0
@@ -316,26 +318,29 @@ def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
 class Grid:
     """Differences from a mean, split so that their products with weights add up exactly.
 
-    Adding and subtracting `high`, then `low`, rounds to the grid of that half.
+    The high half is a whole number of units, the low half what is left in units of `FINE`.
 
     Args:
         largest: of the training set's differences, in absolute value.
+
+    Attributes:
+        unit: a power of two. Differences up to 2^`HALF_BITS` of it are added up exactly.
     """
 
     def __init__(self, largest: float) -> None:
         exponent = int(np.ceil(np.log2(RANGE * largest))) if largest > 0.0 else 0
-        self.high = 1.5 * 2.0 ** (52 + exponent - HALF_BITS)
-        self.low = 1.5 * 2.0 ** (52 + exponent - 2 * HALF_BITS)
+        self.unit = 2.0 ** (exponent - HALF_BITS)
 
     def project(self, d: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates (n, c) of differences (n, p) by weights (p, c) of `on_grid`."""
-        high = (d + self.high) - self.high
-        low = ((d - high) + self.low) - self.low
-        return np.asarray(high @ weights + low @ weights)
+        d = d / self.unit
+        high = np.rint(d)
+        low = ((d - high) + FINE) - FINE
+        return np.asarray((high @ weights + low @ weights) * self.unit)
 
 
 class Projection(TransformerMixin, BaseEstimator):
-    """Features to a few coordinates, the same bits on every machine.
+    """Features to a few coordinates, the same bits on every machine up to `RANGE`.
 
     Each column's mean is subtracted and its feature type's gain multiplied. The directions are
     principal components, or the discriminants of the labels (`Spectrum.discriminants`).

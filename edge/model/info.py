@@ -34,6 +34,8 @@ class Task:
         features: those that it takes, in the order of the model's; all where empty.
         left_out: what the accuracy left out as a whole: "trial", or a label such as "object".
         no_contact: the answer where a recording ends without a contact, or None.
+        resolution: two distances that differ by no more than the first number, plus the second
+            times the distance, may be in either order: they are known no better.
     """
 
     labels: tuple[str, ...]
@@ -45,6 +47,7 @@ class Task:
     features: tuple[str, ...] = ()
     left_out: str = "trial"
     no_contact: str | None = None
+    resolution: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -230,9 +233,15 @@ def _task(table: ConfigTable) -> Task:
         features=table.texts("features"),
         left_out=table.text("left_out"),
         no_contact=table.text("no_contact") if table.has("no_contact") else None,
+        resolution=_pair(table.numbers("resolution", 2, low=0.0)),
     )
     table.done()
     return task
+
+
+def _pair(values: tuple[float, ...]) -> tuple[float, float]:
+    first, second = values
+    return first, second
 
 
 def _calibration(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from edge.model import onnx_file as onnxfile
 from edge.model.info import METADATA_KEY, ModelInfo
 
 LARGEST_BYTES = 1 << 30
+EXACT_REACH = 2.0**26
+"""Up to this `reach` the graph adds up coordinates without rounding."""
 
 
 class Decision(NamedTuple):
@@ -35,6 +38,8 @@ class Decision(NamedTuple):
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) mean squared distance to the nearest (up to three) training
             trials of each label, of a model with decision points; see `edge.model.stopping`.
+        close: two of the neighbours, or the last of them and the next trial, are so nearly
+            equally far that exact arithmetic may have them in another order.
     """
 
     label: str
@@ -44,6 +49,7 @@ class Decision(NamedTuple):
     neighbours: NDArray[np.int64]
     tie: bool
     label_distances: NDArray[np.float64] | None = None
+    close: bool = False
 
 
 class Model:
@@ -97,13 +103,19 @@ class Model:
         # decision then allocates next to nothing.
         self._shape = (self.info.width,)
         self._input = np.zeros((1, *self._shape))
-        self._decision_point = np.full(1, len(self.decision_points_s) - 1, dtype=np.int64)
+        self._last = len(self.decision_points_s) - 1
+        self._decision_point = np.full(1, self._last, dtype=np.int64)
         outputs: dict[str, NDArray[Any]] = {
             output.name: np.zeros(
                 [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
             )
             for output in self._session.get_outputs()
         }
+        # A task's distances and the next one lie side by side, and are read at once.
+        near = {task: np.zeros((1, entry.k + 1)) for task, entry in self.info.tasks.items()}
+        for task, entry in self.info.tasks.items():
+            outputs[f"{task}_distances"] = near[task][:, : entry.k]
+            outputs[f"{task}_next"] = near[task][:, entry.k :]
         self._binding = self._session.io_binding()
         value = runtime.OrtValue.ortvalue_from_numpy
         self._binding.bind_ortvalue_input("features", value(self._input))
@@ -115,14 +127,16 @@ class Model:
             _Answer(
                 task,
                 entry.labels,
+                entry.resolution,
                 outputs[f"{task}_label"],
                 outputs[f"{task}_scores"][0],
-                outputs[f"{task}_distances"][0],
+                near[task][0],
                 outputs[f"{task}_neighbours"][0],
                 outputs[f"{task}_label_distances"][0] if self.info.decision_points_s else None,
             )
             for task, entry in self.info.tasks.items()
         ]
+        self._reach = outputs["reach"]
 
     def _check(self, name: str) -> None:
         inputs = self._session.get_inputs()
@@ -143,8 +157,11 @@ class Model:
                 "export it again"
             )
         outputs = {output.name: output.shape for output in self._session.get_outputs()}
+        if len(outputs.get("reach", ())) != 1:
+            raise InputError(f"{name}: has no output reach; export it again")
         for task, entry in self.info.tasks.items():
-            widths = {"scores": len(entry.labels), "distances": entry.k, "neighbours": entry.k}
+            widths = {"scores": len(entry.labels), "next": 1}
+            widths |= dict.fromkeys(("distances", "neighbours"), entry.k)
             if self.info.decision_points_s:
                 widths["label_distances"] = len(entry.labels)
             if f"{task}_label" not in outputs:
@@ -178,13 +195,11 @@ class Model:
         return dict(zip(self._names, values, strict=True))
 
     def _place(self, decision_point: int | None) -> int:
-        decision_points = len(self.decision_points_s)
         if decision_point is None:
-            return decision_points - 1
-        if not 0 <= decision_point < decision_points:
+            return self._last
+        if not 0 <= decision_point <= self._last:
             raise InputError(
-                f"{self.path}: has the decision points 0 to {decision_points - 1}, "
-                f"not {decision_point}"
+                f"{self.path}: has the decision points 0 to {self._last}, not {decision_point}"
             )
         return decision_point
 
@@ -209,22 +224,29 @@ class Model:
             self._session.run_with_iobinding(self._binding)
         except Exception as error:  # an index past its tensor, a shape that came out otherwise
             raise self._broken(str(error)) from None
+        # Beyond that the sums round as well: see `train.distance.resolution`.
+        reach = self._reach.item()
+        coarser = 1.0 if reach <= EXACT_REACH else (len(x) + 4) * reach / EXACT_REACH
         decisions: dict[str, Decision] = {}
-        for name, labels, label, scores, distances, neighbours, apart in self._answers:
+        for answer in self._answers:
+            name, labels, known, label, scores, near, neighbours, apart = answer
             index = int(label[0])
             if index < 0:
                 raise self._refusal(x)
             shares = scores.tolist()
             if index >= len(labels) or not 0.0 <= shares[index] <= 1.0:
                 raise self._broken(f"{name} is answered by label {index} of {len(labels)}")
+            far = near.tolist()
+            resolved = coarser * known[0] + known[1] * far[-2]
             decisions[name] = Decision(
                 labels[index],
                 shares[index],
                 scores.copy(),
-                distances.copy(),
+                near[:-1].copy(),
                 neighbours.copy(),
                 shares.count(shares[index]) > 1,
                 None if apart is None else apart.copy(),
+                min(map(sub, far[1:], far)) <= resolved,
             )
         return decisions
 
@@ -271,9 +293,11 @@ class _Answer(NamedTuple):
 
     task: str
     labels: tuple[str, ...]
+    resolution: tuple[float, float]
     label: NDArray[np.int64]
     scores: NDArray[np.float64]
-    distances: NDArray[np.float64]
+    near: NDArray[np.float64]
+    """Distances of the neighbours, and of the next training trial."""
     neighbours: NDArray[np.int64]
     label_distances: NDArray[np.float64] | None
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from edge.errors import InputError
 
 OPERATORS = frozenset(
-    "Add And ArgMax Cast Concat CumSum Div Gather GatherElements Identity If Less LessOrEqual "
-    "MatMul Mul Not Pad ReduceMax ReduceMin ReduceSum ReduceSumSquare Slice Sqrt Squeeze Sub TopK "
-    "Unsqueeze Where".split()
+    "Add ArgMax Cast CumSum Div Gather GatherElements GatherND Identity If Less LessOrEqual MatMul "
+    "Max Mul Pad ReduceL2 ReduceMean ReduceMin ReduceSum ReduceSumSquare "
+    "Round Slice Split Sqrt Squeeze Sub TopK Unsqueeze Where".split()
 )
 """The operators, all of the standard domain, that an exported model may use; what each makes of
 its inputs' shapes is said in `_Work`."""

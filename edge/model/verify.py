@@ -9,7 +9,7 @@
 | `series_t` | float64 (s,) | |
 | `series_counts` | int64 (s, c) | `FeatureSeries.integers`: exact |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
-| `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
+| `<task>_label`, `_scores`, `_distances`, `_neighbours`, `_next` | | the graph's, for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, of a model with decision points |
 | `decision_point_vectors` | float64 (points, w, width) | likewise, for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
@@ -36,7 +36,7 @@ from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
 
-PARTS = ("label", "neighbours", "scores", "distances")
+PARTS = ("label", "neighbours", "scores", "distances", "next")
 
 
 @dataclass(frozen=True)

@@ -129,6 +129,19 @@ def test_a_new_touch_is_not_flagged(model, make_touch):
     assert [e.flags for e in events if isinstance(e, Decided)] == [(), ()]
 
 
+def test_neighbours_that_rounding_could_order_otherwise_flag_the_decision(
+    model, make_touch, monkeypatch
+):
+    decide = model.decide
+
+    def close(*arguments):
+        return {task: one._replace(close=True) for task, one in decide(*arguments).items()}
+
+    monkeypatch.setattr(model, "decide", close)
+    events = [e for _, e in watch(model, make_touch(kind="soft", seed=99))]
+    assert [e.flags for e in events if isinstance(e, Decided)] == [("close",), ("close",)]
+
+
 def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(model, make_touch):
     events = watch(model, make_touch(seconds=0.5))
     assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (None, Decided), (None, Decided)]

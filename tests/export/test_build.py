@@ -64,7 +64,7 @@ def test_the_graph_projects_to_the_bits_of_the_estimator(graph, scaling):
     X = np.random.default_rng(0).gamma(2.0, size=(30, 120)) * 10.0 ** np.arange(-3, 3).repeat(20)
     projection = Projection(scaling, 7).fit(X)
     np.testing.assert_array_equal(
-        run(project(build, "x", [projection]), X), projection.transform(X)
+        run(project(build, "x", [projection])[0], X), projection.transform(X)
     )
 
 

@@ -8,13 +8,13 @@ import onnx
 import pytest
 
 from edge.model.info import ModelInfo, Task
-from edge.model.model import Model
+from edge.model.model import EXACT_REACH, Model
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 from export import graph
 from train.pipeline import Choice, ContactClassifier, vote
-from train.projection import SCALINGS
+from train.projection import HALF_BITS, SCALINGS
 
 
 def features(n, seed=0):
@@ -76,6 +76,10 @@ def differences(fitted, model, queries):
         if not gap <= 1e-14 * distances.max():
             wrong.append(f"{task}_distances")
     return wrong
+
+
+def test_the_board_knows_how_far_the_projection_is_exact():
+    assert EXACT_REACH == 2.0**HALF_BITS
 
 
 @pytest.mark.parametrize("scaling", SCALINGS)
@@ -224,6 +228,68 @@ def test_nearly_as_many_voters_as_rows_need_no_shortlist(export):
     X = features(1400)
     fitted, model = export(X, {"t": Choice("none", 5, 1400)})
     assert differences(fitted, model, X[:2]) == []
+
+
+@pytest.mark.parametrize(("n", "k"), [(40, 3), (1400, 3), (40, 40), (1400, 1400)])
+def test_the_trial_after_the_neighbours_is_told_too(export, n, k):
+    """Infinitely far where every trial is a neighbour."""
+    X = features(n)
+    queries = features(5, seed=1)
+    fitted, model = export(X, {"t": Choice("IV", 6, k), "u": Choice("IV", 6, 2)})
+    squares = np.sort(fitted.squares("t", queries), axis=1)
+    beyond = np.sqrt(squares[:, k]) if k < n else np.full(5, np.inf)
+    assert model.run(queries)["t_next"].ravel().tolist() == beyond.tolist()
+    assert model.run(queries)["u_next"].ravel().tolist() == np.sqrt(squares[:, 2]).tolist()
+
+
+def test_the_reach_is_the_length_of_the_largest_difference_in_units_of_its_grid(export):
+    X = features(60)
+    fitted, model = export(X, {"t": Choice("IV", 6, 3), "u": Choice("none", 6, 3)})
+    queries = 1e3 * features(20, seed=1)
+    lengths = [
+        np.linalg.norm((queries - p.mean_) * p.gain_, axis=1) / p.grid_.unit
+        for p in fitted.projections_.values()
+    ]
+    np.testing.assert_allclose(model.run(queries)["reach"], np.max(lengths, axis=0), rtol=1e-12)
+
+
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_a_decision_is_close_where_two_trials_are_equally_far(export, k):
+    X = features(40)
+    fitted, model = export(X, {"t": Choice("none", 20, k)})
+    first, second = np.argsort(fitted.squares("t", X[:1])[0])[:2]
+    middle, way = (X[first] + X[second]) / 2.0, X[second] - X[first]
+    shares = (-1e-9, 0.0, 1e-9)
+    found = [model.decide(middle + share * way)["t"].close for share in shares]
+    assert found == [False, True, False]
+
+
+def test_what_lies_beyond_the_first_trial_without_a_vote_is_not_asked(export):
+    X = features(40)
+    X[1:3] = X[0] + np.outer([0.5, -0.5], np.eye(120)[0])  # 1 and 2 are equally far from 0
+    _, model = export(X, {"t": Choice("none", 20, 1), "u": Choice("none", 20, 3)})
+    assert not model.decide(X[0])["t"].close
+    assert model.decide(X[0])["u"].close
+
+
+def test_equal_trials_are_close(export):
+    X = features(40)
+    X[7] = X[3]
+    _, model = export(X, {"t": Choice("IV", 6, 1)})
+    assert model.decide(X[3])["t"].neighbours.tolist() == [3]
+    assert [model.decide(X[i])["t"].close for i in (2, 3, 7)] == [False, True, True]
+
+
+def test_far_outside_the_training_range_less_is_told_apart(export):
+    """Where sums round too, so that the order of distances is that of their rounding."""
+    X = features(40)
+    fitted, model = export(X, {"t": Choice("none", 6, 3)})
+    length = np.linalg.norm(X[0] - X[1])
+    across = np.linalg.svd(next(iter(fitted.projections_.values())).weights_.T)[2][-1]
+    query = X[0] + 1e-3 * (X[1] - X[0])
+    assert model.run((query + 1e3 * length * across)[None])["reach"][0] > EXACT_REACH
+    near = [model.decide(query + far * length * across)["t"].close for far in (0, 1e3, 1e13)]
+    assert near == [False, False, True]
 
 
 @pytest.mark.parametrize("n", [60, 1400])

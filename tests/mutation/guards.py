@@ -93,13 +93,13 @@ GUARDS = (
     Guard(
         "a projection is exact: high half",
         f"{PROJECTION}:project",
-        "high = (d + self.high) - self.high",
+        "high = np.rint(d)",
         "high = 0.5 * d",
     ),
     Guard(
         "a projection is exact: low half",
         f"{PROJECTION}:project",
-        "low = ((d - high) + self.low) - self.low",
+        "low = ((d - high) + FINE) - FINE",
         "low = d - high",
         beside=GRAPH,
     ),
@@ -131,8 +131,8 @@ GUARDS = (
     Guard(
         "the graph's projection: high half",
         "export/build.py:project",
-        'half = build.node("Sub", [build.node("Add", [d, step]), step])',
-        'half = build.node("Mul", [d, build.constant(0.5)])',
+        'high = build.node("Round", [d])',
+        'high = build.node("Mul", [d, build.constant(0.5)])',
         beside=GRAPH,
     ),
     Guard(

@@ -118,8 +118,9 @@ def test_a_projection_is_exact_in_any_order(seed, scaling, offset, spread):
     projection = Projection(scaling, 4).fit(X)
     z = projection.transform(X)
     d = (X - projection.mean_) * projection.gain_
-    high = (d + projection.grid_.high) - projection.grid_.high
-    low = ((d - high) + projection.grid_.low) - projection.grid_.low
+    units = d / projection.grid_.unit
+    high = np.rint(units) * projection.grid_.unit
+    low = np.rint((units - np.rint(units)) * 2.0**26) * 2.0**-26 * projection.grid_.unit
     for i in range(0, len(X), 7):
         for j in range(4):
             w = [Fraction(v) for v in projection.weights_[:, j].tolist()]
