@@ -15,14 +15,14 @@ from dataclasses import dataclass, field
 from edge.errors import InputError
 
 OPERATORS = frozenset(
-    "Add ArgMax Cast CumSum Div Gather GatherElements GatherND Identity If Less LessOrEqual MatMul "
-    "Max Mul Pad ReduceL2 ReduceMean ReduceMin ReduceSum ReduceSumSquare "
-    "Round Slice Split Sqrt Squeeze Sub TopK Unsqueeze Where".split()
+    "Add ArgMax Cast Concat CumSum Div Gather GatherElements GatherND Identity If Less LessOrEqual "
+    "MatMul Max Mul Pad ReduceL2 ReduceMean ReduceMin ReduceSum ReduceSumSquare Round Slice Split "
+    "Sqrt Squeeze Sub TopK Unsqueeze Where".split()
 )
 """The operators, all of the standard domain, that an exported model may use; what each makes of
 its inputs' shapes is said in `_Work`."""
 EACH_BY_EACH = frozenset(
-    "Add And Cast Div Identity Less LessOrEqual Max Mul Not Sqrt Sub Where".split()
+    "Add Cast Div Identity Less LessOrEqual Max Mul Round Sqrt Sub Where".split()
 )
 NO_LARGER = frozenset("CumSum Slice Split TopK".split())
 
