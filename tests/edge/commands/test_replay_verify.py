@@ -92,11 +92,11 @@ def test_the_golden_file_is_met(exported, capsys):
         "series counts",
         "onset",
         "features",
-        *(f"category_{part}" for part in ("label", "neighbours", "scores", "distances")),
-        *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances")),
+        *(f"category_{part}" for part in ("label", "neighbours", "scores", "distances", "next")),
+        *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances", "next")),
     ]
     assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
-    assert "12 quantities agree with the golden file" in err
+    assert "14 quantities agree with the golden file" in err
 
 
 @pytest.mark.parametrize(
