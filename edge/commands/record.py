@@ -9,6 +9,7 @@ import re
 import signal
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,12 @@ import numpy as np
 
 from edge.commands.options import add_arm, add_joints, add_skin, open_arm
 from edge.commands.output import Output
-from edge.commands.source import Opened, open_joints, open_skin
+from edge.commands.source import open_joints, open_skin
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
 from edge.runtime.event_writer import Lines
 from edge.skin.loop import Loop, stop_on
-from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
@@ -116,12 +116,10 @@ class Trials:
         else:
             self._frames.append(frame)
         over = contact is None or contact.ended
-        if over or frame.t - self._saved_onset() >= self._length:
+        onset_s = math.inf if self._saved is None else self._saved.onset_s
+        if over or frame.t - onset_s >= self._length:
             return self.rest()
         return None
-
-    def _saved_onset(self) -> float:
-        return math.inf if self._saved is None else self._saved.onset_s
 
     def rest(self) -> list[Frame] | None:
         """The frames so far of a trial that has begun; then wait for the next contact."""
@@ -207,80 +205,89 @@ def run(arguments: argparse.Namespace) -> int:
                     f"{opened.source} gives {have or 'no'} joint angles, but the arm of "
                     f"{arguments.arm} has {dof}; name their source with --joints"
                 )
-        names = arm.names if arm is not None else None
+        names = None if arm is None else arm.names
         if arguments.joints is None and opened.playback is not None:
             names = opened.playback.joint_names
         skin = opened.skin
+        meta = {
+            "skin": skin.layout.to_dict(),
+            "skin_name": skin.file.name,
+            "source": opened.source,
+            "rate_hz": skin.file.reading.rate_hz,
+            **({} if arm is None else {"arm": arm.to_dict()}),
+        }
+        recorder = Recorder(arguments.out, labels, meta, names, lines, joints is not None)
         tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead = round(arguments.lead / skin.period_s)
         trials = Trials(tracker, lead_frames=lead, length_s=arguments.length)
         loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
-        done = 0
         LOG.info("waiting for a contact")
         for frame in loop.frames():
-            frames = trials.push(frame)
-            if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, names, lines, complete=True)
-                done += 1
-                if done == wanted:
-                    break
+            recorder.save(trials.push(frame), complete=True)
+            if recorder.saved == wanted:
+                break
         else:
-            frames = trials.rest()
-            if frames is not None:
-                _save(frames, arguments.out, labels, opened, arm, names, lines, complete=False)
-                done += 1
-    if done == 0:
+            recorder.save(trials.rest(), complete=False)
+    if not recorder.saved:
         LOG.warning("there was no contact, so nothing was saved")
-        return 1
-    return 0
+    return 0 if recorder.saved else 1
 
 
-def _save(
-    frames: list[Frame],
-    out: str,
-    labels: dict[str, str],
-    opened: Opened,
-    arm: Chain | None,
-    names: Sequence[str] | None,
-    lines: Lines,
-    *,
-    complete: bool,
-) -> None:
-    path = trial_path(out, labels)
-    meta = {
-        "labels": labels,
-        "skin": opened.skin.layout.to_dict(),
-        "skin_name": opened.skin.file.name,
-        "source": opened.source,
-        "trial": path.stem,
-        "rate_hz": opened.skin.file.reading.rate_hz,
-        "complete": complete,
-    }
-    if arm is not None:
-        meta["arm"] = arm.to_dict()
-    trial = recording(frames, meta)
-    if names is not None and trial.joints is not None:
-        trial.meta["joint_names"] = list(names)
-    while True:
-        try:
-            save(path, trial, overwrite=False)
-            break
-        except NameTaken:
-            # Another recorder in this folder was faster: the next name that is free.
-            path = trial_path(out, labels)
-            trial.meta["trial"] = path.stem
-    without = sum(frame.joints is None for frame in frames)
-    if without and (trial.joints is not None or opened.playback is None):
-        LOG.warning("%s: %d of %d frames have no joint angles", path, without, len(frames))
-    event = {
-        "event": "saved",
-        "file": str(path),
-        "labels": labels,
-        "frames": len(frames),
-        "seconds": round(frames[-1].t - frames[0].t, 3),
-        "joints": trial.joints is not None,
-        **({"frames_without_joints": without} if trial.joints is not None and without else {}),
-        "missing_taxels": trial.valid is not None,
-        "complete": complete,
-    }
-    lines.write([event])
+@dataclass
+class Recorder:
+    """Saves trials, with what they have in common.
+
+    Attributes:
+        out: the folder, or the file of a single trial.
+        labels: {task: label} of every trial.
+        meta: what else their metadata say.
+        names: of the joints, where they are known.
+        lines: where to say what was saved.
+        posed: joint angles are expected; frames without them deserve a warning.
+        saved: how many trials so far.
+    """
+
+    out: str
+    labels: dict[str, str]
+    meta: dict[str, Any]
+    names: Sequence[str] | None
+    lines: Lines
+    posed: bool
+    saved: int = 0
+
+    def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
+        """Save the frames of a trial, if there is one."""
+        if frames is None:
+            return
+        without = sum(frame.joints is None for frame in frames)
+        meta = {**self.meta, "labels": self.labels, "complete": complete}
+        if self.names is not None and without < len(frames):
+            meta["joint_names"] = list(self.names)
+        trial = recording(frames, meta)
+        while True:
+            path = trial_path(self.out, self.labels)
+            meta["trial"] = path.stem
+            try:
+                save(path, trial, overwrite=False)
+                break
+            except NameTaken:
+                # Another recorder in this folder was faster: the next name that is free.
+                continue
+        self.saved += 1
+        if without and self.posed:
+            LOG.warning("%s: %d of %d frames have no joint angles", path, without, len(frames))
+        self.lines.write(
+            [
+                {
+                    "event": "saved",
+                    "file": str(path),
+                    "labels": self.labels,
+                    "frames": len(frames),
+                    "seconds": round(frames[-1].t - frames[0].t, 3),
+                    "joints": trial.joints is not None,
+                    **({"frames_without_joints": without} if 0 < without < len(frames) else {}),
+                    "missing_taxels": trial.valid is not None,
+                    "complete": complete,
+                }
+            ]
+        )

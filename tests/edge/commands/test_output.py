@@ -71,6 +71,11 @@ def test_a_map_of_chips_comes_last(terminal, capsys):
             "   1.400 s  object     box              ██████····  60%  (tie; it was foam)",
         ),
         ({"event": "no_contact"}, "no contact"),
+        (
+            {"event": "saved", "file": "a/box-001.npz", "labels": {"object": "box"}, "frames": 150,
+             "seconds": 1.5, "complete": False},
+            "a/box-001.npz: 1.5 s, 150 frames, object=box; cut short, as reading ended first",
+        ),
     ],
 )  # fmt: skip
 def test_each_event_has_its_words(line, text):
