@@ -38,7 +38,8 @@ QUICK = 3
 """The first of them."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
 QUICK_SHRINKAGES = (0.3, 0.03)
-DISCRIMINANT_NEIGHBOURS = (1, 3, 5)
+FEW_NEIGHBOURS = (1, 3, 5)
+PAPER_SCALINGS = ("none", "I", "IV", "V")
 FEWEST_GROUPS = 3
 """Objects a class needs before whole objects can be left out."""
 
@@ -76,9 +77,10 @@ def candidates(
 ) -> list[Candidate]:
     """Every candidate; what is given is fixed.
 
-    The discriminants of features of many units need Method IV; principal components of the
-    paper's three are tried in each of its scalings that has neighbours of its own (Methods I and
-    II, and III and no scaling, differ by what centring removes).
+    Features of many units need Method IV. Principal components of the paper's three, where they
+    alone are asked for, are tried in each of its scalings that has neighbours of its own (Methods
+    I and II, and III and no scaling, differ by what centring removes); beside other candidates
+    they have no more settings than those: the best of many would win by chance.
     """
     if features is not None:
         every: Sequence[tuple[str, ...]] = (tuple(features),)
@@ -91,8 +93,9 @@ def candidates(
             paper = sets == ("paper",)
             if features is None and projection is None and paper != (kind == "pca"):
                 continue
-            scalings = ("none", "I", "IV", "V") if paper and kind == "pca" else ("IV",)
-            neighbours = NEIGHBOURS if kind == "pca" else DISCRIMINANT_NEIGHBOURS
+            searched = features is not None and kind == "pca"
+            scalings = PAPER_SCALINGS if paper and searched else ("IV",)
+            neighbours = NEIGHBOURS if searched else FEW_NEIGHBOURS
             grid = SearchGrid(
                 projection=kind,
                 features=names,
