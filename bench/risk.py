@@ -27,7 +27,7 @@ from train.dataset import load_trials
 from train.pipeline import Choice
 from train.simulate import scene as scenes
 from train.simulate.run import total_trials, write
-from train.stopping import RISK, SequentialClassifier, answers, stops
+from train.stopping import RISK, SequentialClassifier, answers, confidences, stops
 
 SCENE = Path(__file__).parents[1] / "train" / "scenes" / "cody18.toml"
 NAMES = SETS["contact"].features
@@ -52,10 +52,9 @@ def realised(
         X[:, rows], {"task": labels[rows]}
     )
     with threadpool_limits(1):
-        named, odds, distances = answers(model.decision_points_, "task", X[:, rest])
+        named, margins, distances = answers(model.decision_points_, "task", X[:, rest])
     stopping, seconds = model.stopping_["task"], np.array(POINTS_S)
-    slopes, intercepts = (np.array(one)[:, None] for one in (stopping.slopes, stopping.intercepts))
-    confidence = 1.0 / (1.0 + np.exp(-(slopes * odds + intercepts)))
+    confidence = confidences(stopping.slopes, stopping.intercepts, margins)
     far = [[model.novelty_.rate(i, d) for d in row] for i, row in enumerate(distances.tolist())]
     wrong = (named != labels[rest]) | (np.array(far) <= NOVELTY_RATE)
     found = []
@@ -64,7 +63,7 @@ def realised(
         if rule is None:
             found.append((np.nan, np.nan))
             continue
-        at = stops(confidence, named, rule)
+        at = stops(confidence, rule)
         found.append((float(wrong[at, np.arange(len(rest))].mean()), float(seconds[at].mean())))
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from edge.errors import InputError
@@ -37,8 +37,6 @@ class _Waiting:
     decision_point: int
     """The next of the model's decision points."""
     tasks: list[str]
-    runs: dict[str, tuple[str, int]] = field(default_factory=dict)
-    """By task, the label of the last decision points in a row that were sure, and their number."""
 
 
 class Classifier:
@@ -302,7 +300,7 @@ class Classifier:
         confidence = info.stopping[none.task].confidence(
             at, decision.label_distances.tolist(), info.tasks[none.task].labels.index(label)
         )
-        sure = rule is not None and self._sure(waiting, none.task, label, confidence, rule)
+        sure = rule is not None and confidence >= rule.confidence
         last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
         if not sure and at < last and "short" not in flags:
             return None
@@ -322,19 +320,6 @@ class Classifier:
             stopped_by=None if rule is None else "confidence" if sure else "window",
             decision=decision,
         )
-
-    @staticmethod
-    def _sure(
-        waiting: _Waiting, task: str, label: str, confidence: float, rule: StoppingRule
-    ) -> bool:
-        """Whether so many decision points in a row as the rule asks for were sure of the label."""
-        before, run = waiting.runs.get(task, ("", 0))
-        if confidence < rule.confidence:
-            run = 0
-        else:
-            run = run + 1 if label == before else 1
-        waiting.runs[task] = label, run
-        return run >= rule.agree
 
 
 def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:

@@ -21,7 +21,7 @@ from train.projection import KINDS, SCALINGS
 from train.stopping import FEWEST
 
 FRONTS = Path("build/tradeoff/front.json")
-DECISION_POINTS = "0.2:1.2:0.2"
+DECISION_POINTS = "0.2:1.2:0.1"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -72,8 +72,8 @@ def parser() -> argparse.ArgumentParser:
         "--decision-points",
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
-        f"seconds from onset or at a list a,b,c; `none` for none (default: {DECISION_POINTS} with "
-        f"{FEWEST} to {MOST_TRIALS} trials and a model of at most 1 MB, else none)",
+        f"seconds from onset or at a list a,b,c; `none` for none (default: {DECISION_POINTS}, or "
+        f"every 0.2 s, with {FEWEST} to {MOST_TRIALS} trials and a model of at most 4 MB)",
     )
     top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
     top.add_argument("--onset", type=int, help="counts above which a contact begins")

@@ -23,7 +23,7 @@ from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.onnx_file import check
 from export.build import OPSET, Builder, project, widened
 from train.distance import resolution
-from train.pipeline import NEAREST_OF_LABEL, ContactClassifier, Space
+from train.pipeline import ContactClassifier, Space, nearest_of_label
 from train.projection import HALF_BITS
 from train.stopping import SequentialClassifier
 
@@ -259,18 +259,18 @@ def _label_distances(
 ) -> None:
     """(n, labels) of squared distances (n, rows): `train.pipeline.label_distances`."""
     sizes = np.bincount(labels, minlength=classes)
+    counts = nearest_of_label(sizes)
     # A label's rows, filled up with one more column that is infinitely far away.
-    rows = np.full((classes, max(int(sizes.max()), NEAREST_OF_LABEL)), len(labels))
+    rows = np.full((classes, int(sizes.max())), len(labels))
     for label, size in enumerate(sizes):
         rows[label, :size] = np.flatnonzero(labels == label)
     ints = build.ints
     wider = build.node("Pad", [squares, ints(0, 0, 0, 1), build.constant(np.inf)])
     own = build.node("Gather", [wider, build.constant(rows, np.int64)], axis=1)
     nearest, _ = build.nodes(
-        "TopK", [own, ints(NEAREST_OF_LABEL)], ["", ""], axis=2, largest=0, sorted=1
+        "TopK", [own, ints(int(counts.max()))], ["", ""], axis=2, largest=0, sorted=1
     )
-    counts = np.minimum(sizes, NEAREST_OF_LABEL)
-    there = np.arange(NEAREST_OF_LABEL) < counts[:, None]
+    there = np.arange(counts.max()) < counts[:, None]
     kept = build.node("Where", [build.constant(there, bool), nearest, build.constant(0.0)])
     total = build.node("ReduceSum", [kept, ints(2)], keepdims=0)
     build.node("Div", [total, build.constant(counts.astype(np.float64))], output)

@@ -79,17 +79,26 @@ class NearestNeighbours(ClassifierMixin, BaseEstimator):
 
 
 NEAREST_OF_LABEL = 3
-"""Training trials of a label whose mean squared distance stands for the label."""
+LABEL_SHARE = 20
+
+
+def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How many of so many training trials stand for their label: a twentieth, or 3 where there are.
+
+    The distance of a part of the trials stays what it is when there are more of them.
+    """
+    return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
 
 def label_distances(
     squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int
 ) -> NDArray[np.float64]:
-    """(m, classes) mean of the smallest (up to `NEAREST_OF_LABEL`) squares (m, n) of each label."""
+    """(m, classes) mean of the smallest of each label's squares (m, n): `nearest_of_label`."""
+    counts = nearest_of_label(np.bincount(labels, minlength=classes))
     out = np.empty((len(squares), classes))
-    for label in range(classes):
-        own = np.sort(squares[:, labels == label], axis=1)[:, :NEAREST_OF_LABEL]
-        out[:, label] = own.sum(axis=1) / max(own.shape[1], 1)
+    for label, count in enumerate(counts):
+        own = np.sort(squares[:, labels == label], axis=1)[:, :count]
+        out[:, label] = own.sum(axis=1) / count
     return out
 
 

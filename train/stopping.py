@@ -5,21 +5,23 @@ its own. Three things are made here from trials that the models asked about them
 trials are parted into folds, and each fold is decided by a model that was fitted, and whose
 features, projection and neighbours were chosen, without it.
 
-**Confidence.** The evidence for the label that the neighbours' vote names
-(`edge.model.stopping.log_odds`) is turned into the probability that it is right by logistic
+**Confidence.** How much nearer the training trials of the label that is named lie than those of any
+other (`edge.model.stopping.margin`) is turned into the probability that it is right by logistic
 regression at each decision point (Platt, Probabilistic outputs for support vector machines, 1999).
+A label's distance is that of its nearest twentieth (`train.pipeline.label_distances`), so that it
+is the same for the folds' models, which have fewer trials, as for the exported one.
 
-**Rules.** A rule decides at the first decision point whose confidence reaches a threshold (once, or
-at two points in a row with the same label), or always at one window. Its error rate is bounded by
-learn-then-test (Angelopoulos, Bates, Candès, Jordan and Lei, 2021): the hypothesis that a rule errs
-more often than `error` is rejected at level `RISK` by the exact binomial test on the calibration
-trials. The first hypothesis is that of the full window. Where it is rejected its level passes in
-equal parts to the three families, and each family is walked from the most careful rule to the
-boldest until a test fails (fixed-sequence testing within a graph: Bretz, Maurer, Brannath and
-Posch, 2009): with probability 1 - `RISK` no rule that passes errs more often than asked. As each
-family's tests are monotone in `error`, a rule's certified error is the largest upper confidence
-limit met on the way to it, and one table of rules serves every `error`. The confidences that a
-fold's rules are tested with come from a logistic regression on the other folds.
+**Rules.** A rule decides at the first decision point whose confidence reaches a threshold, or
+always at one window. Its error rate is bounded by learn-then-test (Angelopoulos, Bates, Candès,
+Jordan and Lei, 2021): the hypothesis that a rule errs more often than `error` is rejected at level
+`RISK` by the exact binomial test on the calibration trials. The first hypothesis is that of the
+full window. Where it is rejected its level passes in equal parts to the two families, and each
+family is walked from the most careful rule to the boldest until a test fails (fixed-sequence
+testing within a graph: Bretz, Maurer, Brannath and Posch, 2009): with probability 1 - `RISK` no
+rule that passes errs more often than asked. As each family's tests are monotone in `error`, a
+rule's certified error is the largest upper confidence limit met on the way to it, and one table of
+rules serves every `error`. The confidences that a fold's rules are tested with come from a logistic
+regression on the other folds.
 
 Errors are wrong labels, and `unknown` for what was trained, at `NOVELTY_RATE`.
 
@@ -42,7 +44,13 @@ from scipy.stats import beta
 from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
-from edge.model.stopping import NOVELTY_RATE, Novelty, Stopping, StoppingRule, log_odds
+from edge.model.stopping import (
+    NOVELTY_RATE,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    margin,
+)
 from edge.touch.features import FEATURES
 from train.pipeline import Choice, ContactClassifier, label_distances, vote
 
@@ -54,12 +62,14 @@ FEWEST = 20
 """Trials below which there is nothing to calibrate with."""
 RISK = 0.1
 """Probability with which a certificate may be wrong."""
-THRESHOLDS = np.round(np.arange(0.99, 0.25, -0.01), 2)
-"""Confidences that rules stop at."""
+THRESHOLDS = np.round(expit(np.arange(8.0, -1.05, -0.1)), 4)
+"""Confidences that rules stop at, evenly in the logarithm of their odds."""
 NEVER = 2.0
 """A confidence that is not reached."""
 PULL = 0.5
-"""Weight of the prior that pulls a logistic regression towards slope 1 and intercept 0."""
+"""Weight of the prior that pulls a logistic regression towards 1 a standard deviation."""
+LEAST_SLOPE = 1e-3
+"""A standard deviation: a larger margin never speaks against a label."""
 NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
 
 
@@ -68,23 +78,21 @@ class HeldOut:
     """One task's answers to trials that the answering models had not seen.
 
     Attributes:
-        labels: (decision points, n) named.
-        right: (decision points, n) whether they are right.
-        odds: (decision points, n) evidence for them.
+        right: (decision points, n) whether the labels named are right.
+        margins: (decision points, n) evidence for them.
         distances: (decision points, n) to the nearest training trial.
     """
 
-    labels: NDArray[np.str_]
     right: NDArray[np.bool_]
-    odds: NDArray[np.float64]
+    margins: NDArray[np.float64]
     distances: NDArray[np.float64]
 
 
 def answers(
     models: Sequence[ContactClassifier], task: str, X: NDArray[np.float64]
 ) -> tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]:
-    """Labels, log-odds and nearest distances (decision points, m) of vectors (points, m, p)."""
-    labels, odds, distances = [], [], []
+    """Labels, margins and nearest distances (decision points, m) of vectors (points, m, p)."""
+    labels, margins, distances = [], [], []
     for model, x in zip(models, X, strict=True):
         squares = model.squares(task, x)
         rows = np.argsort(squares, axis=1, kind="stable")[:, : model.choices[task].k]
@@ -92,14 +100,15 @@ def answers(
         named, _ = vote(model.labels_[task][rows], classes)
         apart = label_distances(squares, model.labels_[task], classes)
         labels.append(model.classes_[task][named])
-        odds.append([log_odds(d, int(c)) for d, c in zip(apart.tolist(), named, strict=True)])
+        margins.append([margin(d, int(c)) for d, c in zip(apart.tolist(), named, strict=True)])
         distances.append(np.sqrt(squares.min(axis=1)))
-    return np.array(labels), np.array(odds), np.array(distances)
+    return np.array(labels), np.array(margins), np.array(distances)
 
 
-def logistic(odds: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[float, float]:
-    """Slope (at least 0) and intercept of P(right) as a logistic function of the log-odds."""
-    columns = np.stack([odds, np.ones_like(odds)], axis=1)
+def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[float, float]:
+    """Slope (above 0) and intercept of P(right) as a logistic function of the margins (n,)."""
+    middle, spread = float(margins.mean()), float(margins.std()) or 1.0
+    columns = np.stack([(margins - middle) / spread, np.ones_like(margins)], axis=1)
     prior = np.array([1.0, 0.0])
     found = prior.copy()
     for _ in range(50):
@@ -111,7 +120,15 @@ def logistic(odds: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[float
         found -= step
         if np.abs(step).max() < 1e-10:
             break
-    return max(float(found[0]), 0.0), float(found[1])
+    slope = max(float(found[0]), LEAST_SLOPE) / spread
+    return slope, float(found[1]) - slope * middle
+
+
+def confidences(
+    slopes: Sequence[float], intercepts: Sequence[float], margins: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(points, m) probabilities that what has these margins (points, m) is right."""
+    return np.asarray(expit(np.array(slopes)[:, None] * margins + np.array(intercepts)[:, None]))
 
 
 def upper_limit(wrong: int, trials: int, level: float) -> float:
@@ -119,36 +136,23 @@ def upper_limit(wrong: int, trials: int, level: float) -> float:
     return 1.0 if wrong >= trials else float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
 
 
-def stops(
-    confidence: NDArray[np.float64],
-    labels: NDArray[np.str_],
-    rule: StoppingRule,
-) -> NDArray[np.int64]:
-    """(n,) the decision point at which a rule decides, for confidences and labels (points, n)."""
+def stops(confidence: NDArray[np.float64], rule: StoppingRule) -> NDArray[np.int64]:
+    """(n,) the decision point at which a rule decides, for confidences (points, n)."""
     sure = confidence >= rule.confidence
-    run = sure.copy()
-    for back in range(1, rule.agree):
-        same = np.zeros_like(sure)
-        same[back:] = (labels[back:] == labels[:-back]) & sure[:-back]
-        run &= same
-    run[rule.last] = True
-    return np.asarray(run.argmax(axis=0))
+    sure[rule.last] = True
+    return np.asarray(sure.argmax(axis=0))
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
-    """The full window's rule, and three families, each from the most careful to the boldest."""
-    full = StoppingRule(1.0, 0.0, NEVER, 1, points - 1)
-    families = [
-        [StoppingRule(1.0, 0.0, float(c), agree, points - 1) for c in THRESHOLDS]
-        for agree in (1, 2)
-    ]
-    families.append([StoppingRule(1.0, 0.0, NEVER, 1, last) for last in range(points - 2, -1, -1)])
-    return full, families
+    """The full window's rule, and two families, each from the most careful to the boldest."""
+    full = StoppingRule(1.0, 0.0, NEVER, points - 1)
+    sure = [StoppingRule(1.0, 0.0, float(c), points - 1) for c in THRESHOLDS]
+    fixed = [StoppingRule(1.0, 0.0, NEVER, last) for last in range(points - 2, -1, -1)]
+    return full, [sure, fixed]
 
 
 def certify(
     confidence: NDArray[np.float64],
-    held_out: HeldOut,
     wrong: NDArray[np.bool_],
     seconds: NDArray[np.float64],
     risk: float = RISK,
@@ -157,7 +161,6 @@ def certify(
 
     Args:
         confidence: (points, n) that the labels are right.
-        held_out: the labels.
         wrong: (points, n) whether deciding there is an error.
         seconds: (points,) windows.
         risk: see the module.
@@ -166,10 +169,10 @@ def certify(
     every = np.arange(n)
 
     def tested(rule: StoppingRule, level: float, least: float) -> StoppingRule:
-        at = stops(confidence, held_out.labels, rule)
+        at = stops(confidence, rule)
         limit = upper_limit(int(wrong[at, every].sum()), n, level)
         mean = float(seconds[at].mean())
-        return StoppingRule(max(limit, least), mean, rule.confidence, rule.agree, rule.last)
+        return StoppingRule(max(limit, least), mean, rule.confidence, rule.last)
 
     full, families = candidates(len(seconds))
     passed = [tested(full, risk, 0.0)]
@@ -275,11 +278,11 @@ class SequentialClassifier:
         self.held_out_ = {}
         for task in self.choices:
             named = np.empty((len(X), n), dtype=y[task].dtype)
-            odds, distances = np.empty(named.shape), np.empty(named.shape)
+            margins, distances = np.empty(named.shape), np.empty(named.shape)
             for k, part in enumerate(parts):
                 own = folds == k
-                named[:, own], odds[:, own], distances[:, own] = part[task]
-            self.held_out_[task] = HeldOut(named, named == y[task], odds, distances)
+                named[:, own], margins[:, own], distances[:, own] = part[task]
+            self.held_out_[task] = HeldOut(named == y[task], margins, distances)
         most = finest({task: y[task] for task in self.choices})
         self.novelty_ = novelty(most, self.held_out_[most].distances)
         far = self.held_out_[most].distances
@@ -316,20 +319,19 @@ class SequentialClassifier:
     def _calibrated(
         self, held_out: HeldOut, unknown: NDArray[np.bool_], folds: NDArray[np.int64]
     ) -> Stopping:
-        pairs = list(zip(held_out.odds, held_out.right, strict=True))
         confidence = calibrated(held_out, folds)
         wrong = ~held_out.right | unknown
-        rules = certify(confidence, held_out, wrong, np.array(self.decision_points_s))
-        slopes, intercepts = zip(*(logistic(odds, right) for odds, right in pairs), strict=True)
+        rules = certify(confidence, wrong, np.array(self.decision_points_s))
+        slopes, intercepts = zip(*map(logistic, held_out.margins, held_out.right), strict=True)
         return Stopping(slopes, intercepts, tuple(rules), len(folds), int(wrong[-1].sum()), RISK)
 
 
 def calibrated(held_out: HeldOut, folds: NDArray[np.int64]) -> NDArray[np.float64]:
     """(points, n) confidences, each fold's by a logistic regression on the other folds."""
-    out = np.empty(held_out.odds.shape)
+    out = np.empty(held_out.right.shape)
     for fold in range(int(folds.max()) + 1):
         own = folds == fold
-        for i, (odds, right) in enumerate(zip(held_out.odds, held_out.right, strict=True)):
-            slope, intercept = logistic(odds[~own], right[~own])
-            out[i, own] = expit(slope * odds[own] + intercept)
+        others = map(logistic, held_out.margins[:, ~own], held_out.right[:, ~own])
+        slopes, intercepts = zip(*others, strict=True)
+        out[:, own] = confidences(slopes, intercepts, held_out.margins[:, own])
     return out

@@ -14,7 +14,6 @@ UNKNOWN = "unknown"
 NOVELTY_RATE = 0.02
 """How often a contact with a trained object may be called unknown. At this rate such answers are
 counted among the certified errors."""
-LARGEST_LOG_ODDS = 25.0
 
 
 def check_rate(value: float, what: str) -> float:
@@ -28,32 +27,22 @@ def check_rate(value: float, what: str) -> float:
     return value
 
 
-def log_odds(distances: Sequence[float], label: int) -> float:
-    """Evidence for a label against all others, by how near their training trials lie.
-
-    With d the mean squared distance to a label's nearest trials, each label counts 1 / d; the
-    odds are those of one label's count against the sum of the others'.
+def margin(distances: Sequence[float], label: int) -> float:
+    """Evidence for a label: how much farther the training trials of the nearest other one lie.
 
     Args:
         distances: (labels,) mean squared distances.
         label: index of the label.
 
     Returns:
-        At most `LARGEST_LOG_ODDS` either way.
+        The difference of the roots; minus infinity where the label's own trials are infinitely
+        far away, and 0 where there is no other label.
     """
-    own = distances[label]
-    against = 0.0
-    for other, distance in enumerate(distances):
-        if other != label and distance < math.inf:
-            if distance > 0.0:
-                against += own / distance
-            else:  # both at distance 0 are even; otherwise the other label has all the evidence
-                against += 1.0 if own == 0.0 else math.inf
-    if against == 0.0:
-        return LARGEST_LOG_ODDS
-    if against == math.inf:
-        return -LARGEST_LOG_ODDS
-    return min(max(-math.log(against), -LARGEST_LOG_ODDS), LARGEST_LOG_ODDS)
+    own = math.sqrt(distances[label])
+    others = [d for other, d in enumerate(distances) if other != label]
+    if not others:
+        return 0.0
+    return math.sqrt(min(others)) - own if own < math.inf else -math.inf
 
 
 @dataclass(frozen=True)
@@ -65,14 +54,12 @@ class StoppingRule:
         mean_s: mean seconds from onset to decision, on the calibration trials.
         confidence: decide from this confidence on; above 1 none is enough, which makes the rule a
             fixed window.
-        agree: decision points in a row that must name the same label and be sure enough.
         last: decision point at which to decide in any case.
     """
 
     error: float
     mean_s: float
     confidence: float
-    agree: int
     last: int
 
     @property
@@ -87,7 +74,7 @@ class Stopping:
 
     Attributes:
         slopes, intercepts: of each decision point: the probability that the label is right is the
-            logistic function of slope * log-odds + intercept.
+            logistic function of slope * `margin` + intercept.
         rules: rising in error, falling in mean time.
         trials: that the rules were certified with.
         wrong: how many of them were decided wrongly at the full window.
@@ -108,8 +95,9 @@ class Stopping:
 
     def confidence(self, decision_point: int, distances: Sequence[float], label: int) -> float:
         """Probability that the label is right, 0 to 1."""
-        x = self.slopes[decision_point] * log_odds(distances, label)
-        return 1.0 / (1.0 + math.exp(-(x + self.intercepts[decision_point])))
+        slope, intercept = self.slopes[decision_point], self.intercepts[decision_point]
+        x = slope * margin(distances, label) + intercept
+        return 0.5 + 0.5 * math.tanh(0.5 * x)
 
     def rule(self, error: float) -> StoppingRule | None:
         """The fastest rule that is certified for an error rate; None where there is none."""
@@ -158,7 +146,6 @@ class Stopping:
                     error=float(rule["error"]),
                     mean_s=float(rule["mean_s"]),
                     confidence=float(rule["confidence"]),
-                    agree=int(rule["agree"]),
                     last=int(rule["last"]),
                 )
                 for rule in values["rules"]
@@ -167,12 +154,12 @@ class Stopping:
             wrong=int(values["wrong"]),
             risk=float(values["risk"]),
         )
-        numbers = [*found.slopes, *found.intercepts]
         if not (
             len(found.slopes) == len(found.intercepts) == points
-            and all(map(math.isfinite, numbers))
+            and all(map(math.isfinite, found.intercepts))
+            and all(0.0 < slope < math.inf for slope in found.slopes)
             and found.rules
-            and all(0 <= rule.last < points and rule.agree >= 1 for rule in found.rules)
+            and all(0 <= rule.last < points for rule in found.rules)
             and all(0.0 < rule.error <= 1.0 for rule in found.rules)
             and 0 <= found.wrong <= found.trials > 0
             and 0.0 < found.risk < 1.0

@@ -1,14 +1,22 @@
 """The graph's distances to each label, and the board's stopping, against the estimators."""
 
+from dataclasses import replace
+
+import numpy as np
 import onnxruntime
 import pytest
 
 from edge.classifier import Classifier, stopping_rules
 from edge.errors import InputError
+from edge.model.info import Task
 from edge.model.model import Model
 from edge.recording import save
+from edge.touch.features import FEATURES
 from export.__main__ import main as export
+from export.graph import to_onnx
 from train.dataset import load_trials
+from train.pipeline import Choice
+from train.stopping import SequentialClassifier
 
 POINTS = "0.3,0.6,1.2"
 PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")
@@ -26,18 +34,25 @@ def early(make_touch, tmp_path_factory):
     return Model(folder / "out" / "model.onnx"), folder
 
 
-def test_the_graph_measures_each_label_as_the_estimator_does(early):
-    model, folder = early
-    data = load_trials([folder / "data"])
-    for point, window in enumerate(model.decision_points_s):
-        X = 1.01 * data.features(window)
-        given = model.run(X, point)
-        for task, entry in model.info.tasks.items():
-            distances = given[f"{task}_label_distances"]
-            assert distances.shape == (len(X), len(entry.labels))
-            # The nearest neighbour is no farther than the mean of its label's nearest.
-            nearest = given[f"{task}_distances"][:, 0] ** 2
-            assert (distances.min(axis=1) >= nearest * (1 - 1e-12)).all()
+def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
+    """Labels of 100, 30 and 2 trials: a twentieth, the nearest three, and both there are."""
+    rng = np.random.default_rng(0)
+    labels = rng.permutation(np.repeat(["common", "known", "rare"], [100, 30, 2]))
+    width = early[0].info.samples * len(FEATURES)
+    X, queries = rng.normal(size=(3, len(labels), width)), rng.normal(size=(9, width))
+    info = replace(early[0].info, tasks={"t": Task(("common", "known", "rare"), 3, 4, "none", 0.5)})
+    sequential = SequentialClassifier({"t": Choice("none", 4, 3)}, info.decision_points_s)
+    sequential.fit(X, {"t": labels})
+    info = replace(info, stopping=sequential.stopping_, novelty=sequential.novelty_, rows=132)
+    (tmp_path / "model.onnx").write_bytes(to_onnx(sequential, info))
+    model = Model(tmp_path / "model.onnx")
+    for point, fitted in enumerate(sequential.decision_points_):
+        for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
+            own = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
+            assert own.shape[1] == size
+            expected = np.sort(own, axis=1)[:, :count].mean(axis=1)
+            given = model.run(queries, point)["t_label_distances"][:, label]
+            assert given == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_board_stops_where_the_rule_does(early, make_touch):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import mpmath
@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from edge.model.stopping import log_odds
+from edge.model.stopping import margin
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
@@ -100,15 +100,16 @@ def moment_usual() -> str:
 
 
 def evidence_error(power: int, labels: int, seed: int) -> float:
-    """How far `log_odds` is from the logarithm of exact odds, distances of a size 10^power."""
+    """How far `margin` is from the exact one, in parts of the larger root; sizes of 10^power."""
     stream = np.random.default_rng(seed)
     distances = (10.0**power * stream.uniform(0.5, 2.0, labels)).tolist()
-    exact = [Fraction(d) for d in distances]
-    worst = 0.0
-    for label, own in enumerate(exact):
-        against = sum((own / other for i, other in enumerate(exact) if i != label), Fraction(0))
-        truth = -math.log(against.numerator / against.denominator)
-        worst = max(worst, abs(log_odds(distances, label) - truth))
+    with localcontext(prec=60):
+        roots = [Decimal(d).sqrt() for d in distances]
+        worst = 0.0
+        for label, own in enumerate(roots):
+            other = min(root for i, root in enumerate(roots) if i != label)
+            away = abs(Decimal(margin(distances, label)) - (other - own))
+            worst = max(worst, float(away / max(own, other)))
     return worst
 
 
@@ -142,10 +143,10 @@ CASES = [
     ),
     Case(
         "early stopping",
-        "log-odds of a label from distances of any size",
-        "fractions",
-        "of the log-odds",
-        2.0**-44,
+        "a label's margin from distances of any size",
+        "60 digits",
+        "parts of the larger distance",
+        2.0**-51,
         evidence_error,
         [
             {"power": power, "labels": labels, "seed": 0}

@@ -231,10 +231,10 @@ GUARDS = (
         "width",
     ),
     Guard(
-        "evidence is bounded",
-        "edge/model/stopping.py:log_odds",
-        "if against == math.inf: ...",
-        "if False: ...",
+        "what is infinitely far is no evidence for a label",
+        "edge/model/stopping.py:margin",
+        "math.sqrt(min(others)) - own if own < math.inf else -math.inf",
+        "math.sqrt(min(others)) - own",
     ),
     Guard(
         "a walk keeps the largest limit met",

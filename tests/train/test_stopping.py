@@ -10,10 +10,10 @@ from train.pipeline import Choice
 from train.stopping import (
     NEVER,
     RISK,
-    HeldOut,
     SequentialClassifier,
     answers,
     certify,
+    confidences,
     folds_of,
     logistic,
     stops,
@@ -30,37 +30,44 @@ def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
 
 class TestStops:
     CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
-    LABELS = np.array([["a", "a", "a"], ["b", "a", "a"], ["b", "a", "a"]])
 
     def stop(self, **rule):
-        given = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "agree": 1, "last": 2}
-        return stops(self.CONFIDENCE, self.LABELS, StoppingRule(**{**given, **rule})).tolist()
+        given = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "last": 2}
+        return stops(self.CONFIDENCE, StoppingRule(**{**given, **rule})).tolist()
 
     def test_at_the_first_decision_point_that_is_sure(self):
         assert self.stop() == [0, 1, 0]
-
-    def test_two_in_a_row_must_name_the_same_label(self):
-        assert self.stop(agree=2) == [2, 2, 2]
-        assert self.stop(agree=2, confidence=0.75) == [2, 2, 2]
-        assert self.stop(agree=2, confidence=0.15) == [2, 1, 2]
 
     def test_a_fixed_window_waits_for_it_and_no_longer(self):
         assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
 
 
-def test_a_logistic_regression_finds_the_curve_that_drew_the_outcomes():
-    rng = np.random.default_rng(0)
-    odds = rng.normal(scale=2.0, size=20_000)
-    right = rng.random(len(odds)) < 1 / (1 + np.exp(-(0.5 * odds + 1.0)))
-    slope, intercept = logistic(odds, right)
-    assert slope == pytest.approx(0.5, abs=0.03)
-    assert intercept == pytest.approx(1.0, abs=0.05)
+class TestLogistic:
+    def test_finds_the_curve_that_drew_the_outcomes(self):
+        rng = np.random.default_rng(0)
+        margins = rng.normal(scale=2.0, size=20_000)
+        right = rng.random(len(margins)) < 1 / (1 + np.exp(-(0.5 * margins + 1.0)))
+        assert logistic(margins, right) == pytest.approx((0.5, 1.0), abs=0.05)
 
+    def test_what_is_always_right_stays_finite(self):
+        slope, intercept = logistic(np.full(50, 25.0), np.ones(50, dtype=bool))
+        assert 0.0 <= slope < 100.0
+        assert abs(intercept) < 100.0
 
-def test_a_logistic_regression_of_what_is_always_right_stays_finite():
-    slope, intercept = logistic(np.full(50, 25.0), np.ones(50, dtype=bool))
-    assert 0.0 <= slope < 100.0
-    assert abs(intercept) < 100.0
+    def test_a_larger_margin_never_speaks_against_a_label(self):
+        margins = np.arange(100.0)
+        slope, _ = logistic(margins, margins < 50)
+        assert 0.0 < slope < 1e-3
+
+    def test_the_unit_of_the_distances_does_not_matter(self):
+        rng = np.random.default_rng(2)
+        margins, right = rng.normal(size=60), rng.random(60) < 0.8
+        one, other = (
+            confidences([a], [b], size * margins[None])
+            for size in (1.0, 1e-6)
+            for a, b in [logistic(size * margins, right)]
+        )
+        assert one == pytest.approx(other)
 
 
 SECONDS = np.array([0.4, 0.8, 1.2])
@@ -71,13 +78,12 @@ def drawn(n, rng):
     final = rng.beta(8.0, 1.0, n)
     confidence = np.stack([0.4 + 0.2 * final, 0.2 + 0.7 * final, final])
     right = rng.random(n) < confidence
-    labels = np.where(right, "a", "b")
-    return confidence, HeldOut(labels, right, confidence, confidence)
+    return confidence, right
 
 
 def test_rules_rise_in_error_and_fall_in_time():
-    confidence, held_out = drawn(400, np.random.default_rng(0))
-    rules = certify(confidence, held_out, ~held_out.right, SECONDS)
+    confidence, right = drawn(400, np.random.default_rng(0))
+    rules = certify(confidence, ~right, SECONDS)
     errors, times = [r.error for r in rules], [r.mean_s for r in rules]
     assert errors == sorted(errors)
     assert times == sorted(times, reverse=True)
@@ -85,9 +91,9 @@ def test_rules_rise_in_error_and_fall_in_time():
 
 
 def test_the_first_rule_is_the_full_window_at_the_whole_level():
-    confidence, held_out = drawn(140, np.random.default_rng(1))
-    rules = certify(confidence, held_out, ~held_out.right, SECONDS)
-    wrong = int((~held_out.right[-1]).sum())
+    confidence, right = drawn(140, np.random.default_rng(1))
+    rules = certify(confidence, ~right, SECONDS)
+    wrong = int((~right[-1]).sum())
     assert rules[0].error == pytest.approx(upper_limit(wrong, 140, RISK))
 
 
@@ -98,15 +104,11 @@ def test_certificates_fail_no_oftener_than_they_say(error):
     world_confidence, world = drawn(20_000, rng)
     failed = 0
     for _ in range(300):
-        confidence, held_out = drawn(100, rng)
-        able = [
-            rule
-            for rule in certify(confidence, held_out, ~held_out.right, SECONDS)
-            if rule.error <= error
-        ]
+        confidence, right = drawn(100, rng)
+        able = [rule for rule in certify(confidence, ~right, SECONDS) if rule.error <= error]
         if able:
-            at = stops(world_confidence, world.labels, able[-1])
-            failed += 1.0 - world.right[at, np.arange(20_000)].mean() > error
+            at = stops(world_confidence, able[-1])
+            failed += 1.0 - world[at, np.arange(20_000)].mean() > error
     assert failed <= binom.ppf(0.99, 300, RISK)
 
 

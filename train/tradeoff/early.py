@@ -15,7 +15,15 @@ from edge.model.stopping import NOVELTY_RATE, StoppingRule
 from train.evaluate import Labels, stratified_folds
 from train.pipeline import Choice, ContactClassifier
 from train.simulate.scene_model import Scene
-from train.stopping import NEVER, THRESHOLDS, SequentialClassifier, answers, finest, stops
+from train.stopping import (
+    NEVER,
+    THRESHOLDS,
+    SequentialClassifier,
+    answers,
+    confidences,
+    finest,
+    stops,
+)
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -79,17 +87,13 @@ class StoppingComparison:
         """(decision points,) share wrong at each fixed window."""
         return 1.0 - np.asarray(self.right.mean(axis=1))
 
-    def when_sure(self, agree: int = 1) -> list[tuple[float, float, float]]:
-        """(confidence asked for, mean seconds, share wrong) of stopping at each threshold.
-
-        Args:
-            agree: decision points in a row that must be sure of the same label.
-        """
+    def when_sure(self) -> list[tuple[float, float, float]]:
+        """(confidence asked for, mean seconds, share wrong) of stopping at each threshold."""
         seconds = np.array(self.decision_points_s)
         found = []
         for threshold in (NEVER, *THRESHOLDS.tolist()):
-            rule = StoppingRule(1.0, 0.0, threshold, agree, len(seconds) - 1)
-            at = stops(self.confidence, self.labels, rule)
+            rule = StoppingRule(1.0, 0.0, threshold, len(seconds) - 1)
+            at = stops(self.confidence, rule)
             wrong = 1.0 - float(self.right[at, np.arange(self.trials)].mean())
             found.append((threshold, float(seconds[at].mean()), wrong))
         return found
@@ -169,7 +173,7 @@ def compare_stopping(
                 rule = part.rules[task][error]
                 if rule is None:
                     continue
-                at = stops(part.confidence[task], part.named[task], rule)
+                at = stops(part.confidence[task], rule)
                 every = np.arange(len(part.test))
                 unknown = part.unknown[at, every]
                 wrong = ~right[:, part.test][at, every] | unknown
@@ -204,10 +208,9 @@ def _held_out(
     unknown = np.zeros((len(X), len(test)), dtype=bool)
     with threadpool_limits(1):
         for task in y:
-            named[task], odds, distances = answers(model.decision_points_, task, X[:, test])
+            named[task], margins, distances = answers(model.decision_points_, task, X[:, test])
             stopping = model.stopping_[task]
-            slopes, intercepts = np.array(stopping.slopes), np.array(stopping.intercepts)
-            confidence[task] = 1.0 / (1.0 + np.exp(-(slopes[:, None] * odds + intercepts[:, None])))
+            confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
             if task == model.novelty_.task:
                 rates = [
                     [model.novelty_.rate(i, d) for d in row]

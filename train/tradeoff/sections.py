@@ -123,7 +123,7 @@ def stopping(
     sure = Table(
         "sure",
         "Deciding when sure, at every threshold",
-        ("task", "mean time ms", "wrong %", "confidence asked for", "decision points in a row"),
+        ("task", "mean time ms", "wrong %", "confidence asked for"),
     )
     fixed = Table("fixed", "Fixed windows on the same trials", ("task", "window ms", "wrong %"))
     for task, found in both.items():
@@ -144,9 +144,8 @@ def stopping(
                 )
             )
         sure.rows += [
-            (task, round(1e3 * seconds), round(100 * wrong, 1), threshold, agree)
-            for agree in (1, 2)
-            for threshold, seconds, wrong in found.when_sure(agree)
+            (task, round(1e3 * seconds), round(100 * wrong, 1), threshold)
+            for threshold, seconds, wrong in found.when_sure()
             if threshold <= 1.0
         ]
         fixed.rows += [

@@ -6,46 +6,35 @@ import pytest
 
 from edge.errors import InputError
 from edge.model.stopping import (
-    LARGEST_LOG_ODDS,
     Novelty,
     Stopping,
     StoppingRule,
     check_rate,
-    log_odds,
+    margin,
 )
 
 
-class TestLogOdds:
-    def test_of_two_labels_they_are_the_ratio_of_the_distances(self):
-        assert log_odds([1.0, 4.0], 0) == pytest.approx(math.log(4.0))
-        assert log_odds([1.0, 4.0], 1) == pytest.approx(-math.log(4.0))
+class TestMargin:
+    def test_is_how_much_farther_the_nearest_other_label_lies(self):
+        assert margin([1.0, 16.0, 9.0], 0) == 2.0
+        assert margin([1.0, 16.0, 9.0], 1) == -3.0
 
-    def test_of_several_the_others_count_together(self):
-        # 1 / d: 1, 1/2 and 1/4; the odds of the first are 1 : 3/4.
-        assert log_odds([1.0, 2.0, 4.0], 0) == pytest.approx(math.log(4 / 3))
+    def test_without_another_label_there_is_nothing_to_weigh(self):
+        assert margin([4.0], 0) == 0.0
 
     @pytest.mark.parametrize(
-        ("distances", "label", "expected"),
-        [
-            ([0.0, 1.0], 0, LARGEST_LOG_ODDS),
-            ([1.0, 0.0], 0, -LARGEST_LOG_ODDS),
-            ([0.0, 0.0], 0, 0.0),
-            ([1.0], 0, LARGEST_LOG_ODDS),
-            ([1.0, math.inf], 0, LARGEST_LOG_ODDS),
-            ([1e-300, 1e300], 0, LARGEST_LOG_ODDS),
-            ([1e300, 1e-300], 0, -LARGEST_LOG_ODDS),
-            ([5e-324, 5e-324], 1, 0.0),
-        ],
+        ("distances", "expected"),
+        [((0.0, math.inf), math.inf), ((math.inf, 1.0), -math.inf), ((math.inf,) * 2, -math.inf)],
     )
-    def test_stay_finite_where_distances_are_not_ordinary(self, distances, label, expected):
-        assert log_odds(distances, label) == pytest.approx(expected)
+    def test_what_is_infinitely_far_is_no_evidence_for_a_label(self, distances, expected):
+        assert margin(distances, 0) == expected
 
 
 def stopping(**changes):
     rules = (
-        StoppingRule(0.10, 1.2, 2.0, 1, 2),
-        StoppingRule(0.15, 0.8, 0.9, 1, 2),
-        StoppingRule(0.25, 0.4, 0.6, 2, 2),
+        StoppingRule(0.10, 1.2, 2.0, 2),
+        StoppingRule(0.15, 0.8, 0.9, 2),
+        StoppingRule(0.25, 0.4, 0.6, 2),
     )
     given = {
         "slopes": (1.0, 1.0, 2.0),
@@ -65,9 +54,14 @@ def test_the_fastest_rule_that_is_certified_is_taken():
     assert stopping().rule(0.9).mean_s == 0.4
 
 
-def test_confidence_is_the_logistic_function_of_the_evidence():
-    assert stopping().confidence(0, [1.0, 4.0], 0) == pytest.approx(4 / 5)
-    assert stopping().confidence(2, [1.0, 4.0], 0) == pytest.approx(1 / (1 + math.exp(1) / 16))
+def test_confidence_is_the_logistic_function_of_the_margin():
+    assert stopping().confidence(0, [1.0, 4.0], 0) == pytest.approx(1 / (1 + math.exp(-1)))
+    assert stopping().confidence(2, [1.0, 4.0], 1) == pytest.approx(1 / (1 + math.exp(3)))
+
+
+@pytest.mark.parametrize(("far", "expected"), [((0.0, 1e300), 1.0), ((1e300, 0.0), 0.0)])
+def test_confidence_stays_a_probability_whatever_the_distances(far, expected):
+    assert stopping().confidence(0, far, 0) == expected
 
 
 def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
@@ -95,10 +89,11 @@ def test_what_is_stored_is_read_again():
     "changes",
     [
         {"slopes": (1.0, 1.0)},
+        {"slopes": (1.0, -1.0, 1.0)},
         {"intercepts": (0.0, 0.0, math.nan)},
         {"rules": ()},
-        {"rules": (StoppingRule(0.1, 1.0, 0.9, 1, 3),)},
-        {"rules": (StoppingRule(0.0, 1.0, 0.9, 1, 2),)},
+        {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
+        {"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)},
         {"wrong": 141},
         {"risk": 0.0},
     ],
