@@ -132,13 +132,15 @@ endif
 study: $(READY)
 	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
 
-# Without a BOARD, this machine's own figures: a model of these recordings, benched here.
+# Without a BOARD, this machine's own figures: a model of these recordings, with the features that
+# the report measures, benched here.
 ifdef BOARD
 tradeoff: $(READY)
 else
 BOARD := $(OUT)/tradeoff/board.json
 tradeoff: $(READY)
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --features paper contact \
+	  --projection lda
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 endif
 	$(BIN)/python -m export.prices --data $(RECORDINGS) --out $(OUT)/tradeoff/prices.json
