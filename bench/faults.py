@@ -25,6 +25,7 @@ from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.loop import Schedule
 from edge.skin.skin import Skin
+from edge.skin.wiring import BusSpec, ChipSpec
 from edge.touch.frame import Frame
 
 PERIOD_S = 0.01
@@ -92,7 +93,7 @@ def run(
     faults: Sequence[Fault],
     *,
     seed: int = 0,
-    touched: Callable[[skinfile.ChipSpec, str], bool] = lambda chip, bus: True,
+    touched: Callable[[ChipSpec, str], bool] = lambda chip, bus: True,
     end_s: float = END_S,
     seconds: float = SECONDS,
 ) -> Outcome:
@@ -212,10 +213,8 @@ def _nth(fault: Fault, i: int, rate: float) -> Fault:
 
 def block_skin(cody: SkinFile) -> SkinFile:
     """Cody's skin served by three microcontrollers, a bus each."""
-    chips = [
-        skinfile.ChipSpec("block", 0x28, tuple(range(128 * i, 128 * i + 128))) for i in range(3)
-    ]
-    buses = tuple(skinfile.BusSpec(f"/dev/i2c-{i + 1}", (chip,)) for i, chip in enumerate(chips))
+    chips = [ChipSpec("block", 0x28, tuple(range(128 * i, 128 * i + 128))) for i in range(3)]
+    buses = tuple(BusSpec(f"/dev/i2c-{i + 1}", (chip,)) for i, chip in enumerate(chips))
     return replace(cody, buses=buses)
 
 

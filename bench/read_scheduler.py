@@ -20,8 +20,9 @@ from edge.fake.player import Playback, fake_skin
 from edge.model.model import Model
 from edge.recording import Recording, find, load
 from edge.skin import file as skinfile
-from edge.skin.file import BusSpec, SkinFile
+from edge.skin.file import SkinFile
 from edge.skin.loop import Loop
+from edge.skin.wiring import BusSpec
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.features import FEATURES, SAMPLES, feature_vector

@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -87,3 +88,23 @@ def test_importing_the_path_does_not_load_onnxruntime():
 
     code = "import sys, edge.cli, edge.classifier; sys.exit('onnxruntime' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    paths = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path
+        for package in ("edge", "train", "export")
+        for path in modules(package)
+        if path.name != "__init__.py"
+    }
+    graph = {}
+    for name, path in paths.items():
+        named = {
+            f"{node.module}.{alias.name}"
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        graph[name] = (imported(path) | named) & paths.keys()
+    assert graph["edge.skin.file"] >= {"edge.skin.kinds", "edge.skin.wiring"}
+    assert len(list(TopologicalSorter(graph).static_order())) == len(graph)

@@ -9,8 +9,9 @@ import numpy as np
 from edge.commands.options import add_skin
 from edge.commands.output import Output
 from edge.commands.source import open_skin
-from edge.skin.file import UNUSED, SkinFile
+from edge.skin.file import SkinFile
 from edge.skin.skin import ChipStatus
+from edge.skin.wiring import UNUSED
 
 HELP = "show which chips answer, as a map of the skin"
 DESCRIPTION = (

@@ -19,8 +19,9 @@ from edge.i2c.bus import wire_bits
 from edge.i2c.serial_bus import serial_bits
 from edge.recording import Recording
 from edge.skin import file as skinfile
-from edge.skin.file import UNUSED, BusSpec, ChipSpec, SkinFile, TaxelCalibration
+from edge.skin.file import SkinFile, TaxelCalibration
 from edge.skin.skin import Skin
+from edge.skin.wiring import UNUSED, BusSpec, ChipSpec
 from edge.touch.layout import SkinLayout
 
 Scene = Callable[[float], NDArray[np.uint16]]

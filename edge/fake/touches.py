@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from edge import demo
 from edge.fake.player import calibrated
 from edge.recording import Recording, load
-from edge.skin.file import UNUSED, SkinFile
+from edge.skin.file import SkinFile
+from edge.skin.wiring import UNUSED
 from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.01

@@ -31,7 +31,7 @@ from edge.i2c.bus import (
 from edge.i2c.chip import Chip
 from edge.i2c.mpr121 import MPR121
 from edge.i2c.tca9548a import TCA9548A
-from edge.skin.file import BusSpec, ChipSpec
+from edge.skin.wiring import BusSpec, ChipSpec
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
 """Before a chip that does not answer is tried again; a try costs a few bits."""

@@ -15,62 +15,8 @@ from edge.config import ConfigTable, parse_toml, shown
 from edge.errors import InputError
 from edge.files import read_text
 from edge.skin.kinds import Usual, usual
+from edge.skin.wiring import UNUSED, BusSpec, ChipSpec, read_buses
 from edge.touch.layout import SkinLayout
-
-UNUSED = -1
-"""A stage that is no taxel."""
-
-
-@dataclass(frozen=True)
-class ChipSpec:
-    """One chip: where it is, and which taxel each of its stages is.
-
-    Attributes:
-        kind: a driver's name.
-        address: 7 bits.
-        taxels: flat index (row * cols + col) of each stage, `UNUSED` for none.
-        mux, channel: the way to it, or None where it hangs on the bus itself.
-        sign: 1 where a touch raises the raw value, -1 where it lowers it.
-        decimation: of an AD7147.
-        bits: of a block's taxel.
-    """
-
-    kind: str
-    address: int
-    taxels: tuple[int, ...]
-    mux: int | None = None
-    channel: int | None = None
-    sign: int = 1
-    decimation: int = 64
-    bits: int = 16
-
-    @property
-    def route(self) -> str:
-        """The way to it as a person reads it: mux, channel and address."""
-        way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
-        return f"{way}address {self.address:#04x}"
-
-    @property
-    def highest(self) -> int:
-        """The largest raw value that it measures; an AD7147 that reads 0xFFFF is at its end."""
-        return {"ad7147": 0xFFFE, "mpr121": 1023}.get(self.kind, (1 << self.bits) - 1)
-
-
-@dataclass(frozen=True)
-class BusSpec:
-    """One adapter and its chips, in the order in which they are read.
-
-    Attributes:
-        device: such as `/dev/i2c-1`, or a serial port.
-        chips: on it; one on a serial port.
-        clock_hz: of the I2C bus, or the serial port's bits per second.
-        serial: whether it is a serial port.
-    """
-
-    device: str
-    chips: tuple[ChipSpec, ...]
-    clock_hz: int = 400_000
-    serial: bool = False
 
 
 @dataclass(frozen=True)
@@ -179,8 +125,6 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     Raises:
         InputError: it makes no sense.
     """
-    from edge.skin.wiring import read_buses
-
     top = parse_toml(text, where)
     skin = top.table("skin", {})
     name = skin.text("name", Path(where).stem or "skin")

@@ -19,9 +19,10 @@ from edge.skin.baseline import Baseline
 from edge.skin.buffers import Buffers, ChipGroup, buffers
 from edge.skin.bus_reader import NEVER, BusReader, Slot, State
 from edge.skin.calibration import dead_band
-from edge.skin.file import UNUSED, BusSpec, SkinFile, load
+from edge.skin.file import SkinFile, load
 from edge.skin.read_scheduler import MARGIN, ReadScheduler
 from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
+from edge.skin.wiring import UNUSED, BusSpec
 from edge.touch.frame import Frame
 
 FOLLOW_FRAMES = 4

@@ -1,15 +1,15 @@
-"""The `[[bus]]` tables of a skin's file: which chip is where, and which taxels it serves."""
+"""A skin's buses and chips: the `[[bus]]` tables of its file."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.i2c import ad7147, block, mpr121, tca9548a
 from edge.i2c.bus import device_path
-from edge.skin.file import UNUSED, BusSpec, ChipSpec
 from edge.skin.kinds import KINDS, usual_of
 from edge.touch.layout import SkinLayout
 
@@ -19,6 +19,62 @@ ADDRESSES = range(0x08, 0x78)
 """7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
 SHARED = ("kind", "mux", "block", "bits", "decimation")
 """Keys that a bus may give for all its chips."""
+
+
+UNUSED = -1
+"""A stage that is no taxel."""
+
+
+@dataclass(frozen=True)
+class ChipSpec:
+    """One chip: where it is, and which taxel each of its stages is.
+
+    Attributes:
+        kind: a driver's name.
+        address: 7 bits.
+        taxels: flat index (row * cols + col) of each stage, `UNUSED` for none.
+        mux, channel: the way to it, or None where it hangs on the bus itself.
+        sign: 1 where a touch raises the raw value, -1 where it lowers it.
+        decimation: of an AD7147.
+        bits: of a block's taxel.
+    """
+
+    kind: str
+    address: int
+    taxels: tuple[int, ...]
+    mux: int | None = None
+    channel: int | None = None
+    sign: int = 1
+    decimation: int = 64
+    bits: int = 16
+
+    @property
+    def route(self) -> str:
+        """The way to it as a person reads it: mux, channel and address."""
+        way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
+        return f"{way}address {self.address:#04x}"
+
+    @property
+    def highest(self) -> int:
+        """The largest raw value that it measures; an AD7147 that reads 0xFFFF is at its end."""
+        return {"ad7147": 0xFFFE, "mpr121": 1023}.get(self.kind, (1 << self.bits) - 1)
+
+
+@dataclass(frozen=True)
+class BusSpec:
+    """One adapter and its chips, in the order in which they are read.
+
+    Attributes:
+        device: such as `/dev/i2c-1`, or a serial port.
+        chips: on it; one on a serial port.
+        clock_hz: of the I2C bus, or the serial port's bits per second.
+        serial: whether it is a serial port.
+    """
+
+    device: str
+    chips: tuple[ChipSpec, ...]
+    clock_hz: int = 400_000
+    serial: bool = False
 
 
 def read_buses(

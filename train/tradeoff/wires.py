@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from edge.fake.player import frame_bits
 from edge.i2c import ad7147
 from edge.skin import file as skinfile
-from edge.skin.file import UNUSED, BusSpec, ChipSpec, SkinFile, frame_rate
+from edge.skin.file import SkinFile, frame_rate
+from edge.skin.wiring import UNUSED, BusSpec, ChipSpec
 from edge.touch.layout import SkinLayout
 
 FRAMES = 100

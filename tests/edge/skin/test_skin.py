@@ -11,8 +11,9 @@ from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_skin, frame_bits, still
 from edge.skin import file as skinfile
 from edge.skin.buffers import SEQUENCE_FRAMES
-from edge.skin.file import BusSpec, Reading
+from edge.skin.file import Reading
 from edge.skin.skin import Skin
+from edge.skin.wiring import BusSpec
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 PAD = skinfile.load(skinfile.shipped("mpr121"))

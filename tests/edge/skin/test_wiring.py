@@ -4,6 +4,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.skin import file as skinfile
+from edge.skin.wiring import UNUSED
 from tests.edge.skin.small import SMALL
 
 
@@ -20,7 +21,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
         f"{{ channel = 0, address = 0x2C, taxels = [{listed}] }}",
     )
     file = skinfile.parse(text)
-    assert file.chips[0].taxels == (0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, skinfile.UNUSED)
+    assert file.chips[0].taxels == (0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, UNUSED)
     assert file.uncovered == 1
 
 
