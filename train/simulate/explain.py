@@ -100,10 +100,16 @@ def explain(scene: Scene) -> str:
 
 def _step_lines(step_s: float, found: Convergence, scene: Scene) -> list[str]:
     tried = ", ".join(
-        f"{1e3 * s:g} ms {100.0 * e:.2g} %"
+        f"{1e3 * s:.3g} ms {100.0 * e:.2g} %"
         for s, e in zip(found.steps_s, found.errors, strict=False)
     )
+    goal = f"{100.0 * scene.trials['tolerance']:g} %"
+    told = (
+        f"{1e3 * found.step_s:g} ms is enough for {goal}"
+        if found.within
+        else f"none is within {goal}; {1e3 * found.step_s:g} ms errs by {100.0 * found.error:.2g} %"
+    )
     return [
-        f"  step {1e3 * step_s:g} ms; measured: {1e3 * found.step_s:g} ms is enough for "
-        f"{100.0 * scene.trials['tolerance']:g} % (order {found.order:.1f}; error {tried})"
+        f"  step {1e3 * step_s:g} ms; measured: {told} (order {found.order:.2g}; error {tried}; "
+        f"verified at {1e3 * found.steps_s[-1]:.2g} ms)"
     ]

@@ -14,7 +14,6 @@ from scipy.linalg import solve, toeplitz
 
 from edge.touch.arm import Chain
 from train.simulate import arm, base, contact
-from train.simulate.convergence import measure
 from train.simulate.effects import lateral
 from train.simulate.effects.friction import Shear
 from train.simulate.effects.tipping import Tipping
@@ -505,36 +504,3 @@ class TestTilt:
         total = batch.counts[0].sum(axis=(1, 2)) / 1000.0
         # Each of some dozen taxels is rounded to a count of 1 mN.
         np.testing.assert_allclose(total, batch.force[0], atol=0.05)
-
-
-class TestConvergence:
-    OBJECTS = (
-        ("fixed", {}, ()),
-        ("movable", {"mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35}, ()),
-        ("fixed", {"family": "foam", "modulus_pa": 12e3, "depth_m": 0.1}, ()),
-    )
-
-    @pytest.mark.parametrize(("condition", "keys", "add"), OBJECTS)
-    def test_halving_the_step_halves_the_error(self, condition, keys, add):
-        scene = make(one_object(conditions=[condition], width_m=0.05, **keys), *add)
-        scene.trials["tolerance"] = 1e-9
-        found = measure(scene, tuple(next(iter(kinds(scene).values()))), halvings=4)
-        assert found.errors[-1] < found.errors[0]
-        assert 0.6 <= found.order <= 4.0
-        assert found.errors[-1] < 0.005
-
-    def test_the_step_follows_the_tolerance(self):
-        thing = one_object(
-            conditions=["movable"], mass_kg=1.0, friction_static=0.4, friction_kinetic=0.3
-        )
-        scene = make(thing)
-        chosen = []
-        for tolerance in (0.05, 0.004):
-            scene.trials["tolerance"] = tolerance
-            found = measure(scene, tuple(next(iter(kinds(scene).values()))))
-            within = [
-                s for s, e in zip(found.steps_s, found.errors, strict=False) if e <= tolerance
-            ]
-            assert found.step_s == within[0]
-            chosen.append(found.step_s)
-        assert chosen[0] > chosen[1]

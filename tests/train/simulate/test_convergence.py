@@ -1,0 +1,72 @@
+"""The automatic step: what it claims is what a much shorter step shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from train.simulate.convergence import measure, physics
+from train.simulate.run import kinds
+from train.simulate.scene import Scene, from_dict
+
+
+def one_object(**keys):
+    thing = {"name": "thing", "family": "rigid", "conditions": ["fixed"], **keys}
+    return [thing]
+
+
+def make(objects, *add, **trials) -> Scene:
+    return from_dict(
+        {
+            "trials": {"count": 2, **trials},
+            "step_s": {"base": 1.0 / trials.get("rate_hz", 100)},
+            "effects": {"add": list(add)},
+            "object": objects,
+        }
+    )
+
+
+OBJECTS = (
+    ("fixed", {}, ()),
+    ("movable", {"mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35}, ()),
+    ("fixed", {"family": "foam", "modulus_pa": 12e3, "depth_m": 0.1}, ()),
+)
+
+
+@pytest.mark.parametrize(("condition", "keys", "add"), OBJECTS)
+def test_halving_the_step_halves_the_error(condition, keys, add):
+    scene = make(one_object(conditions=[condition], width_m=0.05, **keys), *add)
+    scene.trials["tolerance"] = 1e-9
+    found = measure(scene, tuple(next(iter(kinds(scene).values()))), halvings=4)
+    assert found.errors[-1] < found.errors[0]
+    assert 0.6 <= found.order <= 1.0
+    assert found.errors[-1] < 0.005
+
+
+def test_a_light_thing_that_swings_within_a_step_is_not_believed():
+    # From three halvings alone, 2.5 ms would err by 5e-5; the thing swings ten times in that.
+    thing = one_object(
+        conditions=["movable"], mass_kg=1e-4, friction_static=0.5, friction_kinetic=0.4
+    )
+    scene = make(thing, lead_s=0.05, after_s=0.15)
+    trials = tuple(next(iter(kinds(scene).values())))
+    found = measure(scene, trials)
+    assert not found.within
+    true = physics(scene, trials, 2e-5).force
+    step = physics(scene, trials, found.step_s).force
+    assert found.error >= 0.9 * np.sqrt(np.mean((step - true) ** 2)) / true.max()
+
+
+def test_the_step_follows_the_tolerance():
+    thing = one_object(
+        conditions=["movable"], mass_kg=1.0, friction_static=0.4, friction_kinetic=0.3
+    )
+    scene = make(thing)
+    chosen = []
+    for tolerance in (0.05, 0.004):
+        scene.trials["tolerance"] = tolerance
+        found = measure(scene, tuple(next(iter(kinds(scene).values()))))
+        within = [s for s, e in zip(found.steps_s, found.errors, strict=False) if e <= tolerance]
+        assert found.step_s == within[0]
+        chosen.append(found.step_s)
+    assert chosen[0] > chosen[1]
