@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants fuzz bench transfer docs faults risk soak \
+  board-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk soak \
   soak-day clean
 
 help:
@@ -26,6 +26,7 @@ help:
 	@echo "make bench    speed, side by side with the alternatives"
 	@echo "make docs     the documentation as a site: build/site/index.html"
 	@echo "make transfer a model of SCENE on trials that another engine (MuJoCo) makes: accuracies, curves"
+	@echo "make matched  the same four touches in MuJoCo and in our simulator, beside theory"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make risk     how often a certified error rate is exceeded, over 200 simulated data sets"
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
@@ -123,6 +124,9 @@ transfer: $(BENCHVENV)
 	$(BIN)/python -m export --data $(OUT)/transfer/simulated --out $(OUT)/transfer $(EXPORT)
 	$(BIN)/python -m bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer \
 	  --ours $(OUT)/transfer/simulated
+
+matched: $(BENCHVENV)
+	$(BIN)/python -m bench.matched
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made

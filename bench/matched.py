@@ -1,0 +1,166 @@
+"""The same four touches in both engines, beside what theory says: `make matched`.
+
+A face parallel to the forearm, rigid or soft, fixed or movable, with skin friction: means from 0.9
+to 1.2 s after the touch, and how far the thing has moved by then. Theory is quasi-static: a fixed
+face bears the arm's stiffness times its advance, a sliding one mu m g; a soft one's contact is as
+wide as on an elastic layer under that load, and its pressure a half ellipse.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from bench.mujoco_touch import (
+    LEAD_S,
+    PLACE_M,
+    RADIUS_M,
+    RATE_HZ,
+    START_DEG,
+    THRESHOLD_COUNTS,
+    Thing,
+    Touch,
+    simulate,
+)
+from edge.errors import InputError
+from train.simulate.effects.lateral import SPREAD
+from train.simulate.engine import run_batch
+from train.simulate.run import kinds
+from train.simulate.scene import from_dict
+
+UPRIGHT_DEG = (0.0, -4.0, 0.0, -3.9, 0.0)
+"""What lets the forearm hang straight as it touches: a standing face is then parallel to it."""
+BOX = Thing("box", floor=0.3, skin=0.4, height_m=0.1, below_m=0.05)
+FOAM = Thing("foam", floor=0.3, skin=0.4, height_m=0.16, breadth_m=0.16, modulus_pa=8e3)
+SCENES = {
+    "rigid fixed": (BOX, True),
+    "rigid movable": (BOX, False),
+    "soft fixed": (FOAM, True),
+    "soft movable": (FOAM, False),
+}
+ALLOWED = {"total force, N": 10, "peak taxel, N": 20, "area, taxels": 20, "motion, mm": 10}
+PITCH_M, ROUND_M = 0.0108, 0.01205
+FROM_S, TO_S = 0.9, 1.2
+ARM_N_M, SPEED_M_S = 115.0, 0.15
+STEP_S = 0.00125
+
+
+def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
+    """Frames, force and motion in MuJoCo."""
+    touched = simulate(Touch(thing, fixed, start_rad=tuple(np.radians(UPRIGHT_DEG))))
+    return touched.recording.frames, touched.force, touched.moved_m
+
+
+def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
+    """The same in ours."""
+    item = {
+        "name": "thing",
+        "family": "foam" if thing.soft else "rigid",
+        "conditions": ["fixed" if fixed else "movable"],
+        "width_m": thing.height_m,
+        "breadth_m": thing.breadth_m,
+        "skin_friction": thing.skin,
+        "mass_kg": thing.mass_kg,
+        "friction_static": thing.floor,
+        "friction_kinetic": thing.floor,
+    }
+    if thing.soft:
+        item |= {"modulus_pa": thing.modulus_pa, "depth_m": thing.thick_m}
+        item |= {"relax_ratio": 0.6, "relax_s": 0.06}
+    start = [a + b for a, b in zip(START_DEG, UPRIGHT_DEG, strict=True)]
+    scene = from_dict(
+        {
+            "trials": {"count": 1, "lead_s": LEAD_S, "after_s": 1.8},
+            "motion": {"start_deg": start, "place_m": PLACE_M},
+            "effects": {"add": ["tilt", "inertia"]},
+            "step_s": {"base": STEP_S},
+            "object": [item],
+        }
+    )
+    batch = run_batch(scene, tuple(next(iter(kinds(scene).values()))), STEP_S)
+    slide = batch.traces.get("slide_m", np.zeros_like(batch.force))
+    return batch.counts[0], batch.force[0], slide[0]
+
+
+def theory(thing: Thing, fixed: bool) -> dict[str, float]:
+    """What is right where things are quasi-static; NaN where theory has no simple answer."""
+    middle = 0.5 * (FROM_S + TO_S)
+    hold = math.inf if fixed else thing.floor * thing.mass_kg * 9.81
+    out = dict.fromkeys(ALLOWED, math.nan)
+    if not thing.soft:
+        force = min(ARM_N_M * SPEED_M_S * middle, hold)
+        out["total force, N"] = force
+        out["motion, mm"] = 0.0 if fixed else 1e3 * (SPEED_M_S * TO_S - hold / ARM_N_M)
+        return out
+    modulus, depth, length = thing.modulus_pa, thing.thick_m, thing.height_m
+
+    def load(a: float) -> float:
+        return length * modulus / RADIUS_M * (2 / 3 * a**3 / depth + SPREAD * a**2)
+
+    def pressed(a: float) -> float:
+        inside = a * a / 2 + 0.36 * depth * (a - 0.19 * depth * math.log1p(a / (0.19 * depth)))
+        return inside / RADIUS_M
+
+    def half_width(advance: float) -> float:
+        return float(
+            brentq(lambda a: min(load(a), hold) / ARM_N_M + pressed(a) - advance, 1e-6, 0.2)
+        )
+
+    a = (
+        half_width(SPEED_M_S * middle)
+        if fixed
+        else float(brentq(lambda a: load(a) - hold, 1e-6, 0.2))
+    )
+    force = load(a)
+    out["total force, N"] = force
+    out["peak taxel, N"] = 4.0 * force / (math.pi * 2 * a * length) * PITCH_M * ROUND_M
+    out["area, taxels"] = 2 * a / ROUND_M * length / PITCH_M
+    out["motion, mm"] = 0.0 if fixed else 1e3 * (SPEED_M_S * TO_S - hold / ARM_N_M - pressed(a))
+    return out
+
+
+def measured(frames: NDArray, force: NDArray, moved: NDArray) -> dict[str, float]:
+    """The four quantities of one engine."""
+    onset = int(np.argmax(frames.max(axis=(1, 2)) > 60))
+    part = slice(onset + round(FROM_S * RATE_HZ), onset + round(TO_S * RATE_HZ))
+    touching = frames[part].max(axis=(1, 2)) > THRESHOLD_COUNTS
+    return {
+        "total force, N": float(force[part].mean()),
+        "peak taxel, N": float(frames[part].max(axis=(1, 2)).mean() / 1e3),
+        "area, taxels": float((frames[part] > THRESHOLD_COUNTS).sum(axis=(1, 2))[touching].mean()),
+        "motion, mm": 1e3 * float(moved[part.stop]),
+    }
+
+
+def table() -> str:
+    """The four touches, a line a quantity."""
+    head = f"{'':16}{'':16}{'MuJoCo':>9}{'ours':>9}{'off':>7}{'allowed':>9}{'theory':>9}"
+    lines = [head]
+    for name, (thing, fixed) in SCENES.items():
+        one, two = measured(*theirs(thing, fixed)), measured(*ours(thing, fixed))
+        right = theory(thing, fixed)
+        for quantity, allowed in ALLOWED.items():
+            a, b = one[quantity], two[quantity]
+            off = f"{100 * (b / a - 1):+.0f} %" if a > 1.0 or quantity != "motion, mm" else "-"
+            told = "-" if math.isnan(right[quantity]) else f"{right[quantity]:.3g}"
+            lines.append(f"{name:16}{quantity:16}{a:>9.3g}{b:>9.3g}{off:>7}{allowed:>7} %{told:>9}")
+            name = ""
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Print the table."""
+    try:
+        print(table())
+    except InputError as error:
+        print(f"matched: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
