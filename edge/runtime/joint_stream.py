@@ -157,8 +157,12 @@ class Joints:
         if self._shared:
             return False  # lines may come all at once there, as those of a file do
         self._recent.append(delay)
+        if len(self._recent) < LEAST_RECENT:
+            return False
         quickest = sorted(self._recent)[len(self._recent) // 10]
-        return len(self._recent) >= LEAST_RECENT and delay < quickest - AHEAD_S
+        # One of the first lines may have been such a line, before there were others to tell.
+        self._delay = [d if d >= quickest - AHEAD_S else quickest for d in self._delay]
+        return delay < quickest - AHEAD_S
 
     def _line(self, line: bytes, arrived: float) -> None:
         try:

@@ -238,6 +238,19 @@ def test_one_line_ahead_of_time_costs_one_line(wire, ahead_s):
     assert "ahead" in wire.joints.problem
 
 
+@pytest.mark.parametrize("place", [0, 3, 7, 8])
+@pytest.mark.parametrize("hz", [25, 100])
+def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_second(
+    wire, place, hz
+):
+    known = []
+    for i in range(2 * hz):
+        wire.now = i / hz + 0.002
+        wire.send(i / hz + 1000.0 + 0.3 * (i == place), [0.0, 0.0])
+        known.append(wire.at())
+    assert None not in known[place + hz :]
+
+
 @pytest.mark.parametrize("step_s", [0.5, -0.5])
 def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
     stream(wire, n=50)
