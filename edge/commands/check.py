@@ -83,8 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         said.append(f"full frames come at {rate:.1f} Hz; the chips near a contact at the rate")
     elif rate < asked:
         wrong.append(
-            f"asks for {asked:g} Hz, the wires carry {rate:.1f}: use more buses, a faster clock, "
-            "a lower [read] rate_hz, or region_of_interest = true"
+            f"asks for {asked:g} Hz, the wires carry {rate:.1f}: use more buses, a faster clock_hz "
+            "or baud, a lower [read] rate_hz, or region_of_interest = true"
         )
     event = {
         "event": "check",
@@ -107,10 +107,9 @@ def _text(
     path: str, file: SkinFile, event: dict[str, Any], wrong: list[str], said: list[str]
 ) -> str:
     rows, cols = file.layout.shape
-    count = len(file.chips)
-    lines = [f"{path}: {file.name}, {rows} x {cols} taxels on {count} chip{'s' * (count != 1)}"]
+    lines = [f"{path}: {file.name}, {rows} x {cols} taxels on {_chips(len(file.chips))}"]
     lines += [
-        f"  {bus['device']:<16} {bus['chips']:>3} chips  {bus['bits']:>8.0f} bits a frame at "
+        f"  {bus['device']:<16} {_chips(bus['chips'], 3):<9}  {bus['bits']:>8.0f} bits a frame at "
         f"{bus['clock_hz'] / 1000:g} {'kbit/s' if spec.serial else 'kHz'}"
         for bus, spec in zip(event["buses"], file.buses, strict=True)
     ]
@@ -121,3 +120,7 @@ def _text(
     lines += [f"Wrong:  {sentence}" for sentence in wrong]
     lines += [f"Remark: {sentence}" for sentence in said]
     return "\n".join(lines)
+
+
+def _chips(count: int, width: int = 0) -> str:
+    return f"{count:>{width}} chip{'s' * (count != 1)}"
