@@ -15,8 +15,9 @@ from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import measure, report, save
 from train import operating_points
+from train.choosing import LEAVE_OUT, TRIAL
 from train.crossval import jobs_here
-from train.fitting import LEAVE_OUT, MOST_TRIALS, TRIAL, fit
+from train.fitting import MOST_TRIALS, fit
 from train.projection import KINDS, SCALINGS
 from train.stopping import FEWEST
 
@@ -67,7 +68,12 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument(
         "--quick", action="store_true", help="a first look: few candidates, five folds"
     )
-    top.add_argument("--window", type=float, default=WINDOW_S, help="seconds from onset (1.2)")
+    top.add_argument(
+        "--window",
+        type=float,
+        help=f"seconds from onset ({WINDOW_S:g}; longer where touches last for long and that tells "
+        "so much more)",
+    )
     top.add_argument(
         "--decision-points",
         metavar="A:B:STEP",
@@ -103,8 +109,10 @@ def run(arguments: argparse.Namespace) -> int:
         front, point = _of_front(arguments)
         window_s, features = point.window_s, list(point.features)
         scaling = scaling or point.scaling
-    _check_fixed(arguments, window_s)
     points = arguments.decision_points
+    if window_s is None and points not in (None, "none"):
+        window_s = WINDOW_S
+    _check_fixed(arguments, window_s)
     fitted = fit(
         arguments.data,
         features=features,
@@ -116,7 +124,9 @@ def run(arguments: argparse.Namespace) -> int:
         samples=arguments.samples,
         tasks=arguments.tasks,
         leave_out=arguments.leave_out,
-        decision_points_s=None if points is None else parse_decision_points(points, window_s),
+        decision_points_s=None
+        if points is None
+        else parse_decision_points(points, window_s or WINDOW_S),
         threshold=arguments.threshold,
         onset=arguments.onset,
         arm=open_arm(arguments),
@@ -154,7 +164,7 @@ def _of_front(
     return front, point
 
 
-def _check_fixed(arguments: argparse.Namespace, window_s: float) -> None:
+def _check_fixed(arguments: argparse.Namespace, window_s: float | None) -> None:
     for name in ("components", "k", "jobs"):
         value = getattr(arguments, name)
         if value is not None and value < 1:
@@ -165,7 +175,7 @@ def _check_fixed(arguments: argparse.Namespace, window_s: float) -> None:
             raise InputError(f"--{name} must be 0 to 65534 counts, not {value}")
     if not 2 <= arguments.samples <= 1000:
         raise InputError(f"--samples must be 2 to 1000, not {arguments.samples}")
-    if not 0.0 < window_s <= 60.0:
+    if window_s is not None and not 0.0 < window_s <= 60.0:
         raise InputError(f"--window must be above 0 and at most 60 seconds, not {window_s}")
 
 

@@ -22,17 +22,16 @@ from edge.touch.features import feature_vector
 from export import golden
 from export.graph import to_onnx
 from train.candidates import Candidate
+from train.choosing import TRIAL, Chosen
 from train.dataset import NO_CONTACT, DataSet
 from train.evaluate import Result
-from train.fitting import TRIAL, Chosen, Fitted
+from train.fitting import Fitted
 from train.pipeline import Choice, ContactClassifier
 from train.projection import CLOSE_EIGENVALUES
 from train.stopping import SequentialClassifier
 
 MISSING_SHARE = 0.02
 """Recordings without a contact above which the thresholds deserve a warning."""
-LONG_TOUCHES = 3.0
-"""Windows that a touch goes on for, from which on a longer one is worth a try."""
 LEAK = 0.5
 """Share of labels known before the touch, above which a model knows the place, not the object."""
 NAMED = 3
@@ -218,12 +217,6 @@ def warnings(fitted: Fitted) -> list[str]:
             f"warning: {len(dataset.unused)} recordings have further contacts, of which only the "
             f"first is used: {_files(dataset.unused)}; `python -m train split` cuts them apart"
         )
-    lasting = [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
-    if float(np.median(lasting)) >= LONG_TOUCHES * fitted.window_s:
-        lines.append(
-            f"the window takes {fitted.window_s:g} s of touches that go on for "
-            f"{np.median(lasting):.1f} s (median); a longer --window may tell more"
-        )
     for task, one in fitted.chosen.items():
         if any(measures.feature(name).quantity == "joint_angle" for name in one.choice.features):
             told = told_by_posture(dataset, task)
@@ -233,7 +226,7 @@ def warnings(fitted: Fitted) -> list[str]:
                 "where the arm was, not what it felt; --features without "
                 "posture tells what touch can"
             )
-    longest = max(lasting)
+    longest = max(float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials)
     if fitted.window_s > longest + 1e-9:
         lines.append(
             f"warning: the window of {fitted.window_s:g} s is longer than any recording goes on "

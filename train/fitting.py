@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +15,13 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
-from train.candidates import Candidate, candidates, costs, groupable
+from train.candidates import Candidate, candidates
+from train.choosing import LEAVE_OUT, Choosing, Chosen, without_folds
 from train.crossval import jobs_here
-from train.dataset import NO_CONTACT, DataSet, load_trials, read
-from train.evaluate import Result, SearchGrid, Table, evaluate, group_folds, stratified_folds
+from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
-LEAVE_OUT = "object"
-TRIAL = "trial"
 STEPS_S = (0.1, 0.2)
 """Between decision points; the shorter one where the model stays below `LARGEST_BYTES`. It decides
 30 to 40 ms sooner at the same error (cody18, household)."""
@@ -34,40 +31,12 @@ MOST_TRIALS = 2000
 """Trials beyond which calibration takes minutes, and must be asked for."""
 LARGEST_BYTES = 4 << 20
 """Largest model that is given decision points which nobody asked for."""
-QUICK_FOLDS = 5
 LEAK = 0.5
 """Share of the trials that do not have the most frequent label: where more of them are recognised
 before any contact, the data leak."""
-GROUP_FOLDS, FEW = 20, 300
-"""Groups left out one at a time, as far as so many fit up to so many trials; ten parts beyond."""
 FEWEST_TRIALS = 3
-UNSEEN_SHRINKAGE = 0.1
-"""The least where whole groups are left out: what tells things never met must not hang on
-differences that are small beside the features' spread."""
-UNSEEN_MARGIN = 0.01
-"""Accuracy on left-out groups within which the cheaper candidate is taken."""
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """What a task is fitted with, and what was measured of it.
-
-    Attributes:
-        choice: the features, scaling, projection and numbers.
-        accuracy: nested accuracy of the whole choice, with whole groups left out where
-            `left_out` is not `trial`.
-        by_trial: the same with single trials left out.
-        left_out: `trial`, or the label of which whole groups were left out.
-        candidates: nested accuracy of each candidate's own choice of numbers.
-        picks: the best choice of each candidate.
-    """
-
-    choice: Choice
-    accuracy: Result
-    by_trial: Result
-    left_out: str
-    candidates: tuple[Result, ...] = ()
-    picks: tuple[Choice, ...] = ()
+LONG_TOUCHES = 3.0
+"""Windows that half of the touches go on for, from which on longer ones are tried."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +76,7 @@ def fit(
     scaling: str | None = None,
     components: int | None = None,
     k: int | None = None,
-    window_s: float = WINDOW_S,
+    window_s: float | None = None,
     samples: int = SAMPLES,
     tasks: Sequence[str] | None = None,
     leave_out: str = LEAVE_OUT,
@@ -132,7 +101,8 @@ def fit(
         scaling: one of `train.projection.SCALINGS`.
         components: principal components.
         k: neighbours.
-        window_s: seconds from onset.
+        window_s: seconds from onset; where None `WINDOW_S`, or two, four or eight times that where
+            touches last for long and it tells so much more (`Choosing.window`).
         samples: values of a feature.
         tasks: keys of the labels; all that the recordings share where None.
         leave_out: label of which whole groups are left out to choose and to score a task, where
@@ -157,16 +127,21 @@ def fit(
         True
     """
     jobs = jobs or jobs_here()
+    if window_s is None and decision_points_s:
+        window_s = decision_points_s[-1]
+    windows: tuple[float, ...] = (window_s or WINDOW_S,)
     if isinstance(data, DataSet):
         dataset = data
     else:
         raw = read([data] if isinstance(data, str | Path) else data, progress=progress)
         every = candidates({}, joints=raw.joints, features=features, quick=quick)
+        if window_s is None and not quick:
+            windows = _windows([float(r.t[-1] - r.t[0]) for r in raw.recordings])
         dataset = load_trials(
             raw,
             threshold=threshold,
             onset=onset,
-            horizon_s=window_s,
+            horizon_s=windows[-1],
             features=expand([name for one in every for name in one.sets]),
             arm=arm,
             progress=progress,
@@ -188,21 +163,24 @@ def fit(
         k=k,
         quick=quick,
     )
-    chosen, trials = _choose(dataset, y, found, window_s, samples, leave_out, quick, jobs, progress)
+    choosing = Choosing(dataset, y, found, samples, leave_out, quick, jobs, progress)
+    lasting = [float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials]
+    windows = windows if len(windows) == 1 else _windows(lasting)
+    window_s, notes = choosing.window(windows)
+    chosen, trials = choosing.choose(window_s)
     measured = dataset
     dataset = dataset.of([name for one in chosen.values() for name in one.choice.features])
     names = dataset.names
     X = dataset.features(window_s, samples)
     widths = dataset.widths(samples)
     choices = {task: one.choice for task, one in chosen.items()}
-    notes: list[str] = []
     notes += _leaks(measured, y)
     points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes)
     sequential = None
     if points:
         at_points = np.stack([dataset.features(s, samples) for s in points])
         sequential = SequentialClassifier(choices, points, names, jobs=jobs, widths=widths)
-        without = _without_folds(trials, dataset, samples, chosen)
+        without = without_folds(trials, dataset, samples, chosen)
         sequential.fit(at_points, y, trials.folds, without)
         classifier = sequential.decision_points_[-1]
     else:
@@ -232,106 +210,12 @@ def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(wanted)
 
 
-def _choose(
-    dataset: DataSet,
-    y: Mapping[str, NDArray[np.str_]],
-    found: Sequence[Candidate],
-    window_s: float,
-    samples: int,
-    leave_out: str,
-    quick: bool,
-    jobs: int,
-    progress: bool,
-) -> tuple[dict[str, Chosen], Table]:
-    """What the candidates' nested accuracies say of each task, and the table by single trials."""
-    X = dataset.features(window_s, samples)
-    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    finest = max(y, key=lambda task: len(set(y[task].tolist())))
-    groups = dataset.groups(leave_out) if leave_out != TRIAL else None
-    by_group = {
-        task: labels
-        for task, labels in y.items()
-        if groups is not None and task != leave_out and groupable(labels, groups)
-    }
-    grids = [grid for one in found for grid in one.grids]
-    names = widths.keys()
-
-    def table(
-        part: Mapping[str, NDArray[np.str_]],
-        folds: NDArray[np.int64],
-        grids: Sequence[SearchGrid],
-        what: str,
-    ) -> Table:
-        return evaluate(
-            X,
-            part,
-            folds,
-            grids,
-            features=dataset.names,
-            widths=tuple(widths.values()),
-            jobs=jobs,
-            progress=what if progress else None,
-        )
-
-    folds = stratified_folds(y[finest], QUICK_FOLDS if quick else 10)
-    trials = table(y, folds, grids, "choosing")
-    whole = None
-    if by_group and groups is not None:
-        count = QUICK_FOLDS if quick else GROUP_FOLDS if len(X) <= FEW else 10
-        own = y if any(grid.targets for grid in grids) else by_group
-        whole = table(own, group_folds(groups, count), [_unseen(g) for g in grids], leave_out)
-    out: dict[str, Chosen] = {}
-    for task in y:
-        missed = partial(_with_untouched, dataset.untouched_labels(task))
-        grouped = whole is not None and task in by_group
-        apart, margin = (whole, UNSEEN_MARGIN) if grouped and whole else (trials, 0.0)
-        choices = apart.choices[task]
-        among = _among(trials.choices[task], names, grouped)
-        prices, alike = costs(choices, widths), costs(trials.choices[task], widths)
-        parts = [_of(one, choices) for one in found]
-        out[task] = Chosen(
-            choices[apart.chosen(task, prices, margin=margin)],
-            missed(apart.nested(task, prices, margin=margin)),
-            missed(trials.nested(task, alike, among, margin)),
-            leave_out if grouped else TRIAL,
-            tuple(missed(apart.nested(task, prices, part)) for part in parts),
-            tuple(choices[apart.chosen(task, prices, part)] for part in parts),
-        )
-    return out, trials
-
-
-def _unseen(grid: SearchGrid) -> SearchGrid:
-    """The candidates of a grid for things never met."""
-    least = [one for one in grid.shrinkages if one >= UNSEEN_SHRINKAGE]
-    return replace(grid, shrinkages=tuple(least))
-
-
-def _among(choices: Sequence[Choice], names: Set[str], unseen: bool) -> NDArray[np.int64]:
-    """The places of those that take no feature but some, and may tell things never met."""
-    return np.flatnonzero(
-        [
-            set(choice.features) <= names
-            and (not unseen or choice.projection == "pca" or choice.shrinkage >= UNSEEN_SHRINKAGE)
-            for choice in choices
-        ]
-    )
-
-
-def _without_folds(
-    trials: Table, dataset: DataSet, samples: int, chosen: Mapping[str, Chosen]
-) -> list[dict[str, Choice]]:
-    """{task: what is chosen without it} of each fold, of the features that the model takes."""
-    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    out: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
-    for task, choices in trials.choices.items():
-        unseen = chosen[task].left_out != TRIAL
-        among = _among(choices, widths.keys(), unseen)
-        prices = np.zeros(len(choices), dtype=np.int64)
-        prices[among] = costs([choices[i] for i in among], widths)
-        margin = UNSEEN_MARGIN if unseen else 0.0
-        for fold, taken in enumerate(out):
-            taken[task] = choices[trials.without(task, fold, prices, among, margin)]
-    return out
+def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
+    """The windows to try for touches that last for so many seconds each."""
+    median = float(np.median(seconds))
+    if median < LONG_TOUCHES * WINDOW_S:
+        return (WINDOW_S,)
+    return tuple(WINDOW_S * times for times in (1, 2, 4, 8) if WINDOW_S * times <= median)
 
 
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
@@ -351,18 +235,6 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
                 "`python -m train import --zero` subtracts the first frames"
             )
     return notes
-
-
-def _with_untouched(labels: Sequence[str], found: Result) -> Result:
-    """Touches that were missed are wrong; recordings of none in which none was found are right."""
-    right = found.right + list(labels).count(NO_CONTACT)
-    return replace(found, right=right, total=found.total + len(labels))
-
-
-def _of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:
-    """The places of a candidate's own choices."""
-    names = {(grid.features, grid.projection) for grid in candidate.grids}
-    return np.flatnonzero([(c.features, c.projection) in names for c in choices])
 
 
 def _decision_points(
@@ -391,6 +263,8 @@ def _decision_points(
         each += c * (4 * columns + 8 * n)
     points: list[float] = []
     for step in STEPS_S:
+        # As many of a long window as of the usual one.
+        step *= max(window_s / WINDOW_S, 1.0)
         rising = (round(FIRST_S + i * step, 6) for i in itertools.count())
         points = [*itertools.takewhile(lambda s: s < window_s, rising), window_s]
         if len(points) * each <= LARGEST_BYTES:

@@ -106,9 +106,3 @@ def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert told_by_posture(fitted.dataset, "object") == 0.0 < LEAK
     assert not any(line.startswith("warning: object") for line in warnings(fitted))
-
-
-def test_a_window_that_takes_a_small_part_of_the_touches_is_named(fitted):
-    short = replace(fitted, window_s=fitted.window_s / 100.0)
-    assert any("a longer --window may tell more" in line for line in warnings(short))
-    assert not any("a longer --window" in line for line in warnings(fitted))
