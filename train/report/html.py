@@ -67,9 +67,15 @@ def _text(text: str) -> str:
     return CODE.sub(r"<code>\1</code>", html.escape(text, quote=False))
 
 
-def _cell(value: Any, more: bool) -> str:
+def _decimals(values: Sequence[Any]) -> int:
+    """How many decimals, at most two, show what differs in a column's numbers."""
+    shown = (f"{value:.2f}".rstrip("0") for value in values if isinstance(value, float))
+    return max((len(text) - text.index(".") - 1 for text in shown), default=0)
+
+
+def _cell(value: Any, more: bool, decimals: int) -> str:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    text = f"{value:.2f}" if isinstance(value, float) else str(value)
+    text = f"{value:.{decimals}f}" if isinstance(value, float) else str(value)
     kinds = " ".join(["number"] * number + ["more"] * more)
     return f'<td class="{kinds}">{_text(text)}</td>' if kinds else f"<td>{_text(text)}</td>"
 
@@ -79,9 +85,13 @@ def _table(table: Table) -> str:
         f"<th{' class=more' if i >= table.narrow else ''}>{_text(column)}</th>"
         for i, column in enumerate(table.columns[: table.wide])
     )
+    decimals = [_decimals(column) for column in zip(*table.rows, strict=True)]
     rows = "\n".join(
         f"<tr{' class=no' if row[-1] == 'no' else ''}>"
-        + "".join(_cell(value, i >= table.narrow) for i, value in enumerate(row[: table.wide]))
+        + "".join(
+            _cell(value, i >= table.narrow, decimals[i])
+            for i, value in enumerate(row[: table.wide])
+        )
         + "</tr>"
         for row in table.rows
     )

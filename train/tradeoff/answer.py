@@ -64,7 +64,9 @@ def answers(found: StoppingComparison, after_s: float) -> list[Answer]:
             how = f"after {window:g} s"
             rows.append(Answer(how, window + after_s, int(right.sum()), n, command))
     able = [one for one in found.certified if one.folds > FOLDS // 2]
-    for one in able:
+    for before, one in zip([None, *able], able, strict=False):
+        if before is not None and (one.mean_s, one.wrong) == (before.mean_s, before.wrong):
+            continue  # the same rule is certified for the smaller error
         command = f"edge-classify run --error {one.asked:g}"
         how = f"when sure, at most {100 * one.asked:g} % wrong"
         rows.append(Answer(how, one.mean_s + after_s, round((1 - one.wrong) * n), n, command))

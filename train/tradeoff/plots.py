@@ -16,6 +16,8 @@ from train.report.figures import COLOURS, STYLE, png
 from train.tradeoff.accuracy import MeasuredPoint
 from train.tradeoff.early import StoppingComparison
 
+MOST_ACROSS = 3
+"""Panels beside each other."""
 CLOSE = 0.06
 """Shares whose names would cover each other."""
 
@@ -145,6 +147,27 @@ def stopping(found: StoppingComparison, breakaways: Mapping[str, float], task: s
         return png(figure)
 
 
+def reliability(both: Mapping[str, StoppingComparison]) -> bytes:
+    """Share right against the confidence that was said, a curve a task; points as large as many."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(5.6, 4.6), layout="constrained")
+        axes = figure.subplots()
+        axes.plot([0, 100], [0, 100], "--", lw=1, color="0.55", label="as said")
+        for colour, (task, found) in zip(COLOURS, both.items(), strict=False):
+            said, was, counts = np.array(found.reliability()).T
+            axes.plot(100 * said, 100 * was, "-", lw=1.2, color=colour)
+            axes.scatter(
+                100 * said, 100 * was, s=8 + 120 * counts / counts.sum(), color=colour, alpha=0.8,
+                label=f"{task}: off by {100 * found.calibration_error:.1f} on average",
+            )  # fmt: skip
+        axes.set_xlim(0, 102)
+        axes.set_ylim(0, 102)
+        axes.set_xlabel("confidence, %")
+        axes.set_ylabel("decisions that are right, %")
+        axes.legend(fontsize=8, loc="upper left")
+        return png(figure)
+
+
 def _floor(axes: Any, slow: Sequence[tuple[str, float]], full_ms: float) -> None:
     """When each object that can move starts to, the slowest first."""
     rows = np.arange(len(slow))
@@ -177,18 +200,21 @@ def answer(
     """
     m = len(both)
     with mpl.rc_context({**STYLE, "font.size": 10.0}):
+        across = 1
         if phone:
             figure = Figure(figsize=(4.2, 2.7 * m + 2.3), layout="constrained")
             axes = figure.subplots(m + 1, 1, height_ratios=[2.7] * m + [1.7])
             panels, strip = list(axes[:-1]), axes[-1]
         else:
-            figure = Figure(figsize=(3.7 * m + 0.4, 6.0), layout="constrained")
-            grid = figure.add_gridspec(2, m, height_ratios=(3.9, 1.5))
-            panels = [figure.add_subplot(grid[0, i]) for i in range(m)]
-            strip = figure.add_subplot(grid[1, :])
+            across = m if m <= MOST_ACROSS else -(-m // 2)
+            down = -(-m // across)
+            figure = Figure(figsize=(3.7 * across + 0.4, 3.3 * down + 1.9), layout="constrained")
+            grid = figure.add_gridspec(down + 1, across, height_ratios=[3.3] * down + [1.5])
+            panels = [figure.add_subplot(grid[i // across, i % across]) for i in range(m)]
+            strip = figure.add_subplot(grid[down, :])
         for i, (axis, (task, found)) in enumerate(zip(panels, both.items(), strict=True)):
             _accuracy(axis, task, found, y[task], wire_s + arithmetic_s)
-            if i == 0 or phone:
+            if phone or i % across == 0:
                 axis.set_ylabel("decisions that are right, %")
             if i == 0:
                 axis.legend(fontsize=8, loc="lower right", framealpha=0.9)

@@ -89,9 +89,9 @@ def tradeoff(
     parts = [
         answer.section(both, y, fastest.wire_s, board, len(NAMES)),
         answer.reasons(fastest.wire_s, board, len(NAMES), breakaways),
-        sections.stopping(both, breakaways, main),
+        sections.stopping(both, breakaways, main, board),
         sections.operating_points(points, best, main, board, breakaways, is_paper),
-        arithmetic.section(dataset, y[main], main, choice[main], board, sizes),
+        arithmetic.section(dataset, y[main], main, choice[main], board, sizes, points),
         *([sections.unknown(finest(y), strange)] if strange else []),
         *([] if sizes is None else [prices.section(sizes, dataset, main)]),
         sections.arithmetic(board),
