@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.i2c.chip import Parsed
-from edge.skin.bus_reader import Slot, frame_bytes
 from edge.skin.file import SkinFile
+from edge.skin.slot import Slot, frame_bytes
 
 SEQUENCE_FRAMES = 25
 """Readings after which a microcontroller that serves one frame over and over is taken to hang."""

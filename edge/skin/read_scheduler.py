@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.i2c.tca9548a import SELECT_BITS, VERIFY_BITS
-from edge.skin.bus_reader import frame_wire_bits
 from edge.skin.file import SkinFile
+from edge.skin.slot import frame_wire_bits
 from edge.skin.wiring import UNUSED, BusSpec
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout

@@ -17,11 +17,12 @@ from edge.errors import EdgeError, InputError
 from edge.i2c.bus import Bus, LinuxBus
 from edge.skin.baseline import Baseline
 from edge.skin.buffers import Buffers, ChipGroup, buffers
-from edge.skin.bus_reader import NEVER, BusReader, Slot, State
+from edge.skin.bus_reader import BusReader
 from edge.skin.calibration import dead_band
 from edge.skin.file import SkinFile, load
 from edge.skin.read_scheduler import MARGIN, ReadScheduler
 from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
+from edge.skin.slot import NEVER, Slot, State
 from edge.skin.wiring import UNUSED, BusSpec
 from edge.touch.frame import Frame
 
