@@ -152,6 +152,9 @@ FULL = {
     "stribeck_m_s": 0.05,
     "base_m": 0.1,
     "height_m": 0.3,
+    "foot_m": 0.2,
+    "aside_m": 0.02,
+    "slope_deg": 1.0,
 }
 
 

@@ -124,8 +124,8 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
                 f'<body pos="{x} {y} {0.18432 - 0.0108 * row}"><joint name="p{len(where)}" '
                 f'type="slide" axis="{out}" stiffness="{k}" damping="{PAD_LOSS_S * k}" '
                 f'armature="{PAD_KG}"/>'
-                f'<geom type="capsule" size="{PAD_M} 0.004" mass="0.0005" contype="1" conaffinity="2" '
-                f'solref="-1e6 -2e3" friction="{skin} 0.005 0.0001"/></body>'
+                f'<geom type="capsule" size="{PAD_M} 0.004" mass="0.0005" contype="1" '
+                f'conaffinity="2" solref="-1e6 -2e3" friction="{skin} 0.005 0.0001"/></body>'
             )
             where.append((row, column))
     xml, end, at = "", "", "0 0 0"

@@ -100,6 +100,8 @@ def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
                 drawn = drawn * np.exp(spread("friction"))
             elif name == "mass_kg":
                 drawn = drawn * np.exp(spread("mass"))
+            elif name in ("aside_m", "slope_deg"):
+                drawn = drawn + spread(name)
             elif name in ("taxel_n_m", "cover_n_m"):
                 drawn = drawn * np.exp(spread("cover"))
             out.setdefault(name, np.full(len(trials), np.nan))[where] = drawn

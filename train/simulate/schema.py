@@ -68,6 +68,8 @@ LABELS = {
 }
 SPREAD = {
     "place_m": Field(0.0, 0.08, 0.0, "where along the forearm the object is met"),
+    "aside_m": Field(0.0, 0.5, 0.0, "how far beside its middle an object is pushed"),
+    "slope_deg": Field(0.0, 10.0, 0.0, "of the table, along the push"),
     "yaw_deg": Field(0.0, 30.0, 0.0, "angle between the object's face and the forearm"),
     "roll_deg": Field(0.0, 60.0, 0.0, "forearm roll: which columns touch"),
     "stiffness": Field(0.0, 1.0, 0.0, "of the object, as a part of its value"),
@@ -85,6 +87,9 @@ OBJECT = {
     "radius_m": Field(0.0, 1e6, 1e6, "how the face curves along the forearm", open_low=True),
     "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
     "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
+    "foot_m": Field(0.0, 10.0, None, "diameter of the object's foot", open_low=True),
+    "aside_m": Field(-1.0, 1.0, None, "how far beside its middle the object is pushed"),
+    "slope_deg": Field(-20.0, 20.0, None, "of what the object stands on, uphill along the push"),
     "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
     "modulus_pa": Field(0.0, 1e18, None, "of the elastic foundation", open_low=True),
     "depth_m": Field(0.0, 10.0, None, "of the elastic foundation", open_low=True),
@@ -169,8 +174,18 @@ EFFECTS: dict[str, EffectInfo] = {
         keys=("skin_friction",),
     ),
     "sliding": EffectInfo("sticks, then slides on the floor", "contact", 3),
+    "slope": EffectInfo(
+        "a table that is not level", "contact", 1, needs=("sliding",), keys=("slope_deg",)
+    ),
+    "turning": EffectInfo(
+        "a push beside the middle turns what it moves",
+        "contact",
+        2,
+        needs=("sliding",),
+        keys=("aside_m", "foot_m"),
+    ),
     "stribeck": EffectInfo(
-        "friction that falls with speed", "contact", 1, needs=("sliding",), keys=("stribeck_m_s",)
+        "friction that falls with speed", "contact", 2, needs=("sliding",), keys=("stribeck_m_s",)
     ),
     "tipping": EffectInfo(
         "tips over its edge where that takes less than sliding",

@@ -51,6 +51,9 @@ def everything():
         "stribeck_m_s": 0.05,
         "base_m": 0.1,
         "height_m": 0.3,
+        "foot_m": 0.2,
+        "aside_m": 0.02,
+        "slope_deg": 1.0,
     }
     return [
         {"name": family, "family": family, "conditions": ["fixed", "movable"], **full}
@@ -98,6 +101,8 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
 OWN = {
     "sliding": {"Mover"},
     "tipping": {"Tipping"},
+    "turning": {"Turning"},
+    "stribeck": {"Stribeck"},
     "tilt": {"Tilt"},
     "inertia": {"Momentum", "Branches"},
     "friction": {"Shear"},
@@ -120,7 +125,9 @@ def test_3_only_the_called_effects_state_exists():
         batch = batch_of(one, i)[0]
         expected = set().union(*(OWN.get(name, set()) for name in kind.effects))
         assert {own.__name__ for own in batch.state.own} == expected, kind.effects
-        assert set(batch.traces) == {"depth_m", *(["slide_m"] if "sliding" in kind.effects else [])}
+        traces = {"sliding": "slide_m", "turning": "turn_rad"}
+        called = {name for effect, name in traces.items() if effect in kind.effects}
+        assert set(batch.traces) == {"depth_m", *called}
         assert ("BubbleBed" in type(batch.state.bed).__name__) is ("pop" in kind.effects)
         assert batch.kept is not None
         assert batch.valid is not None

@@ -2,12 +2,14 @@
 
 It takes m g base / (2 height) at the height of the contact; as the object leans, its weight's
 lever shrinks, and so does the push it takes. The lean is a potential, not a loss: let go, the
-object falls back onto its foot. The softening is taken at the step's start (a concave potential
-taken explicitly makes no energy) and the rest implicitly.
+object falls back onto its foot. Beyond the balance its weight turns it over, away from the arm,
+until it lies. The softening is taken at the step's start (a concave potential taken explicitly
+makes no energy) and the rest implicitly.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,11 +25,13 @@ from train.simulate.state import State
 
 @dataclass
 class Tipping:
-    """Which trials' objects tip, the push that starts it, and the travel until they fall."""
+    """Which trials' objects tip, the push that starts it, the travel until they fall, and the
+    travel until they lie."""
 
     tips: NDArray[np.bool_]
     force: Array
     travel: Array
+    lies: Array
 
 
 def add(build: Build) -> None:
@@ -42,17 +46,17 @@ def balance(state: State) -> None:
     The object is taken for a box twice as high as the contact: its moment of inertia about the
     edge is m (base^2 + 4 height^2) / 3, felt at the contact as that over height^2.
     """
-    values = state.values
+    values, mover = state.values, state.of(Mover)
     foot, height = values["base_m"], values["height_m"]
     own = Tipping(
-        tips=values["friction_static"] > foot / (2.0 * height),
+        tips=mover.static > foot / (2.0 * height),
         force=values["mass_kg"] * GRAVITY * foot / (2.0 * height),
         travel=height * np.arctan2(foot, 2.0 * height),
+        lies=0.5 * math.pi * height,
     )
     state.keep(own)
-    mover = state.of(Mover)
     turned = values["mass_kg"] * (foot * foot / (height * height) + 4.0) / 3.0
-    mover.inertia = np.where(own.tips, turned, values["mass_kg"])
+    mover.inertia = np.where(own.tips, turned, mover.inertia)
 
 
 def topple(state: State) -> None:
@@ -64,9 +68,10 @@ def topple(state: State) -> None:
     moving = leans | (mover.speed > 0.0) | (state.loads[0] > hold)
     if not moving.any():
         return
-    left = np.maximum(1.0 - slide / own.travel, 0.0)
+    left = 1.0 - slide / own.travel
     drag = np.where(own.tips, own.force * left, mover.drag)
     speed, loads = give_way(state, mover, drag, mover.inertia)
     lands = leans & (slide + state.h * speed <= 0.0)
-    advance(state, mover, moving & ((speed > 0.0) | leans) & ~lands, speed, loads)
-    mover.slide = np.where(lands, 0.0, mover.slide)
+    falls = leans & (slide + state.h * speed >= own.lies)
+    advance(state, mover, moving & ((speed > 0.0) | leans) & ~lands & ~falls, speed, loads)
+    mover.slide = np.where(lands, 0.0, np.where(falls, own.lies, mover.slide))

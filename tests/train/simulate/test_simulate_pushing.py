@@ -1,0 +1,105 @@
+"""What is pushed off its middle turns, a slope helps or hinders, and what tips too far falls."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from train.simulate.effects.tipping import Tipping
+from train.simulate.engine import run_batch
+from train.simulate.motion import GRAVITY, Mover
+from train.simulate.run import kinds
+from train.simulate.scene import from_dict
+
+MU, MASS = 0.4, 1.0
+AT_THE_END = slice(-40, None)
+
+
+def push(step_s=0.0025, **keys):
+    """A box of even friction that the arm pushes, and its batch of one trial."""
+    box = {
+        "name": "box",
+        "family": "rigid",
+        "conditions": ["movable"],
+        "width_m": 0.05,
+        "mass_kg": MASS,
+        "friction_static": MU,
+        "friction_kinetic": MU,
+        **keys,
+    }
+    scene = from_dict(
+        {
+            "trials": {"count": 1, "lead_s": 0.2, "after_s": 1.8},
+            "step_s": {"base": step_s},
+            "object": [box],
+        }
+    )
+    return run_batch(scene, tuple(next(iter(kinds(scene).values()))), step_s)
+
+
+class TestTurning:
+    @pytest.mark.parametrize("aside", [-0.06, 0.03])
+    def test_an_off_centre_push_needs_less_and_turns_it(self, aside):
+        batch = push(aside_m=aside, foot_m=0.24)
+        lever = 2.0 / 3.0 * 0.12
+        force = MU * MASS * GRAVITY / math.sqrt(1.0 + (aside / lever) ** 2)
+        assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.02)
+        turned, slid = batch.traces["turn_rad"][0, -1], batch.traces["slide_m"][0, -1]
+        assert turned == pytest.approx(slid * aside / (lever**2 + aside**2), rel=1e-12)
+
+    def test_the_contact_moves_around_the_forearm_with_the_face(self):
+        straight, turned = push(aside_m=0.0, foot_m=0.24), push(aside_m=0.06, foot_m=0.24)
+
+        def column(batch):
+            weight = batch.counts[0, -1].sum(axis=0, dtype=float)
+            return (weight * np.arange(24)).sum() / weight.sum()
+
+        columns = turned.traces["turn_rad"][0, -1] / math.radians(15.0)
+        assert columns > 1.0
+        assert column(turned) - column(straight) == pytest.approx(columns, abs=0.15)
+        total = turned.counts[0].sum(axis=(1, 2)) / 1000.0
+        np.testing.assert_allclose(total, turned.force[0], atol=0.05)
+
+    def test_in_the_middle_it_is_as_if_it_could_not_turn(self):
+        assert push(aside_m=0.0, foot_m=0.2).counts.tobytes() == push().counts.tobytes()
+
+
+class TestSlope:
+    @pytest.mark.parametrize("degrees", [-2.0, 1.0])
+    def test_uphill_takes_more_and_downhill_less(self, degrees):
+        angle = math.radians(degrees)
+        force = MASS * GRAVITY * (MU * math.cos(angle) + math.sin(angle))
+        batch = push(slope_deg=degrees)
+        assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.02)
+
+    def test_friction_that_falls_with_speed_falls_from_the_slopes(self):
+        batch = push(slope_deg=1.0, friction_kinetic=0.2, stribeck_m_s=0.01)
+        angle = math.radians(1.0)
+        force = MASS * GRAVITY * (0.2 * math.cos(angle) + math.sin(angle))
+        assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.1)
+
+
+class TestToppling:
+    def test_beyond_its_balance_it_falls_as_a_pendulum_does(self):
+        # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as it is.
+        batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
+        own, mover = batch.state.of(Tipping), batch.state.of(Mover)
+        travel, lies = own.travel[0], own.lies[0]
+        slide, force = batch.traces["slide_m"][0], batch.force[0]
+        speed = np.gradient(slide, batch.t)
+        free = (slide > 1.2 * travel) & (slide < 0.8 * lies) & (force == 0.0)
+        free[1:-1] &= (force[:-2] == 0.0) & (force[2:] == 0.0)
+        assert free.sum() >= 5
+        stiffness = own.force[0] / travel
+        energy = mover.inertia[0] * speed**2 - stiffness * (slide - travel) ** 2
+        scale = (mover.inertia[0] * speed**2)[free].max()
+        assert np.ptp(energy[free]) < 0.03 * scale
+
+    def test_then_it_lies_and_stays(self):
+        batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
+        slide, lies = batch.traces["slide_m"][0], 0.5 * math.pi * 0.4
+        fallen = slide >= lies - 1e-12
+        assert fallen.any()
+        assert (slide[np.argmax(fallen) :] == lies).all()
