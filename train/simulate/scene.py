@@ -239,6 +239,8 @@ def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
     shape = tuple(CODY_SKIN)
     read.known(table, "skin", (*shape, *schema.SKIN))
     layout: dict[str, Any] = {**CODY_SKIN, **{k: table[k] for k in shape if k in table}}
+    if "column_angles_deg" not in table and layout["cols"] != CODY_SKIN["cols"]:
+        layout |= _even_columns(read, layout, "pitch_m" in table)
     for name in ("counts_per_newton", "threshold_counts", "onset_counts", "release_s"):
         limits = schema.SKIN[name]
         number = read.number(table.get(name, limits.default), f"skin.{name}", limits)
@@ -257,6 +259,17 @@ def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
         schema.SKIN["taxel_n_m"],
     )
     return skin, taxel
+
+
+def _even_columns(read: Reader, layout: dict[str, Any], pitched: bool) -> dict[str, Any]:
+    """Columns evenly around the forearm, where the file gives their number alone."""
+    cols = int(read.number(layout["cols"], "skin.cols", Field(1, 1000, None, "")))
+    radius = read.number(layout["radius_m"], "skin.radius_m", Field(0.0, 10.0, None, "", True))
+    angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
+    out: dict[str, Any] = {"column_angles_deg": [a if a < 180.0 else a - 360.0 for a in angles]}
+    if not pitched:
+        out["pitch_m"] = [CODY_SKIN["pitch_m"][0], 2.0 * math.pi * radius / cols]
+    return out
 
 
 def _objects(

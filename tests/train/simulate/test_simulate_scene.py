@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import copy
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.touch.arm import Chain
 from train.simulate import scene as scenes
-from train.simulate.scene import from_dict
+from train.simulate.run import simulate
+from train.simulate.scene import CODY_DAMPING, CODY_STIFFNESS, from_dict
 from train.simulate.schema import EFFECTS
 
 SCENES = Path(__file__).parents[3] / "train" / "scenes"
@@ -178,3 +183,50 @@ def test_every_effect_says_what_it_is():
     assert all(
         info.says and info.stage in ("contact", "sensor", "clock") for info in EFFECTS.values()
     )
+
+
+def test_a_skin_of_other_columns_has_them_evenly_around():
+    one = from_dict({**GOOD, "skin": {"cols": 12, "release_s": 0.7}})
+    assert one.cylinder.column_angles_deg[:2] == (15.0, 45.0)
+    assert one.cylinder.column_angles_deg[-1] == -15.0
+    assert one.cylinder.column_pitch_m == pytest.approx(2.0 * math.pi * 0.04604 / 12)
+    _, trial = next(simulate(replace(one, trials={**one.trials, "count": 1.0})))
+    assert trial.frames.shape[1:] == (16, 12)
+    assert trial.frames.max() > 0
+    assert trial.meta["skin"]["release_s"] == 0.7
+
+
+def test_an_arm_may_come_from_a_urdf(tmp_path):
+    """The joints of Cody's chain, written as URDF, make the same trials."""
+    chain, links = Chain.cody(), []
+    joints = ""
+    for i, joint in enumerate(chain.joints):
+        links.append(f"l{i}")
+        before = chain.joints[i - 1].translate if i else (0.0, 0.0, 0.0)
+        joints += (
+            f'<joint name="{joint.name}" type="continuous"><parent link="l{i}"/>'
+            f'<child link="l{i + 1}"/><origin xyz="{" ".join(map(str, before))}"/>'
+            f'<axis xyz="{" ".join(map(str, joint.axis))}"/></joint>'
+        )
+    tip = " ".join(map(str, chain.joints[-1].translate))
+    joints += (
+        f'<joint name="tip" type="fixed"><parent link="l{len(links)}"/><child link="tip"/>'
+        f'<origin xyz="{tip}"/></joint>'
+    )
+    names = "".join(f'<link name="{n}"/>' for n in (*links, f"l{len(links)}", "tip"))
+    (tmp_path / "arm.urdf").write_text(f'<robot name="cody">{names}{joints}</robot>')
+    arm = {
+        "chain": "arm.urdf",
+        "base": "l0",
+        "tip": "tip",
+        "stiffness_nm_rad": list(CODY_STIFFNESS),
+        "damping_nms_rad": list(CODY_DAMPING),
+    }
+    box = {"name": "box", "family": "rigid", "conditions": ["fixed"]}
+    plain = {"trials": {"count": 1}, "step_s": {"base": 0.01}, "object": [box]}
+    here = str(tmp_path / "scene.toml")
+    (_, ours), (_, theirs) = (
+        next(simulate(from_dict(table, here))) for table in (plain, {**plain, "arm": arm})
+    )
+    np.testing.assert_allclose(theirs.joints, ours.joints, atol=1e-9)
+    np.testing.assert_allclose(theirs.frames, ours.frames, atol=1)

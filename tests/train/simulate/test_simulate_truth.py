@@ -13,6 +13,7 @@ from train.simulate import viscous
 from train.simulate.engine import check_energy, run_batch
 from train.simulate.run import kinds, simulate, write
 from train.simulate.scene import from_dict
+from train.simulate.schema import EFFECTS, IMPLIED_BY_FAMILY, LABELLED_BY
 
 BOX = {
     "name": "box",
@@ -195,6 +196,54 @@ class TestEnergy:
         joints[100:, 0, 1] -= 1.0
         with pytest.raises(EdgeError, match=r"trial 1 of box-fixed makes energy: at 1 s"):
             check_energy(one, batch.state, joints, batch.t)
+
+
+EXTREME = {
+    "mass_kg": 0.05,
+    "friction_static": 0.9,
+    "friction_kinetic": 0.2,
+    "skin_friction": 1.5,
+    "cover_n_m": 500.0,
+    "stribeck_m_s": 0.02,
+    "base_m": 0.1,
+    "height_m": 0.3,
+    "foot_m": 0.2,
+    "aside_m": 0.1,
+    "slope_deg": -10.0,
+}
+CONTACT = [name for name, info in EFFECTS.items() if info.stage == "contact"]
+
+
+@pytest.mark.parametrize("first", CONTACT)
+def test_no_effect_and_no_pair_of_them_makes_energy(first):
+    """Each run is checked as it ends; values are such that it slides, tips, bounces and slips."""
+    for second in CONTACT:
+        pair = {first, second}
+        pair |= {need for name in pair for need in EFFECTS[name].needs}
+        families = [set(EFFECTS[n].families) for n in pair if EFFECTS[n].families]
+        common = sorted(set.intersection(*families)) if families else ["rigid"]
+        if not common:
+            continue
+        keys = {key: EXTREME[key] for name in pair for key in EFFECTS[name].keys}
+        moves = {key: EXTREME[key] for key in ("mass_kg", "friction_static", "friction_kinetic")}
+        condition = "movable" if "sliding" in pair else "fixed"
+        thing = {"name": "thing", "family": common[0], "conditions": [condition]}
+        own = set(IMPLIED_BY_FAMILY.get(common[0], ())) - {*LABELLED_BY}
+        one = scene(
+            {**thing, **moves, **keys, "width_m": 0.05},
+            trials={"count": 1, "lead_s": 0.1, "after_s": 0.5},
+            effects={
+                "add": sorted(pair),
+                "leave_out": sorted(own - pair),
+            },
+        )
+        batch = run(one)
+        assert batch.force.max() > 0.0, pair
+        assert pair <= set(batch_effects(one)), pair
+
+
+def batch_effects(one):
+    return next(iter(kinds(one))).effects
 
 
 class TestLimits:
