@@ -54,6 +54,8 @@ THROUGH = {
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
     "train/simulate/families.py": "train/simulate/test_simulate_truth.py",
+    "train/simulate/effects/slope.py": "train/simulate/test_simulate_pushing.py",
+    "train/simulate/effects/turning.py": "train/simulate/test_simulate_pushing.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
     "train/simulate/explain.py": "train/simulate/test_simulate_called_for.py",
     "train/simulate/reader.py": "train/simulate/test_simulate_scene.py",
