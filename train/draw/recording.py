@@ -154,28 +154,33 @@ def _side(
     onset: float,
     series: FeatureSeries | None,
 ) -> None:
-    """The arm at onset and at the end of the window, in the x-z plane of its base."""
+    """The arm at onset and at the end of the window, in the x-z plane of its base; what was
+    simulated stands on its table, and slides, leans or turns there."""
     joints = recording.joints
     assert joints is not None
     simulated = recording.meta.get("simulation")
     drawn = simulated if isinstance(simulated, dict) else {}
-    width, radius, mass = (_size(drawn, key) for key in ("width_m", "radius_m", "mass_kg"))
+    first: tuple[np.ndarray, np.ndarray] | None = None
+    told = ""
     for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
         k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
         points = link_positions(chain, joints[k])
         axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
-        found = _contact(recording, chain, layout, k)
-        if found is not None:
-            position, outward = found
-            axis.plot(position[0], position[2], "*", color=style, markersize=13)
-            if width is not None:
-                outline = _outline(position, outward, width, radius)
-                axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
+        last = _last_contact(recording, chain, layout, k)
+        if last is None:
+            continue
+        since, found = last
+        first = first or found
+        if since == 0.0:
+            axis.plot(found[0][0], found[0][2], "*", color=style, markersize=13)
+        if drawn:
+            told = _thing(axis, drawn, first, found[0], since, style)
     if drawn:
         effects = drawn.get("effects")
         names = ", ".join(map(str, effects)) if isinstance(effects, list) else ""
+        mass = _size(drawn, "mass_kg")
         what = str(drawn.get("family", "")) + (f", {mass:.2g} kg" if mass is not None else "")
-        axis.set_title(f"seen from the side: {what}\n{names}", fontsize=9)
+        axis.set_title(f"seen from the side: {what}{told}\n{names}", fontsize=9)
     else:
         axis.set_title("seen from the side", fontsize=9)
     axis.set_xlabel(f"x in the frame of {chain.base}, metres")
@@ -185,31 +190,79 @@ def _side(
 
 
 def _size(simulated: dict[str, Any], key: str) -> float | None:
-    """A size that the simulator drew, where the recording holds a plausible one; else None."""
+    """A number that the simulator drew, where the recording holds a plausible one; else None."""
     values = simulated.get("values")
     size = values.get(key) if isinstance(values, dict) else None
     if isinstance(size, bool) or not isinstance(size, int | float):
         return None
-    return float(size) if 0 < size < 1e9 else None
+    return float(size) if 0 < abs(size) < 1e9 else None
 
 
-DEPTH_M = 0.08
-"""Depth of the object that is sketched behind its face."""
+DEPTH_M, STANDS_M = 0.12, 0.15
+"""Depth of what is sketched, and how far below the contact it stands, if the scene is silent."""
+LOST_S = 0.3
+"""What tips and has not been felt for so long has fallen."""
 
 
-def _outline(position: Any, outward: Any, width_m: float, radius_m: float | None) -> np.ndarray:
-    """(points, 2) x and z of the object's face, with what is behind it."""
-    normal = np.array([outward[0], outward[2]])
-    normal /= np.linalg.norm(normal) or 1.0
-    along = np.array([-normal[1], normal[0]])
-    radius = max(radius_m or math.inf, width_m / 2)
-    s = np.linspace(-width_m / 2, width_m / 2, 33)
-    back = 0.0 * s if radius > 1e3 else radius - np.sqrt(radius**2 - s**2)
-    depth = max(float(back.max()), DEPTH_M)
-    centre = np.array([position[0], position[2]])
-    face = centre + s[:, None] * along + back[:, None] * normal
-    ends = centre + np.array([s[-1], s[0]])[:, None] * along + depth * normal
-    return np.vstack([face, ends])
+def _last_contact(
+    recording: Recording, chain: Chain, layout: SkinLayout, k: int
+) -> tuple[float, tuple[np.ndarray, np.ndarray]] | None:
+    """Seconds since the last contact at frame k, and where that was."""
+    for before in range(k, -1, -1):
+        found = _contact(recording, chain, layout, before)
+        if found is not None:
+            return float(recording.t[k] - recording.t[before]), found
+    return None
+
+
+def _thing(
+    axis: Any,
+    drawn: dict[str, Any],
+    first: tuple[np.ndarray, np.ndarray],
+    now: np.ndarray,
+    since: float,
+    style: str,
+) -> str:
+    """Draw what was touched where it stands by now; what it has done, for the title.
+
+    Args:
+        first: position (3,) of the contact at onset, and the skin's outward normal there (3,).
+        now: (3,) where the last contact was, `since` seconds ago.
+    """
+    start = first[0][[0, 2]]
+    ahead = math.copysign(1.0, first[1][0] or 1.0)
+    height = _size(drawn, "height_m") or STANDS_M
+    width = _size(drawn, "width_m") or 0.1
+    top, floor = 0.5 * min(width, 1.0), -max(height, 0.5 * min(width, 0.6))
+    depth = _size(drawn, "base_m") or DEPTH_M
+    z = np.linspace(floor, top, 33)
+    bulge = _size(drawn, "radius_m") or math.inf
+    face = np.minimum(z * z / (2.0 * bulge), depth / 2.0)
+    outline = np.vstack([np.column_stack([face, z]), [[depth, top], [depth, floor]]])
+    axis.plot(
+        start[0] + ahead * np.array([-0.1, depth + 0.25]), 2 * [start[1] + floor], color="sienna"
+    )
+    told, moved = "", max(ahead * float(now[0] - first[0][0]), 0.0)
+    effects = drawn.get("effects") or []
+    if "sliding" not in effects:
+        moved = 0.0
+    static = _size(drawn, "friction_static") or 0.0
+    if moved and "tipping" in effects and static > depth / (2.0 * height):
+        fallen = since > LOST_S
+        lean = 0.5 * math.pi if fallen else min(moved / height, 0.5 * math.pi)
+        edge = np.array([depth, floor])
+        turn = np.array([[math.cos(lean), math.sin(lean)], [-math.sin(lean), math.cos(lean)]])
+        outline = (outline - edge) @ turn.T + edge
+        told = ", has fallen over" if fallen else f", leans by {math.degrees(lean):.0f} degrees"
+    else:
+        outline[:, 0] += moved
+        aside, foot = _size(drawn, "aside_m"), _size(drawn, "foot_m")
+        if moved and "turning" in effects and aside is not None and foot is not None:
+            angle = moved * aside / ((foot / 3.0) ** 2 + aside**2)
+            told = f", turns by {math.degrees(angle):.0f} degrees seen from above"
+    shown = start + outline * [ahead, 1.0]
+    axis.fill(*shown.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
+    return told
 
 
 def _contact(
