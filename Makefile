@@ -8,7 +8,8 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk soak \
+  board-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk \
+  stopping soak \
   soak-day clean
 
 help:
@@ -29,6 +30,7 @@ help:
 	@echo "make matched  the same four touches in MuJoCo and in our simulator, beside theory"
 	@echo "make faults   what each fault on the skin's wires costs, as a table"
 	@echo "make risk     how often a certified error rate is exceeded, over 200 simulated data sets"
+	@echo "make stopping   deciding when sure beside fixed windows and, where aeon is installed, TEASER"
 	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
 	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
 	@echo "make mutants  removes each guard in turn, and makes 200 random changes: do tests fail?"
@@ -161,6 +163,13 @@ docs: $(VENV)/.docs
 
 risk: $(READY)
 	$(BIN)/python -m bench.risk $(RISK)
+
+ifndef DATA
+stopping: $(SIMULATED)/.made
+endif
+
+stopping: $(READY)
+	$(BIN)/python -m bench.stopping --data $(RECORDINGS) $(STOPPING)
 
 faults: $(READY)
 	$(BIN)/python -m bench.faults
