@@ -9,8 +9,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
   board-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk \
-  stopping soak \
-  soak-day clean
+  stopping soak soak-day clean
 
 help:
 	@echo "make test     what CI runs: lint, types and tests"
@@ -102,8 +101,9 @@ docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
 	cp $(OUT)/tradeoff/front.json train/tradeoff/front.json
 
-docs/touches.png: $(READY)
-	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx --out $@
+docs/touches.png docs/touches-dark.png: $(READY)
+	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
+	  $(if $(findstring dark,$@),--dark) --out $@
 
 docs/touch.png: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(OUT)/picture --seed 2012 --trials 1

@@ -31,6 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scene", action="store_true", help="sketch arm, contact and its path from the side too"
     )
+    parser.add_argument("--dark", action="store_true", help="several recordings: for a dark page")
     parser.add_argument("--threshold", type=int, metavar="COUNTS", help="in place of the skin's")
     parser.add_argument("--task", help="of a map: which labels to show (default: category)")
 
@@ -45,13 +46,16 @@ def run(arguments: argparse.Namespace) -> int:
     single = len(arguments.recording) == 1 and Path(first).suffix == ".npz"
     if arguments.model is not None and single:
         raise InputError("--model is for several recordings or a map, not for one recording")
+    if arguments.dark and len(arguments.recording) == 1:
+        raise InputError("--dark is for several recordings")
     if len(arguments.recording) > 1:
         from train.draw import comparison
 
         if arguments.scene or arguments.threshold is not None:
             raise InputError("--scene and --threshold are for a single recording")
         model = None if arguments.model is None else Model(arguments.model)
-        comparison.draw([(path, load(path)) for path in arguments.recording], out, model=model)
+        touches = [(path, load(path)) for path in arguments.recording]
+        comparison.draw(touches, out, model=model, dark=arguments.dark)
     elif Path(first).suffix != ".npz":
         from edge.runtime.touch_map import TouchMap
         from train.draw import touch_map as picture

@@ -27,10 +27,17 @@ UNITS = {"newton": "N", "metre": "m", "taxel": "taxels", "count": "counts"}
 GAMMA = 0.4
 """Exponent of the colour scale, so that soft touches are seen beside hard ones."""
 INK, DECISION = "#1f4e79", "#b03a2e"
+DARK_INK, DARK_DECISION = "#79b8ff", "#ff9080"
+PAPER, LINES = "#0d1117", "#c9d1d9"
+"""Background and lines on a dark page."""
 
 
 def draw(
-    recordings: Sequence[tuple[str, Recording]], out: Path, *, model: Model | None = None
+    recordings: Sequence[tuple[str, Recording]],
+    out: Path,
+    *,
+    model: Model | None = None,
+    dark: bool = False,
 ) -> None:
     """Draw up to six touches into a PNG, a column each.
 
@@ -38,18 +45,26 @@ def draw(
         recordings: names, for errors, and recordings of one skin.
         out: the picture.
         model: whose decisions are shown.
+        dark: light lines on a dark background.
 
     Raises:
         InputError: there are too many, one has no contact or does not suit the model, or `out`
             cannot be written.
     """
+    from cycler import cycler
     from matplotlib import rc_context
 
     if len(recordings) > MOST:
         raise InputError(f"{len(recordings)} recordings are too many side by side; give {MOST}")
     found = [_contact(name, recording) for name, recording in recordings]
     horizon = WINDOW_S if model is None else model.info.window_s
-    with rc_context({"font.size": 12}):
+    style: dict[Any, Any] = {"font.size": 12, "axes.prop_cycle": cycler(color=[INK, DECISION])}
+    if dark:
+        lines = ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")
+        style |= {"axes.prop_cycle": cycler(color=[DARK_INK, DARK_DECISION])}
+        style |= {"figure.facecolor": PAPER, "axes.facecolor": PAPER, "savefig.facecolor": PAPER}
+        style |= dict.fromkeys(lines, LINES)
+    with rc_context(style):
         _draw(recordings, found, horizon, out, model)
 
 
@@ -63,7 +78,6 @@ def _draw(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(2.6 * len(recordings) + 0.6, 8.6), layout="constrained")
-    figure.set_facecolor("white")
     axes = figure.subplots(
         4, len(recordings), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
     )
@@ -85,7 +99,7 @@ def _draw(
             axes[3, column].text(
                 0.5, -0.45, f"decided: {decided.label}\n{share}",
                 transform=axes[3, column].transAxes, ha="center", va="top", fontsize=13,
-                color=DECISION, weight="bold",
+                color="C1", weight="bold",
             )  # fmt: skip
     for row in (1, 2, 3):
         axes[row, 0].set_ylim(bottom=0.0)
@@ -94,7 +108,7 @@ def _draw(
         bar = figure.colorbar(image, ax=axes[0, :], pad=0.01, shrink=0.9)
         bar.set_label(f"{recordings[0][1].layout.force_unit} per taxel")
     with write_whole(out) as file:
-        figure.savefig(file, format="png", dpi=100, facecolor="white")
+        figure.savefig(file, format="png", dpi=100, bbox_inches="tight")
 
 
 def _contact(name: str, recording: Recording) -> tuple[float, FeatureSeries]:
@@ -158,10 +172,10 @@ def _curve(
     horizon: float,
     decided: Decided | None,
 ) -> None:
-    axis.plot(series.t, getattr(series, feature), color=INK, linewidth=2.2)
+    axis.plot(series.t, getattr(series, feature), color="C0", linewidth=2.2)
     end = horizon if decided is None else decided.window_s
-    axis.axvspan(0.0, end, color=INK, alpha=0.08, linewidth=0)
+    axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
     if decided is not None:
-        axis.axvline(end, color=DECISION, linewidth=1.8)
+        axis.axvline(end, color="C1", linewidth=1.8)
     axis.set_xlim(0.0, 1.15 * horizon)
     axis.grid(alpha=0.25)

@@ -1,6 +1,7 @@
 """Touches side by side: a column each, with what was decided."""
 
 import pytest
+from matplotlib import image
 from matplotlib.figure import Figure
 
 from edge import demo
@@ -34,6 +35,14 @@ def test_the_command_draws_several_with_the_decisions_of_a_model(tmp_path, monke
         assert max(line.get_ydata()) <= axis.get_ylim()[1]
 
 
+def test_a_dark_page_gets_light_lines_on_a_dark_background(tmp_path):
+    for name, words in (("light", []), ("dark", ["--dark"])):
+        out = tmp_path / f"{name}.png"
+        assert main(["show", *TOUCHES[:2], *words, "--out", str(out)]) == 0
+        corner = image.imread(out)[0, 0, :3]
+        assert (corner.mean() < 0.1) == (name == "dark")
+
+
 def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
     with pytest.raises(InputError, match="give 6"):
         comparison.draw([("a", make_touch())] * 7, tmp_path / "a.png")
@@ -43,7 +52,10 @@ def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
         comparison.draw([("quiet.npz", quiet)], tmp_path / "a.png", model=Model(demo.MODEL))
 
 
-@pytest.mark.parametrize("words", [[*TOUCHES, "--scene"], [TOUCHES[0], "--model", str(demo.MODEL)]])
+@pytest.mark.parametrize(
+    "words",
+    [[*TOUCHES, "--scene"], [TOUCHES[0], "--model", str(demo.MODEL)], [TOUCHES[0], "--dark"]],
+)
 def test_options_that_do_not_go_together_are_one_sentence(words, capsys, tmp_path):
     assert main(["show", *words, "--out", str(tmp_path / "a.png")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
