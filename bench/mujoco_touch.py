@@ -82,6 +82,7 @@ class Touch:
         slope_rad: of the table, along the push.
         taxel_n_m: stiffness of the pads.
         noise: counts, and its stream.
+        fine: pads that leave no gaps and blocks of a taxel's size, at a tenfold cost.
     """
 
     thing: Thing
@@ -93,6 +94,7 @@ class Touch:
     slope_rad: float = 0.0
     taxel_n_m: float = 10e3
     noise: tuple[float, np.random.Generator] | None = None
+    fine: bool = False
 
 
 @dataclass
@@ -114,6 +116,9 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
     masses = {1: (2.1, "0 0 -0.13"), 3: (1.5, "0 0 -0.12")}
     pads, where = "", []
     k, skin = touch.taxel_n_m, touch.thing.skin
+    pad = f'type="sphere" size="{PAD_M}"'
+    if touch.fine:
+        pad = f'type="capsule" size="{PAD_M} 0.004"'
     for row in range(ROWS):
         for column, angle in enumerate(COLUMN_ANGLES_DEG):
             if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
@@ -124,7 +129,7 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
                 f'<body pos="{x} {y} {0.18432 - 0.0108 * row}"><joint name="p{len(where)}" '
                 f'type="slide" axis="{out}" stiffness="{k}" damping="{PAD_LOSS_S * k}" '
                 f'armature="{PAD_KG}"/>'
-                f'<geom type="capsule" size="{PAD_M} 0.004" mass="0.0005" contype="1" '
+                f'<geom {pad} mass="0.0005" contype="1" '
                 f'conaffinity="2" solref="-1e6 -2e3" friction="{skin} 0.005 0.0001"/></body>'
             )
             where.append((row, column))
@@ -160,9 +165,9 @@ def stems_xml(thing: Thing, skin: str) -> str:
     return xml
 
 
-def blocks_xml(thing: Thing, skin: str) -> tuple[str, str]:
+def blocks_xml(thing: Thing, skin: str, fine: bool) -> tuple[str, str]:
     """A wall of sprung blocks, and the springs between neighbours: a Pasternak foundation."""
-    dz, dy = 0.0135, 0.0135
+    dz, dy = (0.0135, 0.0135) if fine else (0.0216, 0.016)
     rows = round(min(thing.height_m, 0.22) / dz)
     cols = round(min(thing.breadth_m, 0.17) / dy) | 1
     k = thing.modulus_pa * dz * dy / thing.thick_m
@@ -208,7 +213,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     elif thing.kind == "plant":
         parts = stems_xml(thing, skin)
     else:
-        parts, between = blocks_xml(thing, skin)
+        parts, between = blocks_xml(thing, skin, touch.fine)
         back = 0.2
     foot = f'<geom type="box" size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" '
     foot += f'pos="{back} 0 0.004" mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" '

@@ -11,6 +11,7 @@ from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
 from train.study.classify import papers
 from train.study.context import Context
+from train.study.readings import BY_MEAN, averaged
 from train.study.score import grid_search
 from train.study.skins import View, masked, pooled_down, pooled_layout, thinned, vectors
 
@@ -51,8 +52,15 @@ def section(context: Context) -> Section:
     ]
     series = context.follow_again("taxel resolution", views)
     X = [context.vectors(), *(vectors(found) for found in series)]
-    results = context.map("its accuracy", grid_search, [(x, context.labels) for x in X])
     levels = len(skins) - 1
+    # The first views are those by the sum.
+    means = [averaged(x, taxels[0] / n) for x, n in zip(X[: levels + 1], taxels, strict=True)]
+    cases = [(x, context.labels) for x in (X if context.scene is None else [*X, *means])]
+    results = context.map("its accuracy", grid_search, cases)
+    for n, by_mean in zip(taxels, results[len(X) :], strict=False):
+        for task, r in by_mean.items():
+            context.ours[BY_MEAN.key, str(n), task] = percent(r.accuracy)
+    results = results[: len(X)]
     table = Table(
         "resolution",
         "Larger taxels",

@@ -18,7 +18,7 @@ from train.report.tables import Section
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
 from train.simulate.scene_model import Scene
-from train.study import beyond, classify, findings, honest, paper, resolution, robust
+from train.study import beyond, classify, findings, honest, paper, readings, resolution, robust
 from train.study.context import Context
 
 SECTIONS: tuple[Callable[[Context], Section], ...] = (
@@ -86,7 +86,11 @@ def study(
             every = [context.ours, *_again(source, seeds - 1, context)]
             context.ours, context.seeds = paper.mean_of(every), len(every)
     # After all that the paper's numbers are set beside.
-    compared = [] if source is None else [paper.section(context)]
+    compared = []
+    if source is not None:
+        theirs_too = {(e.table, e.setting, e.task): e.percent for e in paper.entries()}
+        read = readings.compare(context.ours, theirs_too, context.tested)
+        compared = [paper.section(context), read]
     own, theirs = sections[-2:], sections[:-2]
     sections = [*own, *compared, *theirs, *([] if others is None else [others])]
     sections.insert(0, findings.section(sections))
