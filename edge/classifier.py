@@ -64,12 +64,11 @@ class Classifier:
     the confidence was reached).
 
     Flags of a decision: `tie` (another label had as many votes), `close` (two of the nearest
-    training trials are equally far but for rounding), `short` (the stream ended
-    inside the window; the last values were held), `missing_taxels` (taxels could not be read),
-    `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
-    measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
-    `out_of_range` (there is no label, as the features are too large to be measured against the
-    training rows).
+    training trials are equally far but for rounding), `short` (the stream ended inside the window;
+    the last values were held), `missing_taxels` (taxels could not be read), `missing_pose` (joint
+    angles were absent in part of the window), `skin_motion` (motion was measured on the skin,
+    though the model's is in the world), `as_trained` (see `AS_TRAINED`) and `out_of_range` (there
+    is no label, as the features are too large to be measured against the training rows).
 
     A task that was trained with recordings of no contact is decided by `finish` where there was
     none, flagged `no_contact` and at the time of the last frame; `missing_taxels` says that a

@@ -351,8 +351,8 @@ def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) ->
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
     A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), which is the last
-    where it is not given, and for each task
-    the output `<task>_label_distances` (n, labels); see `edge.model.stopping`.
+    where it is not given, and for each task the output `<task>_label_distances` (n, labels); see
+    `edge.model.stopping`.
     """
     kind = type(model)
     update_registered_converter(

@@ -31,12 +31,12 @@ from edge.skin.slot import Slot, State
 from edge.skin.wiring import BusSpec, ChipSpec
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
-"""Before a chip that does not answer is tried again; a try costs a few bits."""
+"""Pauses before a chip that does not answer is tried again; a try costs a few bits."""
 HUNG_PAUSE_S, LONGEST_HUNG_PAUSE_S = 0.05, 1.0
-"""Before a hung chip is: a try costs the adapter's timeout. Each pause is four times
-the one before."""
+"""Pauses before a chip that hung is; a try costs the adapter's timeout. Each pause is four times the
+one before."""
 GONE_PAUSE_S = 0.05
-"""Between two tries to open a bus whose adapter has gone."""
+"""Pause between two tries to open a bus whose adapter has gone."""
 RETRIES_PER_FRAME = 12
 STEPS_PER_FRAME = 128
 """Most transactions a frame spends on bringing chips back; on a real wire its time ends them."""
