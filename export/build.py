@@ -10,7 +10,7 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from train.projection import FINE, Grid
+from train.projection import FINE, RoundingGrid
 
 OPSET = 18
 
@@ -108,7 +108,7 @@ class Affine(Protocol):
 
     mean_: NDArray[np.float64]
     gain_: NDArray[np.float64]
-    grid_: Grid
+    grid_: RoundingGrid
     weights_: NDArray[np.float64]
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from train.candidates import Candidate, costs, groupable
 from train.dataset import NO_CONTACT, DataSet
 from train.evaluate import (
+    AnswerTable,
     Result,
     SearchGrid,
-    Table,
     choose,
     evaluate,
     group_folds,
@@ -97,7 +97,7 @@ class Choosing:
             many = GROUP_FOLDS if len(groups) <= FEW else 10
             self._group_folds = group_folds(groups, QUICK_FOLDS if quick else many)
 
-    def _table(self, X: NDArray[np.float64], grouped: bool, what: str, nested: bool) -> Table:
+    def _table(self, X: NDArray[np.float64], grouped: bool, what: str, nested: bool) -> AnswerTable:
         y, grids = self._y, self._grids
         if grouped:
             grids = [_unseen(grid) for grid in grids]
@@ -150,7 +150,7 @@ class Choosing:
         ]
         return best, notes
 
-    def choose(self, window_s: float) -> tuple[dict[str, Chosen], Table]:
+    def choose(self, window_s: float) -> tuple[dict[str, Chosen], AnswerTable]:
         """What each task is fitted with, and the candidates' answers to single trials."""
         X = self._dataset.features(window_s, self._samples)
         trials = self._table(X, False, "choosing", nested=True)
@@ -193,7 +193,7 @@ def _among(choices: Sequence[Choice], names: Set[str], unseen: bool) -> NDArray[
 
 
 def without_folds(
-    trials: Table, dataset: DataSet, samples: int, chosen: Mapping[str, Chosen]
+    trials: AnswerTable, dataset: DataSet, samples: int, chosen: Mapping[str, Chosen]
 ) -> list[dict[str, Choice]]:
     """{task: what is chosen without it} of each fold, of the features that the model takes."""
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))

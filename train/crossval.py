@@ -19,7 +19,7 @@ from tqdm import tqdm
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.distance import running_squares
-from train.projection import Grid, Spectrum, gains_of, on_grid
+from train.projection import RoundingGrid, Spectrum, gains_of, on_grid
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -57,7 +57,7 @@ def split_neighbours(
     known = X[train]
     scaled = (X - known.mean(axis=0)) * gains_of(known, scaling, features)
     axes = Spectrum(scaled[train]).leading(max_components)
-    exact = Grid(np.abs(scaled[train]).max(initial=0.0))
+    exact = RoundingGrid(np.abs(scaled[train]).max(initial=0.0))
     z = exact.project(scaled, on_grid(axes.T))
     places, queries = z[train], z[test]
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)

@@ -236,7 +236,7 @@ def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]
 
 
 @dataclass(frozen=True)
-class Table:
+class AnswerTable:
     """Every candidate's answers to every trial, by fits that had not seen it.
 
     Attributes:
@@ -336,7 +336,7 @@ def evaluate(
     jobs: int = 1,
     progress: str | None = None,
     nested: bool = True,
-) -> Table:
+) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
 
     Args:
@@ -348,8 +348,8 @@ def evaluate(
         widths: columns of each; equal where None.
         jobs: processes.
         progress: what a bar on stderr is called; none without it.
-        nested: without it only the fits without each fold are made: `Table.held_out` is all there
-            is, by a fifth of the work.
+        nested: without it only the fits without each fold are made: `AnswerTable.held_out` is all
+            there is, by a fifth of the work.
 
     Raises:
         InputError: there are fewer than three folds, or X is not finite.
@@ -391,4 +391,4 @@ def evaluate(
             for one, other in {(i, j), (j, i)}:
                 own = folds[test] == other
                 right[task][one][:, test[own]] = answers[:, own]
-    return Table(folds, choices, right)
+    return AnswerTable(folds, choices, right)

@@ -315,7 +315,7 @@ def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.ascontiguousarray(np.ldexp(np.rint(np.ldexp(weights, powers)), -powers))
 
 
-class Grid:
+class RoundingGrid:
     """Differences from a mean, split so that their products with weights add up exactly.
 
     The high half is a whole number of units, the low half what is left in units of `FINE`.
@@ -414,7 +414,7 @@ class Projection(TransformerMixin, BaseEstimator):
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
-        self.grid_ = Grid(largest)
+        self.grid_ = RoundingGrid(largest)
         return self
 
     def _axes(

@@ -33,8 +33,8 @@ from edge.skin.wiring import BusSpec, ChipSpec
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
 """Pauses before a chip that does not answer is tried again; a try costs a few bits."""
 HUNG_PAUSE_S, LONGEST_HUNG_PAUSE_S = 0.05, 1.0
-"""Pauses before a chip that hung is; a try costs the adapter's timeout. Each pause is four times the
-one before."""
+"""Pauses before a chip that hung is; a try costs the adapter's timeout. Each pause is four times
+the one before."""
 GONE_PAUSE_S = 0.05
 """Pause between two tries to open a bus whose adapter has gone."""
 RETRIES_PER_FRAME = 12

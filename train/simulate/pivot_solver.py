@@ -29,7 +29,7 @@ Answer = tuple[float, float, float, float, float]
 """F and M, and the stiffness there: the whole, its mean lever, its spread about that."""
 
 
-class Contact(NamedTuple):
+class PivotContact(NamedTuple):
     """One trial's springs: gaps, stiffness and number of each spring by depth; weight, gap, lever
     and viscous load of each row; and what the arm does within the step, y = free - C (F, M)."""
 
@@ -53,7 +53,7 @@ class Contact(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def contact_of(
     springs: Springs, i: int, rows: tuple[Array, ...], free: Coordinates, c: Coordinates
-) -> Contact:
+) -> PivotContact:
     """Trial i's, its rows gathered into scratch arrays."""
     weight, line_gap, lever, load, held = rows
     viscous = springs.load.shape[0] > 0
@@ -64,7 +64,7 @@ def contact_of(
         if viscous:
             load[row] = springs.load[row, i]
     gain = springs.gain[i] if viscous else 1.0
-    return Contact(
+    return PivotContact(
         springs.gaps[i],
         springs.stiffness[i],
         springs.column[i],
@@ -84,7 +84,7 @@ def contact_of(
 
 
 @njit(cache=True, error_model="numpy")
-def answer(contact: Contact, alive: Array, i: int, y0: float, y1: float, out: Array) -> Answer:
+def answer(contact: PivotContact, alive: Array, i: int, y0: float, y1: float, out: Array) -> Answer:
     """The loads of trial i's springs at y, and their stiffness; each row's force into `out`."""
     gaps, stiffness, column = contact.gaps, contact.stiffness, contact.column
     weight, line_gap, lever = contact.weight, contact.line_gap, contact.lever
@@ -126,7 +126,7 @@ def answer(contact: Contact, alive: Array, i: int, y0: float, y1: float, out: Ar
 
 
 @njit(cache=True, error_model="numpy")
-def newton_step(at: Contact, y0: float, y1: float, found: Answer) -> tuple[float, float]:
+def newton_step(at: PivotContact, y0: float, y1: float, found: Answer) -> tuple[float, float]:
     """p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean lever, where
     H is diagonal and the determinant a sum of positive terms: no digits are lost at 1e15 N/m."""
     force, moment, whole, mean, spread = found
@@ -142,7 +142,7 @@ def newton_step(at: Contact, y0: float, y1: float, found: Answer) -> tuple[float
 
 
 @njit(cache=True, error_model="numpy")
-def slope(at: Contact, y0: float, y1: float, found: Answer, p0: float, p1: float) -> float:
+def slope(at: PivotContact, y0: float, y1: float, found: Answer, p0: float, p1: float) -> float:
     """Of the energy at y along -p."""
     det = at.c00 * at.c11 - at.c01 * at.c01
     d0, d1 = y0 - at.free0, y1 - at.free1
@@ -152,7 +152,7 @@ def slope(at: Contact, y0: float, y1: float, found: Answer, p0: float, p1: float
 
 
 @njit(cache=True, error_model="numpy")
-def agree(at: Contact, y0: float, y1: float, found: Answer) -> tuple[float, float]:
+def agree(at: PivotContact, y0: float, y1: float, found: Answer) -> tuple[float, float]:
     """The loads at the solution, from the side that has more digits: a stiff bed's depth is
     all rounding, while what the arm has given way is not."""
     force, moment, stiffness = found[0], found[1], found[2]

@@ -232,7 +232,7 @@ def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> f
 
 
 @dataclass(frozen=True)
-class Novelty:
+class NoveltyCount:
     """Contacts with objects that were trained, and with objects that were not.
 
     Attributes:
@@ -253,7 +253,7 @@ def novelty(
     features: Sequence[str],
     widths: Sequence[int] | None = None,
     rates: Sequence[float] = RATES,
-) -> list[Novelty]:
+) -> list[NoveltyCount]:
     """A third of the labels is left out whole, in turn; of the others a fold at a time is known.
 
     Args:
@@ -289,7 +289,7 @@ def novelty(
         return []
     near, far = np.concatenate(known), np.concatenate(strange)
     return [
-        Novelty(rate, len(near), (len(far), int((far > np.quantile(near, 1.0 - rate)).sum())))
+        NoveltyCount(rate, len(near), (len(far), int((far > np.quantile(near, 1.0 - rate)).sum())))
         for rate in rates
     ]
 

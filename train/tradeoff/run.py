@@ -192,7 +192,7 @@ def _vectors(
 
 def _early(
     dataset: DataSet, y: Labels, jobs: int
-) -> tuple[dict[str, early.StoppingComparison], dict[str, Choice], list[early.Novelty]]:
+) -> tuple[dict[str, early.StoppingComparison], dict[str, Choice], list[early.NoveltyCount]]:
     """Early stopping of every task, what all trials choose, and objects left out whole."""
     X = np.stack([dataset.features(window, SAMPLES, NAMES) for window in DECISION_POINTS_S])
     columns = dataset.widths(SAMPLES)

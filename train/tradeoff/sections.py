@@ -203,7 +203,7 @@ def stopping(
     return Section("As soon as it is sure", text, [asked, fixed, sure], figures)
 
 
-def unknown(task: str, found: Sequence[early.Novelty]) -> Section:
+def unknown(task: str, found: Sequence[early.NoveltyCount]) -> Section:
     """How often contacts with known and with new objects are called unknown."""
     table = Table(
         "unknown",
