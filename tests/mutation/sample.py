@@ -3,7 +3,8 @@
 200 places are drawn by a seed, 50 of each kind: comparisons, arithmetic, constants and
 conditions. A change is made on a copy of the tree, and the tests that run through its line are
 asked, the fastest first. What survives is printed with its line; `EQUIVALENT` says of those that
-change nothing why they do not, and they count as neither.
+change nothing why they do not: they are not tried, and count as neither. `--part 1/4` tries a
+quarter of them, and `--reach FILE` keeps which tests run through which line for the next part.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
+from edge.files import write_whole
 from tests.mutation import runner, shapes
 from tests.mutation.equivalent import EQUIVALENT
 
@@ -68,6 +70,11 @@ class Change:
     def name(self) -> str:
         """File, line and change, for people."""
         return f"{self.file}:{self.line}: {self.old}  ->  {self.new}"
+
+    @property
+    def same(self) -> str:
+        """Why it changes nothing; "" where it does."""
+        return EQUIVALENT.get((self.file, f"{self.old}  ->  {self.new}"), "")
 
 
 def others(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
@@ -133,8 +140,20 @@ def drawn(count: int, seed: int) -> list[Change]:
     return out
 
 
-def reach() -> dict[str, dict[str, list[str]]]:
-    """{file: {line: the tests that run through it, the fastest first}}."""
+def reach(kept: Path | None) -> dict[str, dict[str, list[str]]]:
+    """{file: {line: the tests that run through it, the fastest first}}, from `kept` if there."""
+    if kept is not None and kept.exists():
+        stored: dict[str, dict[str, list[str]]] = json.loads(kept.read_text())
+        return stored
+    found = measured()
+    if kept is not None:
+        with write_whole(kept) as file:
+            file.write(json.dumps(found).encode())
+    return found
+
+
+def measured() -> dict[str, dict[str, list[str]]]:
+    """What the tests run through, by running them all."""
     with tempfile.NamedTemporaryFile(suffix=".json") as kept:
         words = ["-q", "-p", "tests.mutation.reach", "-p", "no:xdist", *ASKED]
         environment = {**os.environ, "REACH_FILE": kept.name, "PYTHONPATH": str(shapes.ROOT)}
@@ -166,21 +185,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=2012)
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--only", default="", help="changes whose line holds this text")
+    parser.add_argument("--part", default="1/1", help="such as 2/4: the second quarter")
+    parser.add_argument("--reach", type=Path, help="keep here which tests run through which line")
     arguments = parser.parse_args(argv)
+    part, parts = map(int, arguments.part.split("/"))
     chosen = [c for c in drawn(arguments.count, arguments.seed) if arguments.only in c.name]
-    reached = reach()
-    alive, same = 0, 0
-    work = [job(change, reached) for change in chosen]
+    chosen = chosen[part - 1 :: parts]
+    alive, tried = 0, [change for change in chosen if not change.same]
+    for change in chosen:
+        if change.same:
+            print(f"SAME     {change.name}\n         {change.same}")
+    reached = reach(arguments.reach)
+    work = (job(change, reached) for change in tried)
     for one, noticed, took in runner.run(work, arguments.jobs):
-        file, _, what = one.name.split(":", 2)
-        reason = EQUIVALENT.get((file, what.strip()), "")
-        same += not noticed and bool(reason)
-        alive += not noticed and not reason
-        verdict = "killed  " if noticed else "SAME    " if reason else "SURVIVED"
-        print(f"{verdict} {one.name}\n         {noticed or reason} [{took:.0f} s]", flush=True)
-    judged = len(work) - same
-    print(f"{judged - alive} of {judged} changes are noticed; {same} more change nothing")
-    return 1 if judged - alive < SHARE * judged else 0
+        alive += not noticed
+        verdict = "killed  " if noticed else "SURVIVED"
+        print(f"{verdict} {one.name}\n         {noticed} [{took:.0f} s]", flush=True)
+    same = len(chosen) - len(tried)
+    print(f"{len(tried) - alive} of {len(tried)} changes are noticed; {same} more change nothing")
+    return 1 if len(tried) - alive < SHARE * len(tried) else 0
 
 
 if __name__ == "__main__":
