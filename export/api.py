@@ -12,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge import __version__
 from edge.files import write_whole
@@ -240,6 +241,14 @@ def warnings(fitted: Fitted) -> list[str]:
                 f"warning: {task}: the trials span {classifier.components_[task]} components, "
                 f"{dropped} fewer than asked for"
             )
+        rows = classifier.rows_[classifier.spaces_[task]][:, : classifier.components_[task]]
+        alike = told_by_order(rows, classifier.labels_[task])
+        if alike:
+            lines.append(
+                f"warning: {task}: {alike} trials equal one of another label in all that the model "
+                "looks at; of equal trials the one that was read first counts as nearer, so their "
+                "order decides the label"
+            )
         gap = classifier.projections_[classifier.spaces_[task]].gap_
         if gap < CLOSE_EIGENVALUES:
             lines.append(
@@ -247,6 +256,14 @@ def warnings(fitted: Fitted) -> list[str]:
                 "which of them is kept is arbitrary"
             )
     return lines
+
+
+def told_by_order(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
+    """How many rows (n, c) equal a row of another label (n,)."""
+    _, group = np.unique(rows, axis=0, return_inverse=True)
+    labels_of = np.zeros((len(rows), int(labels.max()) + 1), dtype=bool)
+    labels_of[group.ravel(), labels] = True
+    return int((labels_of.sum(axis=1) > 1)[group.ravel()].sum())
 
 
 def told_by_posture(dataset: DataSet, task: str) -> float:

@@ -11,7 +11,7 @@ from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load, save
-from export.api import LEAK, measure, report, told_by_posture, warnings
+from export.api import LEAK, measure, report, told_by_order, told_by_posture, warnings
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +106,21 @@ def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert told_by_posture(fitted.dataset, "object") == 0.0 < LEAK
     assert not any(line.startswith("warning: object") for line in warnings(fitted))
+
+
+def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
+    """One touch stored under three names, twice with its own label and once with another."""
+    for path in sorted(recordings.glob("*.npz")):
+        save(tmp_path / path.name, load(path))
+    touch = load(path)
+    save(tmp_path / "again.npz", touch)
+    other = {**touch.labels, "object": "another"}
+    save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
+    fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
+    said = [line for line in warnings(fitted) if "equal one of another label" in line]
+    assert [line.split(" equal")[0] for line in said] == ["warning: object: 3 trials"]
+
+
+def test_rows_that_are_equal_but_for_rounding_are_not_equal():
+    rows = np.array([[0.0], [1.0], [0.0], [1.0 + 1e-15], [2.0], [2.0]])
+    assert told_by_order(rows, np.array([0, 1, 1, 0, 1, 1])) == 2
