@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import mpmath
 import numpy as np
 from hypothesis import strategies as st
 
@@ -12,6 +15,9 @@ from edge.touch.track import ContactTracker, TrackSettings
 from tests.hard_cases.adversarial import FAMILIES, judged
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM
+from tests.hard_cases.models import Array, Ours, features
+from tests.hard_cases.neighbours import LISTS, WHOLE, near_duplicates
+from train.projection import MOST_COLUMNS, Projection
 
 FAMILY_GROUP = "ties and gaps"
 TOLD = 2.0**-48
@@ -19,12 +25,18 @@ TOLD = 2.0**-48
 a coordinate carries an error of at most 2^-52 of it, a sum of 20 squares and a root add a few."""
 
 
-def skin_error(side: int, across: bool) -> float:
-    """Error of area, peak and centroid of a block at full scale, over a quarter of the columns."""
+def skin_error(side: int, across: bool, full: bool = False) -> float:
+    """Error of area, peak and centroid of a block at full scale, over a quarter of the columns.
+
+    Args:
+        side: rows and columns.
+        across: the block lies across the seam.
+        full: it is every taxel instead.
+    """
     side = int(side)
     counts = np.zeros((side, side), np.uint16)
-    width = side // 4
-    first = -(width // 2) if across else width
+    width = side if full else side // 4
+    first = 0 if full else -(width // 2) if across else width
     counts[:, np.arange(first, first + width) % side] = 65535
     region = largest_region(counts, 50, wraps=True)
     assert region is not None
@@ -72,6 +84,71 @@ def clock_usual() -> str:
     return f"float32 times at 1.7e9 s: {len(np.unique(t))} of {len(t)} frames are told apart"
 
 
+COURSES = ("log_max_force", "sqrt_max_force", "log_second_force", "sqrt_second_force")
+"""Of the contact, and of a second region that is not there: a logarithm of its floor alone."""
+
+
+def transform_error(counts: int, scale: float) -> float:
+    """Largest error of a logarithm or root of a constant force, over the larger of it and 1."""
+    layout = replace(FOREARM, counts_per_newton=scale)
+    tracker = ContactTracker(layout, TrackSettings(debounce=1), horizon_s=1.2, features=COURSES)
+    frame = np.zeros((16, 24), np.uint16)
+    frame[4:6, 5:8] = counts
+    contact, *_ = (c for i in range(130) for c in tracker.push(Frame(i / 100.0, frame)))
+    seen = feature_vector(contact.series(), 1.2, 8, COURSES).reshape(4, 8)
+    with mpmath.workdps(50):
+        force = mpmath.mpf(int(counts)) / mpmath.mpf(scale)
+        floor = mpmath.mpf(layout.threshold_counts + 1) / mpmath.mpf(scale)
+        true = [mpmath.log(force + floor), mpmath.sqrt(force), mpmath.log(floor), mpmath.mpf(0)]
+        errors = [
+            abs(mpmath.mpf(value) - want) / max(1, abs(want))
+            for row, want in zip(seen.tolist(), true, strict=True)
+            for value in row
+        ]
+        return float(max(errors))
+
+
+def transform_usual() -> str:
+    """NumPy's logarithm of a zone that feels nothing."""
+    return f"np.log of a force of 0: {np.log(0.0)}, which a scaler and PCA pass on as NaN"
+
+
+def column_error(columns: int, seed: int) -> float:
+    """Coordinates that change with the order in which products are added."""
+    X = np.random.default_rng(seed).normal(size=(12, int(columns)))
+    p = Projection("none", 6, ["max_force"]).fit(X)
+    z, d = p.transform(X), (X - p.mean_) * p.gain_
+    order = np.random.default_rng(seed + 1).permutation(int(columns))
+    return float((p.grid_.project(d[:, order], p.weights_[order]) != z).sum())
+
+
+def column_usual() -> str:
+    """The same products added up in float64."""
+    X = np.random.default_rng(0).normal(size=(12, MOST_COLUMNS))
+    p = Projection("none", 6, ["max_force"]).fit(X)
+    order = np.random.default_rng(1).permutation(MOST_COLUMNS)
+    differ = (X @ p.weights_ != X[:, order] @ p.weights_[order]).sum()
+    return f"float64 alone: {differ} of {12 * 6} coordinates differ at {MOST_COLUMNS} columns"
+
+
+def far_queries(factor: float, seed: int) -> tuple[Array, Array]:
+    """Near-duplicate rows, and queries that lie so many times their size outside."""
+    X, _ = near_duplicates(60, 1e-9, seed)
+    return X, X[:12] + factor * features(12, seed + 1)
+
+
+def reach_error(factor: float, seed: int) -> float:
+    """Queries with other neighbours than exact arithmetic finds, and no flag."""
+    X, queries = far_queries(factor, seed)
+    return float(Ours(X).unflagged(queries))
+
+
+def reach_usual() -> str:
+    """Without the flag."""
+    X, queries = far_queries(1e6, 0)
+    return f"without the flag: {Ours(X).judged(queries)[0]} of {len(queries)} lists are others"
+
+
 def family_error(family: str, seed: int, sets: int) -> float:
     """The largest difference of distances that was told wrongly without a flag."""
     return max(judged(family, seed + i).missed for i in range(sets))
@@ -85,7 +162,11 @@ CASES = [
         "taxels, counts",
         0,
         skin_error,
-        [{"side": side, "across": across} for side in (16, 64, 256) for across in (True, False)],
+        [
+            *({"side": side, "across": True} for side in (16, 64, 256)),
+            *({"side": side, "across": False} for side in (16, 64, 256)),
+            {"side": 256, "across": False, "full": True},
+        ],
         {"side": st.integers(4, 64).map(lambda n: 4 * n), "across": st.booleans()},
         usual=skin_usual,
     ),
@@ -100,6 +181,47 @@ CASES = [
         {"start": st.floats(0.0, 9.2).map(lambda e: 10.0**e)},
         usual=clock_usual,
         examples=5,
+    ),
+    Case(
+        "limits",
+        "logarithms at their floor, square roots",
+        "mpmath, 50 digits",
+        "error over the larger of the value and 1",
+        1e-15,
+        transform_error,
+        [{"counts": 51, "scale": 1.0}, {"counts": 65535, "scale": 2250.0}],
+        {
+            "counts": st.integers(51, 65535),
+            "scale": st.floats(-12.0, 12.0).map(lambda e: 10.0**e),
+        },
+        usual=transform_usual,
+    ),
+    Case(
+        "limits",
+        "values a trial, to 4096 of them",
+        "the same sums in another order",
+        "coordinates with other bits",
+        0,
+        column_error,
+        [{"columns": columns, "seed": 0} for columns in (128, 129, MOST_COLUMNS)],
+        {"columns": st.integers(6, 600), "seed": st.integers(0, 10**6)},
+        usual=column_usual,
+        examples=6,
+    ),
+    Case(
+        "limits",
+        "queries within RANGE (4) of the training set's size, and beyond",
+        WHOLE,
+        f"{LISTS}, without the flag",
+        0,
+        reach_error,
+        [{"factor": factor, "seed": 0} for factor in (1.0, 4.0, 1e3, 1e12)],
+        {
+            "factor": st.floats(-3.0, 20.0).map(lambda e: 10.0**e),
+            "seed": st.integers(0, 10**6),
+        },
+        usual=reach_usual,
+        examples=6,
     ),
     *(
         Case(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -11,6 +13,7 @@ from tests.train.simulate.test_simulate_stability import (
     SPEED,
     cases,
     judge,
+    ledger,
     lugre,
     naive_push,
     tilt_cases,
@@ -20,12 +23,13 @@ from tests.train.simulate.test_simulate_stability import (
 from train.simulate import contact
 
 SEEDS = st.integers(0, 10**6)
+SOME_MASSES = 10.0 ** np.arange(-9, 10, 3)
 
 
-def judged(
+def pushed(
     stiffness: np.ndarray, mass: np.ndarray, h: np.ndarray, mu: np.ndarray, steps: int
-) -> float:
-    """Cases with a complaint, of a push against a spring with friction."""
+) -> Any:
+    """The trace of pushes against springs with friction."""
     rig = Rig(
         h=h,
         speed=SPEED,
@@ -36,7 +40,14 @@ def judged(
         friction_static=mu,
         friction_kinetic=0.8 * mu,
     )
-    trace = rig.run(steps)
+    return rig.run(steps)
+
+
+def judged(
+    stiffness: np.ndarray, mass: np.ndarray, h: np.ndarray, mu: np.ndarray, steps: int
+) -> float:
+    """Cases with a complaint, of a push against a spring with friction."""
+    trace = pushed(stiffness, mass, h, mu, steps)
     wrong = 0
     for i in range(stiffness.size):
         one = type(trace)(**{k: v[:, i : i + 1] for k, v in vars(trace).items()})
@@ -51,6 +62,21 @@ def grid_error(steps: int) -> float:
 def around_error(stiffness: float, mass: float, h: float, mu: float) -> float:
     one = [np.array([10.0**stiffness]), np.array([10.0**mass]), np.array([10.0**h])]
     return judged(*one, np.array([mu]), 60)
+
+
+def energy_error(h: float, mu: float, steps: int) -> float:
+    """Largest part of the energy at hand that a step made out of nothing, 1e-3 to 1e15 N/m."""
+    stiffness, mass = (a.ravel() for a in np.meshgrid(10.0 ** np.arange(-3, 16), SOME_MASSES))
+    trace = pushed(stiffness, mass, np.full(mass.size, h), np.full(mass.size, mu), steps)
+    lost, scale, _ = ledger(trace, stiffness, mass, 0.8 * mu)
+    made = np.divide(-lost, scale, out=np.zeros_like(lost), where=scale > 0.0)
+    return float(np.nan_to_num(made, nan=np.inf).max(initial=0.0))
+
+
+def energy_usual() -> str:
+    return (
+        f"explicit LuGre at 10 ms: its bristles' energy grows to {lugre(0.01, explicit=True):.0e}"
+    )
 
 
 def grid_usual() -> str:
@@ -118,6 +144,22 @@ CASES = [
         grid_error,
         [{"steps": 40}],
         usual=grid_usual,
+    ),
+    Case(
+        "simulator",
+        "energy of a push, 1e-3 to 1e15 N/m, 1e-9 to 1e9 kg",
+        "energy ledger",
+        "energy made, of all at hand",
+        1e-12,
+        energy_error,
+        [{"h": h, "mu": 0.5, "steps": 60} for h in (1e-3, 0.01, 0.2)],
+        {
+            "h": st.floats(-3.0, -0.7).map(lambda e: 10.0**e),
+            "mu": st.floats(0.05, 1.0),
+            "steps": st.just(30),
+        },
+        energy_usual,
+        examples=4,
     ),
     Case(
         "simulator",

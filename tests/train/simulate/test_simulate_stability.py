@@ -53,7 +53,21 @@ def judge(trace, stiffness, mass, h, mu_s, mu_k):
         complaints.append("creeps in stick")
     if ((force > hold * (1 + 1e-12)) & stuck).any():
         complaints.append("sticks under more than it holds")
-    # The ledger: the target's motion at fixed q puts energy in; after that nothing may add any.
+    lost, scale, friction = ledger(trace, stiffness, mass, mu_k)
+    if (lost < -1e-12 * scale).any():
+        complaints.append("energy made")
+    if (friction < 0.0).any():
+        complaints.append("friction gives energy")
+    return complaints
+
+
+def ledger(trace, stiffness, mass, mu_k):
+    """Energy lost in each step, all that took part in it, and what friction took of it.
+
+    The target's motion at fixed q puts energy in; after that nothing may add any.
+    """
+    force = trace.force
+    moved = trace.slide - np.vstack([np.zeros(force.shape[1]), trace.slide[:-1]])
     q0 = np.vstack([np.zeros(force.shape[1]), trace.q[:-1]])
     f0 = np.vstack([np.zeros(force.shape[1]), force[:-1]])
     v0 = np.vstack([np.zeros(force.shape[1]), trace.speed[:-1]])
@@ -63,12 +77,7 @@ def judge(trace, stiffness, mass, h, mu_s, mu_k):
     arm1 = 0.5 * ARM_K * (trace.target - trace.q) ** 2
     friction = mu_k * mass * GRAVITY * moved
     lost = (stored0 + arm0) - (stored1 + arm1) - friction
-    scale = stored0 + arm0 + stored1 + arm1 + friction
-    if (lost < -1e-12 * scale).any():
-        complaints.append("energy made")
-    if (friction < 0.0).any():
-        complaints.append("friction gives energy")
-    return complaints
+    return lost, stored0 + arm0 + stored1 + arm1 + friction, friction
 
 
 class TestGrid:
