@@ -235,22 +235,28 @@ class Found:
     Attributes:
         queries: how many were asked.
         close: of them flagged as closer than can be told.
+        other: of the flagged, those whose neighbours, order or label are not the oracle's.
         wrong: neighbours, order or label other than the oracle's, without the flag.
         engines: neighbours or labels that differ between engines, and queries asked of both.
         gap: the smallest part of a distance by which two neighbours in a right, unflagged order
             differ, where they differ at all.
         missed: the largest difference of two distances that was told wrongly, as a part of the
             size of the training rows and the query.
-        worst: (family, seed) where wrong, then of the smallest gap.
+        worst: (family, seed) where wrong, then where most were other, then of the smallest gap.
+        hardest: by which it is the worst.
+        refused: sets that cannot be fitted, by a sentence.
+        bad: seeds of sets with a wrong answer.
     """
 
     queries: int = 0
     close: int = 0
+    other: int = 0
     wrong: int = 0
     engines: tuple[int, int] = (0, 0)
     gap: float = np.inf
     missed: float = 0.0
     worst: tuple[str, int] | None = None
+    hardest: tuple[float, ...] = ()
     refused: int = 0
     bad: list[int] = field(default_factory=list)
 
@@ -258,21 +264,26 @@ class Found:
         """Take in another's."""
         if other.wrong or other.engines[0]:
             self.bad.append(seed[1])
-        harder = (other.wrong + other.engines[0], -other.gap)
-        if self.worst is None or harder > (int(bool(self.bad[:-1])), -self.gap):
-            self.worst = seed
+        harder = (other.wrong + other.engines[0], other.other, -other.gap)
+        if self.worst is None or harder > self.hardest:
+            self.worst, self.hardest = seed, harder
         self.queries += other.queries
         self.close += other.close
+        self.other += other.other
         self.wrong += other.wrong
         self.refused += other.refused
         self.engines = (self.engines[0] + other.engines[0], self.engines[1] + other.engines[1])
         self.gap, self.missed = min(self.gap, other.gap), max(self.missed, other.missed)
 
 
+def made(family: str, seed: int) -> Hard:
+    """A set of a family."""
+    return FAMILIES[family](np.random.default_rng([list(FAMILIES).index(family), seed]))
+
+
 def judged(family: str, seed: int, reference: bool = False) -> Found:
     """Fit, export, ask and judge one set."""
-    number = list(FAMILIES).index(family)
-    hard = FAMILIES[family](np.random.default_rng([number, seed]))
+    hard = made(family, seed)
     names = np.array([f"c{label}" for label in hard.y])
     found = Found()
     try:
@@ -302,6 +313,7 @@ def judged(family: str, seed: int, reference: bool = False) -> Found:
         right = seen == wanted and decision.label == winner
         if decision.close:
             found.close += 1
+            found.other += not right
         elif right:
             found.gap = min(found.gap, smallest_gap(squares, hard.choice.k))
         else:
@@ -391,19 +403,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--keep", action="store_true", help="put the worst into the corpus")
     arguments = parser.parse_args(argv)
     chosen = [family for family in FAMILIES if arguments.only in family]
-    kept, bad, asked, flagged = corpus(), 0, 0, 0
+    kept, bad, asked, flagged, other = corpus(), 0, 0, 0, 0
     for family, found in search(chosen, arguments.sets, arguments.jobs, arguments.first):
         bad += found.wrong + found.engines[0]
         asked, flagged = asked + found.queries, flagged + found.close
+        other += found.other
         print(
             f"{family:<16} {found.queries:>6} queries  {found.wrong:>4} wrong without a flag "
-            f"(by up to {found.missed:.0e} of the rows' size)  {found.close:>4} close  "
-            f"engines differ in {found.engines[0]} of {found.engines[1]}  "
+            f"(by up to {found.missed:.0e} of the rows' size)  {found.close:>4} close, "
+            f"{found.other} of them rightly  engines differ in {found.engines[0]} of "
+            f"{found.engines[1]}  "
             f"smallest gap told {found.gap:.0e}  {found.refused} sets refused", flush=True,
         )  # fmt: skip
         print(f"{'':<16} worst: seed {found.worst and found.worst[1]}; wrong: {found.bad[:8]}")
         kept += [(family, seed) for seed in found.bad[:3]] + ([found.worst] if found.worst else [])
-    print(f"{asked} queries, {bad} wrong; {flagged} flagged as close")
+    print(f"{asked} queries, {bad} wrong; {flagged} flagged as close, {other} of them rightly")
     if arguments.keep:
         lines = ",\n".join(f"  {json.dumps(entry)}" for entry in sorted(set(kept)))
         CORPUS.write_text(f"[\n{lines}\n]\n")

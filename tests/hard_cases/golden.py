@@ -24,7 +24,8 @@ from export.__main__ import main as export
 from export.api import describe
 from export.graph import to_onnx
 from tests.conftest import FOREARM, touch
-from tests.hard_cases.models import Array, features, labels_for
+from tests.hard_cases.adversarial import Hard, corpus, made
+from tests.hard_cases.models import features, labels_for
 from tests.hard_cases.neighbours import SHORT, lattice, near_duplicates, offset_data
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
@@ -83,10 +84,10 @@ def hard_trials(folder: Path) -> DataSet:
     return load_trials([folder])
 
 
-def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
-    """Training vectors of each hard case, and what is fitted on them."""
+def vectors(dataset: DataSet) -> dict[str, Hard]:
+    """Training vectors of each hard case, with queries, and what is fitted on them."""
     own = dataset.features()
-    return {
+    found = {
         "frames": (own, Choice("IV", 5, 2)),
         "near-duplicates": (near_duplicates(160, 1e-7, 0)[0], Choice("none", 6, 5)),
         "near-duplicates-shortlist": (near_duplicates(SHORT, 1e-7, 0)[0], Choice("none", 6, 5)),
@@ -97,6 +98,9 @@ def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
         "equal-distances": (lattice(0)[0], Choice("none", 3, 8)),
         "duplicates": (np.repeat(features(40), 4, axis=0), Choice("IV", 20, 4)),
     }
+    sets = {name: Hard(X, np.zeros(0, int), X, choice) for name, (X, choice) in found.items()}
+    # The last of each family's hardest sets.
+    return sets | {f"family-{family}": made(family, seed) for family, seed in corpus()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -106,13 +110,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as trials:
         dataset = hard_trials(Path(trials))
-        for name, (X, choice) in vectors(dataset).items():
-            fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels_for(X)})
-            info = describe(dataset, fitted, {}, 1.2, 40)
+        for name, hard in vectors(dataset).items():
+            fitted = ContactClassifier({"t": hard.choice}).fit(hard.X, {"t": labels_for(hard.X)})
+            info = describe(dataset, fitted, {}, 1.2, hard.X.shape[1] // 3)
             folder = arguments.out / name
             with write_whole(folder / "model.onnx") as file:
                 file.write(to_onnx(fitted, info))
-            golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
+            golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, hard.queries)
             print(folder)
         # Decisions before the full window.
         decision_points = ["--decision-points", "0.6:1.2:0.3", "--jobs", "1"]
