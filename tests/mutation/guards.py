@@ -194,6 +194,20 @@ GUARDS = (
         "if False: ...",
     ),
     Guard(
+        "neighbours that rounding may order otherwise are flagged",
+        "edge/model/model.py:decide",
+        "min(map(sub, far[1:], far)) <= resolved",
+        "False",
+        beside=GRAPH,
+    ),
+    Guard(
+        "beyond the range of exact sums less is told apart",
+        "edge/model/model.py:decide",
+        "1.0 if reach <= EXACT_REACH else (len(x) + 4) * reach / EXACT_REACH",
+        "1.0",
+        beside=GRAPH,
+    ),
+    Guard(
         "leave-one-out: equal distances at the partition's limit",
         f"{CROSSVAL}:_nearest",
         "among = np.flatnonzero(near)",
