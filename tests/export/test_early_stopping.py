@@ -8,6 +8,7 @@ import pytest
 
 from edge.classifier import Classifier, stopping_rules
 from edge.errors import InputError
+from edge.events import Decided
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.recording import save
@@ -68,6 +69,28 @@ def test_the_board_stops_where_the_rule_does(early, make_touch):
         assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
+
+
+def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(early, make_touch):
+    model, _ = early
+    recording = make_touch(kind="soft", seed=50, seconds=0.25)
+    classifier = Classifier(
+        model, recording.layout, error=model.info.stopping["category"].smallest_error
+    )
+    decided = [event for event in classifier.classify(recording) if isinstance(event, Decided)]
+    assert [event.task for event in decided] == list(model.info.tasks)
+    assert all("short" in event.flags for event in decided)
+
+
+def test_a_task_without_a_certified_rule_says_so(early, make_touch):
+    model, _ = early
+    classifier = Classifier(model, error=model.info.stopping["category"].smallest_error)
+    classifier._rules["object"] = None
+    decided = [e for e in classifier.classify(make_touch(seed=50)) if isinstance(e, Decided)]
+    assert {event.task: "uncertified" in event.flags for event in decided} == {
+        "category": False,
+        "object": True,
+    }
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):

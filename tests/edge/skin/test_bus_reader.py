@@ -54,6 +54,16 @@ def test_a_hung_chip_costs_its_timeout_and_is_then_tried_less_and_less():
     assert outcome.missed <= 2 * outcome.met
 
 
+def test_a_bus_on_which_nothing_answers_rests_longer_each_time():
+    file = skins()["cody"]
+    with fake_skin(file, Pattern(file)) as skin:
+        reader, pauses = skin.readers[0], []
+        for _ in range(4):
+            reader._give_up(read_any=False)
+            pauses.append(reader._resting_until - reader.bus.now())
+    assert pauses == pytest.approx([0.05, 0.2, 0.8, 1.0])
+
+
 SKINS = skins()
 EVERY = {
     "frame": {"cody": 97, "one bus at 40 Hz": 97},
