@@ -30,7 +30,7 @@ ASKED = ("tests/edge", "tests/golden", "tests/hard_cases")
 """Tests whose way through edge/ is measured."""
 APART = ("tests/edge/commands", "tests/edge/runtime", "tests/test_demo_data.py", "tests/export")
 """Tests that run edge/ in processes of their own, or through an export: asked at the end."""
-MOST_TESTS = 400
+MOST_TESTS = 200
 SHARE = 0.9
 
 COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -176,9 +176,11 @@ def measured() -> dict[str, dict[str, list[str]]]:
 
 def job(change: Change, reached: dict[str, dict[str, list[str]]]) -> runner.Job:
     """The change and those who are asked: the tests of its line, its mirror, those apart."""
-    tests = reached.get(change.file, {}).get(str(change.line), [])[:MOST_TESTS]
-    stages: list[tuple[str, ...]] = [tuple(tests)] if tests else []
     mirror, package = runner.mirror(change.file), Path("tests", change.file).parent
+    # Those of the module itself first, then the fastest.
+    tests = reached.get(change.file, {}).get(str(change.line), [])
+    tests = sorted(tests, key=lambda test: not test.startswith(mirror))[:MOST_TESTS]
+    stages: list[tuple[str, ...]] = [tuple(tests)] if tests else []
     if not tests and (shapes.ROOT / mirror).exists():
         stages.append((mirror,))
     if not tests and package.name != "edge" and (shapes.ROOT / package).is_dir():
