@@ -3,11 +3,11 @@
 The trials are parted into folds. For each two folds every candidate is fitted on all others and
 tested on both, and for each fold on all others and tested on it. Seen from fold i, the tests on
 the other folds by fits without fold i are a whole cross-validation among those others: what it
-chooses was chosen without fold i, and the fit without fold i alone then tells fold i. Scaling,
-projection and neighbours are fitted on a fit's own trials each time, so a trial that is told took
-no part in them, nor in the choice of the features, the projection, the shrinkage, the components
-and k: that is the nested accuracy. A fit without folds i and j serves both i and j, so ten folds
-take 55 fits, not 110.
+chooses was chosen without fold i, and the fit without fold i alone then decides fold i. Scaling,
+projection and neighbours are fitted on a fit's own trials each time, so a trial that is decided
+took no part in them, nor in the choice of the features, the projection, the shrinkage, the
+components and k: that is the nested accuracy. A fit without folds i and j serves both i and j, so
+ten folds take 55 fits, not 110.
 """
 
 from __future__ import annotations
