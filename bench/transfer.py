@@ -29,6 +29,7 @@ EACH = 6
 SLIDES_M, WINDOW_S = 0.02, 1.2
 """What is called movable has moved so far by then, as in the scenes and in the paper."""
 DRAWS = 50
+FALSE_ALARMS = (0.02, 0.05, 0.1)
 
 
 def draw_object(rng: np.random.Generator) -> Thing:
@@ -140,6 +141,26 @@ def score(model: edge.Model, paths: list[Path]) -> dict[str, list[tuple[str, str
     return told
 
 
+def unknown(model: edge.Model, paths: list[Path]) -> list[str]:
+    """How many of the trials a model calls unknown, at each rate of false alarms."""
+    novelty = model.info.novelty
+    if novelty is None:
+        return ["the model has no decision points, and so calls nothing unknown"]
+    rates = []
+    for path in paths:
+        for event in edge.Classifier(model).classify(load(path)):
+            if isinstance(event, edge.Decided) and event.task == novelty.task and event.decision:
+                distance = float(event.decision.distances[0])
+                rates.append(novelty.rate(len(novelty.limits) - 1, distance))
+    lines = ["called unknown, where so many trained contacts would be:"]
+    for false in FALSE_ALARMS:
+        count = sum(rate <= false for rate in rates)
+        low, high = interval(count, len(rates))
+        share = f"{100 * count / len(rates):6.1f} %  ({100 * low:.0f} to {100 * high:.0f})"
+        lines.append(f"{100 * false:>8.0f} %{share}")
+    return lines
+
+
 def report(told: dict[str, list[tuple[str, str]]]) -> str:
     """Accuracies with intervals, and the confusion of categories."""
     lines = []
@@ -206,7 +227,8 @@ def main(arguments: list[str] | None = None) -> int:
     told = parser.parse_args(arguments)
     try:
         paths, again = make_trials(told.out / f"seed{told.seed}", told.trials, told.seed)
-        text = report(score(edge.Model(told.model), paths))
+        model = edge.Model(told.model)
+        text = "\n".join([report(score(model, paths)), "", *unknown(model, paths)])
     except InputError as error:
         print(f"transfer: {error}", file=sys.stderr)
         return 2
