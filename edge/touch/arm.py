@@ -168,7 +168,7 @@ class Chain:
             InputError: as `pose`.
         """
         angles = np.asarray(q).tolist()
-        if len(angles) != self.dof or not math.isfinite(math.fsum(map(abs, angles))):
+        if len(angles) != self.dof or not math.isfinite(sum(map(abs, angles))):
             self.pose(q)  # says what is wrong
         x, y, z = position
         a, b, c, tx, d, e, h, ty, i, j, k, tz = self._tip

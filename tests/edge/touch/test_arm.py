@@ -197,3 +197,8 @@ def test_a_point_refuses_what_the_pose_refuses():
     for bad in (np.nan, np.inf):
         with pytest.raises(InputError, match="is not finite"):
             chain.point([0.0, bad, 0.0, 0.0, 0.0], (0.0, 0.0, 0.0))
+
+
+def test_angles_whose_sum_no_float_holds_are_angles():
+    place = Chain.cody().point([1e308] * 5, (0.0, 0.0, 0.0))
+    np.testing.assert_allclose(place, Chain.cody().pose([1e308] * 5)[:3, 3], atol=1e-12)
