@@ -353,6 +353,31 @@ GUARDS = (
         "NaN",
     ),
     Guard(
+        "a call that the kernel completed in part is no reading",
+        "edge/i2c/bus.py:transfer",
+        "if done != len(prepared.messages): ...",
+        "if False: ...",
+        beside="edge/i2c/smbus2.py",
+    ),
+    Guard(
+        "a count that no touch reaches is not valid",
+        "edge/skin/skin.py:_assemble",
+        "valid &= ~beyond",
+        "pass",
+    ),
+    Guard(
+        "an early joint line ahead of time does not set the offset",
+        "edge/runtime/joint_stream.py:_ahead",
+        "self._delay = [d if d >= quickest - AHEAD_S else quickest for d in self._delay]",
+        "pass",
+    ),
+    Guard(
+        "a decision of a model file takes no more than its size accounts for",
+        "edge/model/onnx_file.py:_node",
+        "self._spend(*made, each=each)",
+        "pass",
+    ),
+    Guard(
         "the tilt's Newton steps are cut back",
         f"{TILT}:search",
         "size *= min(max(begin / (begin - end), 0.1), 0.9)",
