@@ -5,5 +5,18 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "edge/touch/contact.py",
         "256  ->  257",
     ): "the rows that a contact first has room for; more room is made where they are full",
+    (
+        "edge/runtime/joint_stream.py",
+        "arrived > self._window_ends  ->  arrived >= self._window_ends",
+    ): "the least delay is that of two windows together: which of them a line at the limit opens "
+    "or ends changes nothing until a window later, by one line",
+    (
+        "edge/skin/bus_reader.py",
+        "now() >= deadline  ->  now() > deadline",
+    ): "a clock that stands at the deadline to the bit is past it at its next reading",
+    (
+        "edge/touch/region.py",
+        "highest <= self._threshold  ->  highest < self._threshold",
+    ): "a shortcut: a frame whose peak is the threshold has no taxel above it, which is found next",
 }
 """{(file, "old  ->  new"): the reason}."""

@@ -181,7 +181,8 @@ def job(change: Change, reached: dict[str, dict[str, list[str]]]) -> runner.Job:
     tests = reached.get(change.file, {}).get(str(change.line), [])
     tests = sorted(tests, key=lambda test: not test.startswith(mirror))[:MOST_TESTS]
     stages: list[tuple[str, ...]] = [tuple(tests)] if tests else []
-    if not tests and (shapes.ROOT / mirror).exists():
+    # A default or a constant is run through but once, where the module is first imported.
+    if (shapes.ROOT / mirror).exists():
         stages.append((mirror,))
     if not tests and package.name != "edge" and (shapes.ROOT / package).is_dir():
         stages.append((package.as_posix(),))

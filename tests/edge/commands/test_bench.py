@@ -48,6 +48,20 @@ def test_a_cold_start_is_the_median_of_several_in_milliseconds(monkeypatch):
     assert bench.cold_start_ms("model.onnx") == 250.0
 
 
+def test_the_processor_is_the_first_that_is_named(monkeypatch):
+    class File:
+        def __init__(self, name):
+            self.name = name
+
+        def read_text(self, **_):
+            if "device-tree" in self.name:
+                raise FileNotFoundError
+            return "processor\t: 0\nmodel name\t: first\nmodel name\t: second\n"
+
+    monkeypatch.setattr(bench, "Path", File)
+    assert bench.kind() == "first"
+
+
 def test_the_model_is_named_by_its_digest(board, exported):
     data = (exported / "model.onnx").read_bytes()
     assert board["model"]["sha256"] == hashlib.sha256(data).hexdigest()
