@@ -74,7 +74,11 @@ class Change:
     @property
     def same(self) -> str:
         """Why it changes nothing; "" where it does."""
-        return EQUIVALENT.get((self.file, f"{self.old}  ->  {self.new}"), "")
+        line = (shapes.ROOT / self.file).read_text().splitlines()[self.line - 1]
+        for (file, change, part), reason in EQUIVALENT.items():
+            if file == self.file and change == f"{self.old}  ->  {self.new}" and part in line:
+                return reason
+        return ""
 
 
 def others(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
