@@ -27,5 +27,20 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "-1  ->  1",
         "len(messages[-1].buffer)",
     ): "a request and its answer are two messages: the last is the second",
+    (
+        "edge/skin/bus_reader.py",
+        "1000000000.0  ->  1000000001.0",
+        "NEVER",
+    ): "long ago is long ago",
+    (
+        "edge/runtime/event_writer.py",
+        "0.03  ->  1.03",
+        "STUCK_S",
+    ): "a limit on waiting at the end for a reader that is stuck: no line is gained or lost",
+    (
+        "edge/commands/fake.py",
+        "5.0  ->  6.0",
+        "STILL_S",
+    ): "how long a recording of nothing lasts: any time will do",
 }
 """{(file, "old  ->  new", a part of the line): the reason}."""

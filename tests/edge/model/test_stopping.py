@@ -81,6 +81,8 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
 
 def test_what_is_stored_is_read_again():
     assert Stopping.from_dict(stopping().to_dict(), 3) == stopping()
+    at_once = stopping(rules=(StoppingRule(0.2, 0.4, 0.0, 0),), wrong=0)
+    assert Stopping.from_dict(at_once.to_dict(), 3) == at_once
     novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0, 4.0)))
     assert Novelty.from_dict(novelty.to_dict(), 2) == novelty
 

@@ -47,6 +47,11 @@ def test_where_nobody_listens_lines_are_counted_and_the_file_is_whole():
     lines.close()
 
 
+def test_a_datagram_that_finds_no_room_is_lost_rather_than_waited_for():
+    with event_writer._connected("127.0.0.1:9") as sender:
+        assert not sender.getblocking()
+
+
 @pytest.mark.parametrize("address", ["", "47400", ":47400", "127.0.0.1:", "127.0.0.1:0", "a:b:c"])
 def test_an_address_that_makes_no_sense_is_one_sentence(address):
     with pytest.raises(InputError, match="give HOST:PORT"):
