@@ -42,5 +42,15 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "5.0  ->  6.0",
         "STILL_S",
     ): "how long a recording of nothing lasts: any time will do",
+    (
+        "edge/commands/replay.py",
+        "failed += 1  ->  failed -= 1",
+        "",
+    ): "only whether it is 0 is asked, and it goes one way alone",
+    (
+        "edge/touch/contact.py",
+        "True  ->  False",
+        "frozen",
+    ): "nothing assigns to a series: that it cannot be done guards against what is not there",
 }
 """{(file, "old  ->  new", a part of the line): the reason}."""

@@ -45,6 +45,13 @@ def stream(wire, *, ahead=1000.0, delay=0.002, n=10):
         wire.joints.at(wire.now)
 
 
+def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(wire):
+    wire.data = b"\n" * 80
+    wire.send(5.0, [1.0, 2.0])
+    assert wire.at(0.0) == [1.0, 2.0]
+    assert wire.joints.malformed == 81 - 64
+
+
 @pytest.mark.parametrize("ahead", [-50.0, 0.0, 1.7e9])
 def test_the_senders_clock_need_not_be_ours(wire, ahead):
     stream(wire, ahead=ahead)
