@@ -57,5 +57,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "rate < asked  ->  rate <= asked",
         "",
     ): "the rate that wires carry is a quotient, and equals the one asked for to the bit by chance",
+    (
+        "edge/skin/bus_reader.py",
+        "0  ->  1",
+        "self._timeouts = 0",
+    ): "set again where each frame begins",
 }
 """{(file, "old  ->  new", a part of the line): the reason}."""

@@ -185,3 +185,14 @@ def test_a_label_cannot_send_escape_sequences_to_the_terminal():
     summary.add({"object": "\u202ebox\x9b"}, [event])
     assert all(line.isprintable() for line in summary.text().splitlines())
     assert "\\x1b]0;a\\x07" in summary.text()
+
+
+def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
+    summary = Summary({"object": None})
+    labels = [f"a thing with a long name {i:02d}" for i in range(12)]
+    for label in labels:
+        event = {"event": "decision", "task": "object", "label": label, "flags": []}
+        summary.add({"object": label}, [event])
+    head, *rows = summary.text().splitlines()[-13:]
+    assert head.split() == [row.split()[0] for row in rows] == [str(i + 1) for i in range(12)]
+    assert [row.split()[8 + i] for i, row in enumerate(rows)] == ["1"] * 12
