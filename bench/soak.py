@@ -4,7 +4,8 @@
 of all transactions failing, decides on each contact with the model that comes with the program,
 writes events, map and datagrams as `edge-classify run` does, and prints memory, descriptors,
 schedule and lost lines. The exit status is 1 where memory has grown after the first tenth of the
-time, a descriptor or a line was lost, or a tick left out.
+time, a descriptor or a line was lost, or a tick left out. A virtual minute takes about six seconds
+of one core, a day two and a half hours.
 """
 
 from __future__ import annotations
