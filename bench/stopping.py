@@ -108,6 +108,14 @@ def run(arguments: argparse.Namespace) -> int:
         for seconds in sorted({*SHOWN_S, *theirs}):
             shares = " | ".join(f"{100 * at(way, seconds):.1f}" for way in (fixed, sure, twice))
             print(f"| {task} | {seconds:.2f} | {shares} | {theirs.get(seconds, '')} |")
+    for task, found in compared.items():
+        for one in found.certified:
+            if one.folds:
+                print(
+                    f"{task}, asked for {one.asked:g}: certified in {one.folds} of {FOLDS} folds, "
+                    f"{100 * one.wrong:.1f} % wrong ({100 * one.unknown:.1f} % unknown) at "
+                    f"{one.mean_s:.2f} s"
+                )
     return 0
 
 

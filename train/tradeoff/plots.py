@@ -18,6 +18,8 @@ from train.tradeoff.early import StoppingComparison
 
 MOST_ACROSS = 3
 """Panels beside each other."""
+LEAST_SHARE = 0.01
+"""Of the decisions that a point of the reliability diagram stands for."""
 CLOSE = 0.06
 """Shares whose names would cover each other."""
 
@@ -148,13 +150,17 @@ def stopping(found: StoppingComparison, breakaways: Mapping[str, float], task: s
 
 
 def reliability(both: Mapping[str, StoppingComparison]) -> bytes:
-    """Share right against the confidence that was said, a curve a task; points as large as many."""
+    """Share right against the confidence that was said, a curve a task; points as large as many.
+
+    Ranges of confidence with hardly any decisions are left out.
+    """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.6, 4.6), layout="constrained")
         axes = figure.subplots()
         axes.plot([0, 100], [0, 100], "--", lw=1, color="0.55", label="as said")
         for colour, (task, found) in zip(COLOURS, both.items(), strict=False):
-            said, was, counts = np.array(found.reliability()).T
+            bins = np.array(found.reliability())
+            said, was, counts = bins[bins[:, 2] >= LEAST_SHARE * bins[:, 2].sum()].T
             axes.plot(100 * said, 100 * was, "-", lw=1.2, color=colour)
             axes.scatter(
                 100 * said, 100 * was, s=8 + 120 * counts / counts.sum(), color=colour, alpha=0.8,
@@ -164,7 +170,7 @@ def reliability(both: Mapping[str, StoppingComparison]) -> bytes:
         axes.set_ylim(0, 102)
         axes.set_xlabel("confidence, %")
         axes.set_ylabel("decisions that are right, %")
-        axes.legend(fontsize=8, loc="upper left")
+        axes.legend(fontsize=8, loc="lower right")
         return png(figure)
 
 

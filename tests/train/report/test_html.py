@@ -38,6 +38,13 @@ def test_a_table_is_the_same_in_its_csv():
     ]  # fmt: skip
 
 
+def test_a_column_has_as_many_decimals_as_its_numbers_need():
+    rows = [(1, 54.30, 2.0, 0.125), (2, 60.0, 3.0, 0.5)]
+    text = page("t", [], [Section("s", tables=[Table("t", "T", ("n", "a", "b", "c"), rows)])])
+    cells = [part.split("<")[0] for part in text.split('<td class="number">')[1:]]
+    assert cells == ["1", "54.3", "2", "0.12", "2", "60.0", "3", "0.50"]
+
+
 def test_what_a_clock_measured_stands_in_a_file_of_its_own():
     files = table_csv(table(timed=("seconds",)))
     assert sorted(files) == ["speed.csv", "speed_timings.csv"]

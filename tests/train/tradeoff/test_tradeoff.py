@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from train.__main__ import main as train
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.pipeline import Choice
 from train.study.score import Result
-from train.tradeoff import board, early
+from train.tradeoff import answer, board, early
 from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
@@ -223,6 +224,17 @@ class TestEarly:
         assert found.calibration_error == pytest.approx(0.0)
         assert comparison(share_right(0.9, 0.9, 0.9)).calibration_error == pytest.approx(0.4)
 
+    def test_a_rule_that_serves_two_error_rates_is_listed_once(self):
+        found = comparison(share_right(0.5, 0.7, 0.9))
+        rule = early.Certified(0.1, early.FOLDS, 0.1, 0.0, 1.0, 0.6)
+        bolder = early.Certified(0.3, early.FOLDS, 0.3, 0.0, 1.0, 0.4)
+        found.certified.extend([rule, replace(rule, asked=0.2), bolder])
+        commands = [row.command for row in answer.answers(found, 0.01)]
+        assert [c for c in commands if "--error" in c] == [
+            "edge-classify run --error 0.1",
+            "edge-classify run --error 0.3",
+        ]
+
     def test_what_is_plain_from_the_second_decision_point_on_is_decided_then(self):
         """Before it the labels look alike; once they differ no one waits for the full window."""
         rng = np.random.default_rng(6)
@@ -339,7 +351,7 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
     again = tradeoff([str(tmp_path / "data")], tmp_path / "2", str(path), scene_path=str(SCENE))
     assert again.read_bytes() == report.read_bytes()
     assert not browser.available() or browser.faults(report) == []
-    for name in ("tradeoff.png", "settings.png", "early_category.png", "early_object.png"):
+    for name in ("tradeoff.png", "settings.png", "early_category.png", "reliability.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader((out / "points.csv").read_text().splitlines()))
     for cells in rows:
