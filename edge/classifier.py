@@ -301,7 +301,7 @@ class Classifier:
         )
         sure = rule is not None and confidence >= rule.confidence
         last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
-        if not sure and at < last and "short" not in flags:
+        if not sure and at < last:
             return None
         unknown = novel <= self.novelty_rate
         if unknown:

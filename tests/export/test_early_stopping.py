@@ -82,15 +82,28 @@ def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(early,
     assert all("short" in event.flags for event in decided)
 
 
-def test_a_task_without_a_certified_rule_says_so(early, make_touch):
+def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule(
+    early, make_touch, monkeypatch
+):
     model, _ = early
-    classifier = Classifier(model, error=model.info.stopping["category"].smallest_error)
-    classifier._rules["object"] = None
-    decided = [e for e in classifier.classify(make_touch(seed=50)) if isinstance(e, Decided)]
-    assert {event.task: "uncertified" in event.flags for event in decided} == {
-        "category": False,
-        "object": True,
-    }
+    error = model.info.stopping["category"].smallest_error
+    rule = replace(stopping_rules(model, error)["category"], confidence=2.0, last=1)
+    waits = replace(model.info.stopping["category"], rules=(rule,))
+    monkeypatch.setitem(model.info.stopping, "category", waits)
+    events = Classifier(model, error=error).classify(make_touch(seed=50))
+    (category,) = (e for e in events if isinstance(e, Decided) and e.task == "category")
+    assert (category.window_s, category.stopped_by) == (model.decision_points_s[1], "window")
+
+
+def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch):
+    model, _ = early
+    error = model.info.stopping["category"].smallest_error
+    stopping = model.info.stopping["object"]
+    never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
+    monkeypatch.setitem(model.info.stopping, "object", never)
+    events = Classifier(model, error=error).classify(make_touch(seed=50))
+    flags = {e.task: "uncertified" in e.flags for e in events if isinstance(e, Decided)}
+    assert flags == {"category": False, "object": True}
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):

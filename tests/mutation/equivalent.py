@@ -62,5 +62,21 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "0  ->  1",
         "self._timeouts = 0",
     ): "set again where each frame begins",
+    (
+        "edge/commands/summary.py",
+        "sum((len(label) + 2 for label in said)) > 100  ->  "
+        "sum((len(label) + 2 for label in said)) >= 100",
+        "",
+    ): "from which width on columns are numbered is a matter of looks",
+    (
+        "edge/model/onnx_file.py",
+        "True  ->  False",
+        "zip(*branches, strict=True)",
+    ): "branches of unequal lengths give fewer shapes than the node has outputs: refused further on",
+    (
+        "edge/commands/terminal.py",
+        "124  ->  125",
+        "TOUCH",
+    ): "a shade of red",
 }
 """{(file, "old  ->  new", a part of the line): the reason}."""
