@@ -72,7 +72,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "edge/model/onnx_file.py",
         "True  ->  False",
         "zip(*branches, strict=True)",
-    ): "branches of unequal lengths give fewer shapes than the node has outputs: refused further on",
+    ): "branches of unequal lengths give fewer shapes than outputs, which is refused further on",
     (
         "edge/commands/terminal.py",
         "124  ->  125",
