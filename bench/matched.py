@@ -51,7 +51,7 @@ STEP_S = 0.00125
 
 def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in MuJoCo."""
-    touched = simulate(Touch(thing, fixed, start_rad=tuple(np.radians(UPRIGHT_DEG)), fine=True))
+    touched = simulate(Touch(thing, fixed, start_rad=tuple(np.radians(UPRIGHT_DEG))))
     return touched.recording.frames, touched.force, touched.moved_m
 
 

@@ -30,6 +30,9 @@ ROWS = 16
 FACING_DEG = 76.0
 """Taxels whose normal lies farther from the push than this can't meet anything."""
 PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
+BLOCK_KG = 0.003
+SOLIMP, RIGID = 0.95, "-1e6 -2e3"
+"""MuJoCo's constraint: its stiffness is SOLIMP / (1 - SOLIMP) times solref's and the mass in it."""
 ABOVE_FLOOR_M = 0.30
 """Of the middle of the contact."""
 FOOT_M = 0.16
@@ -82,7 +85,6 @@ class Touch:
         slope_rad: of the table, along the push.
         taxel_n_m: stiffness of the pads.
         noise: counts, and its stream.
-        fine: pads that leave no gaps and blocks of a taxel's size, at a tenfold cost.
     """
 
     thing: Thing
@@ -94,7 +96,6 @@ class Touch:
     slope_rad: float = 0.0
     taxel_n_m: float = 10e3
     noise: tuple[float, np.random.Generator] | None = None
-    fine: bool = False
 
 
 @dataclass
@@ -116,9 +117,11 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
     masses = {1: (2.1, "0 0 -0.13"), 3: (1.5, "0 0 -0.12")}
     pads, where = "", []
     k, skin = touch.taxel_n_m, touch.thing.skin
-    pad = f'type="sphere" size="{PAD_M}"'
-    if touch.fine:
-        pad = f'type="capsule" size="{PAD_M} 0.004"'
+    contact = RIGID
+    if touch.thing.soft and touch.thing.kind != "plant":
+        # A block's face is rigid, the layer's is not: beneath one taxel it gives as E times that.
+        stiffness = touch.thing.modulus_pa * 0.0108 / (SOLIMP / (1.0 - SOLIMP) * BLOCK_KG)
+        contact = f"-{stiffness} -{2.0 * math.sqrt(stiffness)}"
     for row in range(ROWS):
         for column, angle in enumerate(COLUMN_ANGLES_DEG):
             if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
@@ -129,8 +132,9 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
                 f'<body pos="{x} {y} {0.18432 - 0.0108 * row}"><joint name="p{len(where)}" '
                 f'type="slide" axis="{out}" stiffness="{k}" damping="{PAD_LOSS_S * k}" '
                 f'armature="{PAD_KG}"/>'
-                f'<geom {pad} mass="0.0005" contype="1" '
-                f'conaffinity="2" solref="-1e6 -2e3" friction="{skin} 0.005 0.0001"/></body>'
+                f'<geom type="sphere" size="{PAD_M}" mass="0.0005" contype="1" '
+                f'conaffinity="2" solref="{contact}" solimp="{SOLIMP} {SOLIMP} 0.001" '
+                f'friction="{skin} 0.005 0.0001"/></body>'
             )
             where.append((row, column))
     xml, end, at = "", "", "0 0 0"
@@ -165,9 +169,9 @@ def stems_xml(thing: Thing, skin: str) -> str:
     return xml
 
 
-def blocks_xml(thing: Thing, skin: str, fine: bool) -> tuple[str, str]:
+def blocks_xml(thing: Thing, skin: str) -> tuple[str, str]:
     """A wall of sprung blocks, and the springs between neighbours: a Pasternak foundation."""
-    dz, dy = (0.0135, 0.0135) if fine else (0.0216, 0.016)
+    dz, dy = 0.0216, 0.016
     rows = round(min(thing.height_m, 0.22) / dz)
     cols = round(min(thing.breadth_m, 0.17) / dy) | 1
     k = thing.modulus_pa * dz * dy / thing.thick_m
@@ -179,8 +183,8 @@ def blocks_xml(thing: Thing, skin: str, fine: bool) -> tuple[str, str]:
             xml += (
                 f'<body pos="0.004 {y} {z}"><joint name="b{r}_{c}" type="slide" axis="1 0 0" '
                 f'stiffness="{k}" damping="{0.06 * k + 0.1}" range="0 {thing.thick_m * 0.9}" '
-                f'limited="true"/><geom type="box" size="0.004 {dy / 2} {dz / 2}" mass="0.003" '
-                f'contype="2" conaffinity="1" {skin}/></body>'
+                f'limited="true"/><geom type="box" size="0.004 {dy / 2} {dz / 2}" '
+                f'mass="{BLOCK_KG}" contype="2" conaffinity="1" {skin}/></body>'
             )
             for r2, c2, part in ((r + 1, c, dy / dz), (r, c + 1, dz / dy)):
                 if r2 < rows and c2 < cols:
@@ -213,7 +217,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     elif thing.kind == "plant":
         parts = stems_xml(thing, skin)
     else:
-        parts, between = blocks_xml(thing, skin, touch.fine)
+        parts, between = blocks_xml(thing, skin)
         back = 0.2
     foot = f'<geom type="box" size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" '
     foot += f'pos="{back} 0 0.004" mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" '
