@@ -9,17 +9,19 @@ from __future__ import annotations
 import math
 import statistics
 import time
+from pathlib import Path
 
 import pytest
 
 from edge import recording
 from train.simulate.engine import run_batch
 from train.simulate.explain import costs
-from train.simulate.run import kinds, recordings
-from train.simulate.scene import COLUMN_ANGLES_DEG, from_dict
+from train.simulate.run import kinds, parts, recordings, simulate_trials
+from train.simulate.scene import COLUMN_ANGLES_DEG, from_dict, load
 from train.simulate.scene_model import TrialSpec
 from train.simulate.schema import EFFECTS
 
+FILES = Path(__file__).parents[1] / "train" / "scenes"
 BATCH = 256
 MOVES = {"mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35}
 SCENES = {
@@ -144,6 +146,21 @@ def bench_write(benchmark, note, tmp_path):
     mine = benchmark.stats.stats.median
     note("us a trial", mine / BATCH * 1e6, "-")
     note("simulating the same", mine / statistics.median(simulated), "at most 1")
+
+
+@pytest.mark.parametrize("name", ["cody18", "household"])
+def bench_scene(benchmark, note, name):
+    """Every trial of a scene with all that it calls for, as recordings, without writing them."""
+    scene = load(FILES / f"{name}.toml")
+    work = parts(scene)
+
+    def ours():
+        return sum(1 for trials, step in work for _ in simulate_trials(scene, trials, step))
+
+    ours()
+    began = time.process_time()
+    count = benchmark.pedantic(ours, rounds=1, iterations=1)
+    note("trials a second of one core", count / (time.process_time() - began), "at least 1000")
 
 
 FULL = {

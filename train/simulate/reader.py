@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from edge.config import shown
 from edge.errors import InputError
 from train.simulate.schema import Field
 
@@ -42,7 +43,7 @@ class Reader:
     def table(self, value: object, key: str) -> Mapping[str, Any]:
         """A table."""
         if not isinstance(value, Mapping):
-            raise self.fail(key, f"must be a table ([{key}]), not {value!r}")
+            raise self.fail(key, f"must be a table ([{key}]), not {shown(value)}")
         return value
 
     def known(self, table: Mapping[str, Any], key: str, allowed: tuple[str, ...]) -> None:
@@ -60,21 +61,23 @@ class Reader:
         if limits.high < math.inf:
             between += f", at most {limits.high:g}"
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"must be a number ({between}), not {value!r}")
+            raise self.fail(key, f"must be a number ({between}), not {shown(value)}")
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         low_ok = number > limits.low if limits.open_low else number >= limits.low
         if not (math.isfinite(number) and low_ok and number <= limits.high):
-            raise self.fail(key, f"must be {between}, not {value!r}")
+            raise self.fail(key, f"must be {between}, not {shown(value)}")
         return number
 
     def value(self, value: object, key: str, limits: Field) -> Value:
         """A number, or a range of two."""
         if isinstance(value, list):
             if len(value) != 2:
-                raise self.fail(key, f"must be one number or a range [low, high], not {value!r}")
+                raise self.fail(
+                    key, f"must be one number or a range [low, high], not {shown(value)}"
+                )
             low, high = (self.number(v, key, limits) for v in value)
             if low > high:
                 raise self.fail(
@@ -89,19 +92,21 @@ class Reader:
     def numbers(self, value: object, key: str, count: int, limits: Field) -> tuple[float, ...]:
         """A number for each joint."""
         if not isinstance(value, list) or len(value) != count:
-            raise self.fail(key, f"must be {count} numbers, one a joint, not {value!r}")
+            raise self.fail(key, f"must be {count} numbers, one a joint, not {shown(value)}")
         return tuple(self.number(v, key, limits) for v in value)
 
     def text(self, value: object, key: str) -> str:
         """A text that is not empty."""
         if not isinstance(value, str) or not value.strip():
-            raise self.fail(key, f"must be text, not {value!r}")
+            raise self.fail(key, f"must be text, not {shown(value)}")
         return value
 
     def names(self, value: object, key: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
         """A list of some of the names allowed, none twice."""
         if not isinstance(value, list):
-            raise self.fail(key, f"must be a list of names ({', '.join(allowed)}), not {value!r}")
+            raise self.fail(
+                key, f"must be a list of names ({', '.join(allowed)}), not {shown(value)}"
+            )
         for name in value:
             if not isinstance(name, str) or name not in allowed:
                 raise self.fail(key, f"has no {name!r}; allowed: {', '.join(allowed)}")
