@@ -5,7 +5,9 @@ energy of arm and bed is convex and piecewise quadratic in (a, tilt), so its min
 answer; Newton's method finds it in a few rounds, and where it cycles between pieces a line search
 on the slope takes over. A trial's arithmetic does not know of its neighbours in the batch.
 
-numba compiles each function when it is first called, and keeps the result beside this file.
+numba compiles what is called when it is first called, and keeps the result beside this file: of the
+two functions that others call alone, as a kept one cannot be found again once a class that it takes
+has another name.
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ class PivotContact(NamedTuple):
     c11: float
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def contact_of(
     springs: Springs, i: int, rows: tuple[Array, ...], free: Coordinates, c: Coordinates
 ) -> PivotContact:
@@ -83,7 +85,7 @@ def contact_of(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def answer(contact: PivotContact, alive: Array, i: int, y0: float, y1: float, out: Array) -> Answer:
     """The loads of trial i's springs at y, and their stiffness; each row's force into `out`."""
     gaps, stiffness, column = contact.gaps, contact.stiffness, contact.column
@@ -125,7 +127,7 @@ def answer(contact: PivotContact, alive: Array, i: int, y0: float, y1: float, ou
     return whole_force, moment, whole, mean, spread
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def newton_step(at: PivotContact, y0: float, y1: float, found: Answer) -> tuple[float, float]:
     """p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean lever, where
     H is diagonal and the determinant a sum of positive terms: no digits are lost at 1e15 N/m."""
@@ -141,7 +143,7 @@ def newton_step(at: PivotContact, y0: float, y1: float, found: Answer) -> tuple[
     return p0 - mean * p1, p1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def slope(at: PivotContact, y0: float, y1: float, found: Answer, p0: float, p1: float) -> float:
     """Of the energy at y along -p."""
     det = at.c00 * at.c11 - at.c01 * at.c01
@@ -151,7 +153,7 @@ def slope(at: PivotContact, y0: float, y1: float, found: Answer, p0: float, p1: 
     return -(p0 * g0 + p1 * g1)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def agree(at: PivotContact, y0: float, y1: float, found: Answer) -> tuple[float, float]:
     """The loads at the solution, from the side that has more digits: a stiff bed's depth is
     all rounding, while what the arm has given way is not."""
