@@ -235,6 +235,10 @@ class Log:
     def _only(self, what: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
         wanted = self.beside.get(f"{what}_topic")
         if wanted is not None:
+            if not isinstance(wanted, str):
+                raise InputError(
+                    f"{self.path}: {what}_topic in {self.path.stem}.json must be a topic's name"
+                )
             if wanted not in topics:
                 raise InputError(
                     f"{self.path}: has no {what} on {wanted}; it has {sorted(topics) or 'none'}"

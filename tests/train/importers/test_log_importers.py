@@ -213,6 +213,9 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
     path = write_bag(tmp_path / "grasp", 2, messages, topics=("/left", "/right"))
     assert main(["import", "rosbag", str(path), "--out", str(tmp_path / "out")]) == 2
     assert 'frames are on /left, /right; name one as "frames_topic"' in capsys.readouterr().err
+    (tmp_path / "grasp.json").write_text('{"frames_topic": {}}')
+    assert main(["import", "rosbag", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert "frames_topic in grasp.json must be a topic's name" in capsys.readouterr().err
     (tmp_path / "grasp.json").write_text('{"frames_topic": "/left"}')
     assert np.array_equal(imported(tmp_path, "rosbag", path).frames, FRAMES)
 
