@@ -28,7 +28,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "len(messages[-1].buffer)",
     ): "a request and its answer are two messages: the last is the second",
     (
-        "edge/skin/bus_reader.py",
+        "edge/skin/slot.py",
         "1000000000.0  ->  1000000001.0",
         "NEVER",
     ): "long ago is long ago",

@@ -1,5 +1,7 @@
 """The skin as half-blocks."""
 
+import re
+
 import numpy as np
 
 from edge.commands import terminal
@@ -70,3 +72,10 @@ def test_a_skin_that_feels_everything_or_nothing_is_drawn():
         regions = find_regions(f.counts, 0)
         colour = terminal.colours(f, regions, 0, 1)
         assert terminal.picture(colour).count("▀") == 2 * 5 * 2
+
+
+def test_the_legend_is_one_line_where_it_fits_to_the_column():
+    (whole,) = terminal.legend(1000)
+    columns = len(re.sub(r"\x1b\[[^m]*m", "", whole))
+    assert terminal.legend(columns) == [whole]
+    assert len(terminal.legend(columns - 1)) == 2
