@@ -79,7 +79,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
         f"seconds from onset or at a list a,b,c; `none` for none (default: {DECISION_POINTS}, or "
-        f"every 0.2 s, with {FEWEST} to {MOST_TRIALS} trials and a model of at most 4 MB)",
+        f"fewer in a model that would exceed 1 MB, with {FEWEST} to {MOST_TRIALS} trials)",
     )
     top.add_argument("--threshold", type=int, help="counts above which a taxel is in contact")
     top.add_argument("--onset", type=int, help="counts above which a contact begins")

@@ -22,15 +22,15 @@ from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
-STEPS_S = (0.1, 0.2)
-"""Between decision points; the shorter one where the model stays below `LARGEST_BYTES`. It decides
-30 to 40 ms sooner at the same error (cody18, household)."""
+STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
+"""Between decision points: the shortest with which the weights stay below `LARGEST_BYTES`. 0.1 s
+decides 30 to 40 ms sooner than 0.2 s at the same error (cody18, household)."""
 FIRST_S = 0.2
 """The first decision point."""
 MOST_TRIALS = 2000
 """Trials beyond which calibration takes minutes, and must be asked for."""
-LARGEST_BYTES = 4 << 20
-"""Largest model that is given decision points which nobody asked for."""
+LARGEST_BYTES = 950_000
+"""Most weights of a model below 1 MB with decision points that nobody asked for."""
 LEAK = 0.5
 """Share of the trials that do not have the most frequent label: where more of them are recognised
 before any contact, the data leak."""
@@ -262,15 +262,20 @@ def _decision_points(
         c = min(choice.components, len(set(dataset.labels(task).tolist())) * 2, n)
         each += c * (4 * columns + 8 * n)
     points: list[float] = []
-    for step in STEPS_S:
+    for every in STEPS_S:
         # As many of a long window as of the usual one.
-        step *= max(window_s / WINDOW_S, 1.0)
-        rising = (round(FIRST_S + i * step, 6) for i in itertools.count())
+        step = every * max(window_s / WINDOW_S, 1.0)
+        rising = (round(max(FIRST_S, step) + i * step, 6) for i in itertools.count())
         points = [*itertools.takewhile(lambda s: s < window_s, rising), window_s]
         if len(points) * each <= LARGEST_BYTES:
+            if every > STEPS_S[0]:
+                notes.append(
+                    f"{len(points)} decision points, one every {step:g} s, so that the model stays "
+                    "below 1 MB; --decision-points asks for more"
+                )
             return tuple(points)
     notes.append(
         f"no decision points before the full window: they would make the model about "
-        f"{len(points) * each / 2**20:.1f} MB; --decision-points asks for them"
+        f"{len(points) * each / 1e6:.1f} MB; --decision-points asks for them"
     )
     return ()

@@ -1,13 +1,17 @@
 """From recordings to a fitted model, from Python."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import train
 from edge.errors import InputError
 from edge.recording import save
 from train.dataset import load_trials
+from train.fitting import _decision_points
+from train.pipeline import Choice
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +84,28 @@ def test_names_of_train_are_loaded_when_they_are_asked_for():
     assert train.fit.__module__ == "train.fitting"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = train.nothing
+
+
+@pytest.mark.parametrize(
+    ("trials", "objects", "points"),
+    [
+        (140, 18, (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)),
+        (1400, 18, (0.3, 0.6, 0.9, 1.2)),
+        (600, 68, (0.6, 1.2)),
+        (2000, 90, ()),
+    ],
+)
+def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(trials, objects, points):
+    labels = np.array([f"object {i % objects}" for i in range(trials)])
+    data = SimpleNamespace(
+        trials=range(trials),
+        names=("max_force",),
+        widths=lambda samples: (150,),
+        labels=lambda task: labels,
+    )
+    choices = {"object": Choice("IV", objects - 1, 3, "lda", ("max_force",))}
+    notes: list[str] = []
+    assert _decision_points(data, choices, None, 1.2, 40, notes) == pytest.approx(points)
+    assert [note.split(" decision points")[0] for note in notes] == (
+        [] if len(points) == 11 else [str(len(points) or "no")]
+    )
