@@ -186,12 +186,6 @@ class Joints:
             q = [q[column] for column in columns]
         if len(q) != self._dof:
             return self._bad(f"a line has {len(q)} angles, the arm has {self._dof}")
-        try:
-            finite = all(math.isfinite(x) for x in numbers)
-        except OverflowError:
-            finite = False
-        if not finite:
-            return self._bad("a time or an angle is not finite")
         if self._ahead(arrived - t):
             return self._bad("its time is ahead of the other lines'")
         if self._poses and t <= self._poses[-1][0]:

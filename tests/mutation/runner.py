@@ -63,13 +63,20 @@ def stages(file: str, first: Sequence[tuple[str, ...]] = ()) -> tuple[tuple[str,
     return (*nearest, ("tests/golden", HARD), (top.as_posix(),), ("tests/train", "tests/export"))
 
 
+IN_A_BROWSER = (
+    "--deselect=tests/train/report/test_html.py::test_in_a_browser",
+    "--deselect=tests/train/study/test_study_report.py::test_in_a_browser",
+)
+"""Tests that would fail for want of memory, whatever the change."""
+
+
 def failed(folder: str, job: Job) -> str:
     """The first test that fails on the copy; "" where none does."""
     import pytest
 
     for stage in job.stages:
         said = io.StringIO()
-        options = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist"]
+        options = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist", *IN_A_BROWSER]
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             status = pytest.main([*options, "--rootdir", folder, *stage])
         found = [s for s in said.getvalue().splitlines() if s.startswith(("FAILED", "ERROR"))]

@@ -97,6 +97,15 @@ def test_the_first_rule_is_the_full_window_at_the_whole_level():
     assert rules[0].error == pytest.approx(upper_limit(wrong, 140, RISK))
 
 
+def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
+    """What the first decision point gets right counts for nothing once the full window, which is
+    tested first, has 20 of 100 wrong."""
+    wrong = np.zeros((3, 100), dtype=bool)
+    wrong[-1, :20] = True
+    rules = certify(np.full((3, 100), 0.9), wrong, SECONDS)
+    assert [rule.error for rule in rules] == [pytest.approx(upper_limit(20, 100, RISK))]
+
+
 @pytest.mark.parametrize("error", [0.15, 0.2, 0.3])
 def test_certificates_fail_no_oftener_than_they_say(error):
     """Of 300 calibrations the share whose rule errs more often than certified; at most a tenth."""
