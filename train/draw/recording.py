@@ -243,7 +243,8 @@ def _thing(
         start[0] + ahead * np.array([-0.1, depth + 0.25]), 2 * [start[1] + floor], color="sienna"
     )
     told, moved = "", max(ahead * float(now[0] - first[0][0]), 0.0)
-    effects = drawn.get("effects") or []
+    given = drawn.get("effects")
+    effects = given if isinstance(given, list) else []
     if "sliding" not in effects:
         moved = 0.0
     static = _size(drawn, "friction_static") or 0.0

@@ -7,6 +7,7 @@ are not their times in seconds; `FOLDER/labels.csv` has the columns `trial` and 
 from __future__ import annotations
 
 import csv
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -104,7 +105,9 @@ def _times(folder: Path, files: list[Path], rate: Any) -> NDArray[np.float64]:
 
 def _frame(path: Path) -> NDArray[np.uint16]:
     try:
-        counts = np.loadtxt(path, delimiter=",", dtype=np.int64, ndmin=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of an empty file, which is refused below
+            counts = np.loadtxt(path, delimiter=",", dtype=np.int64, ndmin=2)
     except (OSError, ValueError, OverflowError) as error:
         raise InputError(f"{path}: not a frame of whole numbers: {error}") from None
     if counts.size == 0 or counts.min() < 0 or counts.max() > 65535:
