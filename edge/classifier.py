@@ -59,9 +59,9 @@ class Classifier:
     With an error rate, each task follows the fastest stopping rule that the model holds certified
     for that rate: it is decided at the first decision point that is sure enough, and at the rule's
     last in any case (see `edge.model.stopping`). A task for which no rule is certified is decided
-    at the full window, flagged `uncertified`. Further flags are then `unknown` (the label is
-    "unknown": the contact is unlike everything in training) and `unsure` (the window ended before
-    the confidence was reached).
+    at the full window, flagged `uncertified`. Further flags are then `unknown` (the contact is
+    unlike everything in training; the label of the task with the most labels, such as the object,
+    is then "unknown") and `unsure` (the window ended before the confidence was reached).
 
     Flags of a decision: `tie` (another label had as many votes), `close` (two of the nearest
     training trials are equally far but for rounding), `short` (the stream ended inside the window;
@@ -305,7 +305,10 @@ class Classifier:
             return None
         unknown = novel <= self.novelty_rate
         if unknown:
-            label, confidence, flags = UNKNOWN, 1.0 - novel, (*flags, "unknown")
+            flags = (*flags, "unknown")
+        # A new object can still be told to be soft or to move: only what it is has no answer.
+        if unknown and info.novelty is not None and none.task == info.novelty.task:
+            label, confidence = UNKNOWN, 1.0 - novel
         elif rule is not None and not sure and not rule.fixed:
             flags = (*flags, "unsure")
         if rule is None:

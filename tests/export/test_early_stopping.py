@@ -106,6 +106,31 @@ def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch)
     assert flags == {"category": False, "object": True}
 
 
+def test_a_touch_unlike_all_others_names_no_object_but_still_says_what_it_is_like(
+    early, make_touch
+):
+    model, _ = early
+    known = make_touch(kind="hard", seed=50)
+    strange = replace(known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535))
+    error = model.info.stopping["category"].smallest_error
+    decided = {
+        name: {
+            e.task: e
+            for e in Classifier(model, error=error).classify(touch)
+            if isinstance(e, Decided)
+        }
+        for name, touch in {"known": known, "strange": strange}.items()
+    }
+    assert model.info.novelty.task == "object"
+    assert {e.task: "unknown" in e.flags for e in decided["strange"].values()} == {
+        "category": True,
+        "object": True,
+    }
+    assert decided["strange"]["object"].label == "unknown"
+    assert decided["strange"]["category"].label == "rigid-fixed"
+    assert not any("unknown" in e.flags for e in decided["known"].values())
+
+
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
     model, _ = early
     with pytest.raises(InputError, match="cannot be certified; category: the smallest error that"):
