@@ -3,7 +3,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+# Errors alone: every editable installation warns.
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
 # Matrices this small only lose by several threads, which also fight with the processes beside.
 export OPENBLAS_NUM_THREADS := 1
 

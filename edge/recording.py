@@ -183,7 +183,9 @@ def _check(path: str, recording: Recording) -> None:
     if n == 0 or rows == 0 or cols == 0:
         fail(f"frames are empty {frames.shape}; record at least one frame")
     if t.dtype != np.float64 or t.shape != (n,):
-        fail(f"t must be float64 ({n},) seconds for {n} frames, not {t.dtype} {t.shape}")
+        fail(
+            f"t must be float64 ({n},), a time in seconds a frame, not {t.dtype} {t.shape}; mend it"
+        )
     if not np.isfinite(t).all():
         fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
     back = np.flatnonzero(np.diff(t) < 0)
@@ -193,7 +195,7 @@ def _check(path: str, recording: Recording) -> None:
         if joints.dtype != np.float64 or joints.ndim != 2 or joints.shape[0] != n:
             fail(
                 f"joints must be float64 ({n}, dof) for {n} frames, "
-                f"not {joints.dtype} {joints.shape}"
+                f"not {joints.dtype} {joints.shape}; mend them"
             )
         if joints.shape[1] == 0:
             fail("joints have no column; leave them out where the arm is unknown")
@@ -208,7 +210,7 @@ def _check(path: str, recording: Recording) -> None:
     ):
         fail(
             f"valid must be bool ({rows}, {cols}) or ({n}, {rows}, {cols}), "
-            f"not {valid.dtype} {valid.shape}"
+            f"not {valid.dtype} {valid.shape}; mend it"
         )
     meta = recording.meta
     if not isinstance(meta, dict):

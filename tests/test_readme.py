@@ -86,8 +86,8 @@ def test_a_make_command_says_what_it_would_do(command):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_make_target_exists(target):
-    if not re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.M):
-        pytest.fail(f"README.md names `make {target}`, the Makefile has none")
+    rules = re.findall(r"^([\w./-]+(?: [\w./-]+)*):", (ROOT / "Makefile").read_text(), re.M)
+    assert target in " ".join(rules).split()
 
 
 @pytest.mark.parametrize("picture", re.findall(r"\]\((docs/[^)]+\.png)\)", TEXT))

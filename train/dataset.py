@@ -200,8 +200,8 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         except InputError as error:
             bad.append(str(error))
     if bad:
-        more = f" (and {len(bad) - 1} more files)" if len(bad) > 1 else ""
-        raise InputError(f"{bad[0]}{more}; repair or remove it, nothing was fitted")
+        more = f"; {len(bad) - 1} more cannot be used either" if len(bad) > 1 else ""
+        raise InputError(bad[0] + more)
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 

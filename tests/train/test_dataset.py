@@ -190,7 +190,7 @@ def test_damaged_files_stop_the_fit_and_the_first_is_named(recordings, tmp_path)
     shutil.copytree(recordings, tmp_path / "data")
     for name in ("hard_3", "soft_1"):
         (tmp_path / "data" / f"{name}.npz").write_bytes(b"PK")
-    with pytest.raises(InputError, match=r"hard_3.npz: not a readable .* \(and 1 more files\)"):
+    with pytest.raises(InputError, match=r"hard_3.npz: not .*; 1 more cannot be used either"):
         load_trials([tmp_path / "data"])
 
 

@@ -46,6 +46,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings."""
     arm = open_arm(arguments)
+    if not arguments.file.exists():
+        raise InputError(f"{arguments.file}: no such file or folder")
     trials = import_module(f"train.importers.{arguments.format}").trials(arguments.file, arm)
     n, without = 0, []
     for name, recording in tqdm(trials, desc="importing", unit=" trials"):

@@ -21,8 +21,6 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError("bags need rosbags; install it with `pip install rosbags`") from None
-    if not path.exists():
-        raise InputError(f"{path}: no such bag")
     log = Log.of(path, arm)
     # A ROS 2 bag of before 2024 does not carry its types' definitions.
     types = get_typestore(Stores.ROS2_HUMBLE)
