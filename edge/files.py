@@ -145,10 +145,17 @@ def _sync_folder(folder: Path) -> None:
 
 
 @contextmanager
-def write_whole(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iterator[BinaryIO]:
+def write_whole(
+    path: str | os.PathLike[str], *, overwrite: bool = True, lasting: bool = True
+) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path`; at the end of the block it takes the name.
 
     Where the block raises, `path` is as it was and the temporary file is gone.
+
+    Args:
+        overwrite: whether a file that exists is replaced.
+        lasting: wait until the file would outlast a loss of power. What can be made again need
+            not: on a disk the wait takes several times as long as the writing.
 
     Raises:
         NameTaken: `path` exists and `overwrite` is False.
@@ -168,7 +175,8 @@ def write_whole(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iter
         with os.fdopen(handle, "wb") as file:
             yield file
             file.flush()
-            os.fsync(file.fileno())
+            if lasting:
+                os.fsync(file.fileno())
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)
@@ -177,7 +185,8 @@ def write_whole(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iter
         else:
             _name_free(temporary, target)
         temporary = None
-        _sync_folder(target.parent)
+        if lasting:
+            _sync_folder(target.parent)
     except FileExistsError as error:
         if error.filename == os.fspath(target.parent):
             raise InputError(f"{target}: cannot be written: {target.parent} is a file") from None

@@ -345,6 +345,7 @@ def save(
     *,
     scale: float | None = None,
     overwrite: bool = True,
+    lasting: bool = True,
 ) -> None:
     """Write a recording, whole or not at all; the same recording gives the same bytes.
 
@@ -363,7 +364,7 @@ def save(
             `meta.skin` says the rows and columns.
         scale: counts of a unit of `frames` that are no counts; it is kept in `meta.scale`. Give
             all recordings of a data set the same.
-        overwrite: whether a file that exists is replaced.
+        overwrite, lasting: see `write_whole`.
 
     Raises:
         InputError: the recording is not as the contract says, `path` cannot be written, or
@@ -377,7 +378,7 @@ def save(
         arrays["joints"] = recording.joints
     if recording.valid is not None:
         arrays["valid"] = recording.valid
-    save_arrays(name, arrays, recording.meta, overwrite=overwrite)
+    save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)
 
 
 def save_arrays(
@@ -386,6 +387,7 @@ def save_arrays(
     meta: dict[str, Any],
     *,
     overwrite: bool = True,
+    lasting: bool = True,
     compress: bool = False,
 ) -> None:
     """Write arrays and their JSON metadata as one `.npz`, whole or not at all."""
@@ -393,7 +395,7 @@ def save_arrays(
         text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{os.fspath(path)}: meta cannot be written as JSON: {error}") from None
-    with write_whole(path, overwrite=overwrite) as file:
+    with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
         if compress:
             np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
         else:

@@ -111,6 +111,10 @@ def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeyp
     with write_whole(tmp_path / "a") as file:
         file.write(b"x")
     assert order == ["fsync", "name", "fsync"]
+    order.clear()
+    with write_whole(tmp_path / "a", lasting=False) as file:
+        file.write(b"y")
+    assert (order, (tmp_path / "a").read_bytes()) == (["name"], b"y")
 
 
 def test_the_longest_name_can_be_written(tmp_path):

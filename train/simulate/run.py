@@ -132,7 +132,7 @@ def simulate_part(
     out: list[Simulated] = []
     for name, trial in simulate_trials(scene, trials, step_s):
         if folder is not None:
-            recording.save(Path(folder) / name, trial)
+            recording.save(Path(folder) / name, trial, lasting=False)
         redrawn = int(trial.meta["simulation"]["redrawn"])
         out.append(Simulated(name, redrawn, trial if folder is None else None))
     return out
@@ -197,7 +197,7 @@ def write(
     for part in done:
         for trial in part:
             if trial.recording is not None:
-                recording.save(target / trial.name, trial.recording)
+                recording.save(target / trial.name, trial.recording, lasting=False)
             found.append(replace(trial, recording=None))
         progress(len(part))
     return Written(
