@@ -190,8 +190,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
     virtual = arguments.fake is not None and not arguments.real_time
     with (
-        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
         open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
+        # Until here a signal ends the program at once: there is nothing to lose yet.
+        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
         open_joints(arguments, opened, arm, dof) as joints,
         Lines(
             form=Output.of(arguments).line,

@@ -93,16 +93,15 @@ def run(arguments: argparse.Namespace) -> int:
     with ExitStack() as stack:
         notifier = stack.enter_context(Notifier(now=time.monotonic))
         opened = stack.enter_context(open_skin(arguments, model=model, arm=chain))
+        virtual = opened.playback is not None and not arguments.real_time
+        lines = Lines(
+            udp=arguments.udp,
+            form=Output.of(arguments).line,
+            patient=lambda: virtual and not stop.asked,
+        )
         # Until here a signal ends the program at once: there is nothing to lose yet.
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
-        virtual = opened.playback is not None and not arguments.real_time
-        lines = stack.enter_context(
-            Lines(
-                udp=arguments.udp,
-                form=Output.of(arguments).line,
-                patient=lambda: virtual and not stop.asked,
-            )
-        )
+        stack.enter_context(lines)
         on_skin = arguments.without_joints == "skin"
         if not on_skin:
             check_joints(model, arguments, opened)

@@ -149,11 +149,12 @@ def open_joints(
         source, listener = joint_stream.from_udp(address)
     else:
         raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {arguments.joints!r}")
+    clock = opened.skin.clock
     stream = joint_stream.Joints(
         source,
         dof=dof,
         names=None if arm is None else arm.names,
-        now=opened.skin.clock.now,
+        now=clock.real if isinstance(clock, PacedClock) else clock.now,
         oldest_s=arguments.joints_oldest,
         shared_clock=arguments.joints_shared_clock,
     )

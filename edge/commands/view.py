@@ -104,8 +104,8 @@ def run(arguments: argparse.Namespace) -> int:
     chain = None if model is None else model.info.chain
     dof = None if model is None else model.info.dof
     with (
-        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
         open_skin(arguments, paced=sys.stdout.isatty(), arm=chain) as opened,
+        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
     ):
         if model is not None:
             check_joints(model, arguments, opened)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 TIME_ROUNDING_S = 5e-7
 """A time that is meant to be a sample's own may lie below it by rounding; no two samples are as
 close as this half microsecond."""
+LATE_S = 0.005
+"""A paced clock that is later than this behind real time is put forward."""
 
 
 class Hand:
@@ -56,15 +59,28 @@ class VirtualClock:
 
 
 class PacedClock(VirtualClock):
-    """Virtual time that runs no faster than real time, for a person to watch."""
+    """Virtual time that goes with real time from the first wait on, for a person to watch.
+
+    While the machine keeps up, times are to the bit those of a clock that never waits. A loop that
+    comes late finds that time went on without it, as over real chips: hurrying after it would give
+    other programs, which send joint angles at real times, a clock that changes its speed.
+    """
 
     def __init__(self, start: float = 0.0) -> None:
         super().__init__(start)
-        self._ahead = time.monotonic() - start
+        self._ahead = math.nan
+
+    def real(self) -> float:
+        """Seconds that have really passed, on this clock: when another program's line came."""
+        return self.now() if math.isnan(self._ahead) else time.monotonic() - self._ahead
 
     def sleep_until(self, t: float) -> None:
         """Let all hands meet at `t`, and wait until as much real time has passed."""
+        if math.isnan(self._ahead) and t > self.now():
+            self._ahead = time.monotonic() - self.now()
         super().sleep_until(t)
-        left = t + self._ahead - time.monotonic()
+        left = self.start - self.real()
         if left > 0.0:
             time.sleep(left)
+        elif left < -LATE_S:
+            self.start -= left

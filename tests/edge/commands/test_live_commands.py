@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,6 +17,7 @@ import pytest
 
 from edge import recording
 from edge.cli import main
+from edge.commands import record, run, view
 from edge.commands.record import Trials
 from edge.recording import Recording
 from edge.skin import file as skinfile
@@ -272,6 +274,34 @@ def test_run_stops_cleanly_at_ctrl_c(exported, recordings):
     assert events[-1]["event"] == "end"
 
 
+@pytest.mark.parametrize("command", [record, run, view])
+def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
+    edge, exported, recordings, tmp_path, monkeypatch, command
+):
+    """A silent serial port or name server may take seconds, and there is nothing to lose yet."""
+    handled = []
+    open_skin, resolve = command.open_skin, socket.getaddrinfo
+
+    def opened(*arguments, **options):
+        handled.append(signal.getsignal(signal.SIGTERM))
+        return open_skin(*arguments, **options)
+
+    def resolved(*arguments, **options):
+        handled.append(signal.getsignal(signal.SIGTERM))
+        return resolve(*arguments, **options)
+
+    monkeypatch.setattr(command, "open_skin", opened)
+    monkeypatch.setattr(socket, "getaddrinfo", resolved)
+    options = {
+        record: ["--label", "object=foam", "--out", tmp_path],
+        run: ["--model", exported / "model.onnx", "--udp", "127.0.0.1:9"],
+        view: ["--model", exported / "model.onnx"],
+    }[command]
+    name = command.__name__.rpartition(".")[2]
+    assert edge(name, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
+    assert handled == [signal.SIG_DFL] * (2 if command is run else 1)
+
+
 def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
     source = recording.load(recordings / "soft_1.npz")
     out = tmp_path / "trials"
@@ -288,6 +318,15 @@ def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
     np.testing.assert_allclose(trial.t, np.arange(141) * 0.01, atol=1e-9)
     assert trial.layout == source.layout
     assert trial.valid is None
+
+
+def test_record_keeps_the_names_of_a_recordings_joints(edge, recordings, tmp_path):
+    source = recording.load(recordings / "soft_1.npz")
+    names = [f"joint {i}" for i in range(source.joints.shape[1])]
+    path = tmp_path / "named.npz"
+    recording.save(path, replace(source, meta={**source.meta, "joint_names": names}))
+    _, (event,), _ = edge("record", "--fake", path, "--label", "object=foam", "--out", tmp_path)
+    assert recording.load(event["file"]).joint_names == tuple(names)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

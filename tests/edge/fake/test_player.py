@@ -1,8 +1,8 @@
 """A recording on fake chips: what goes in at the registers comes out as frames."""
 
 import math
-import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,12 +68,35 @@ def test_noise_is_repeatable_by_seed_and_as_large_as_asked():
     assert np.std(first) == pytest.approx(5.0, abs=0.2)
 
 
-def test_a_paced_clock_is_no_faster_than_real_time():
+@pytest.fixture
+def real(monkeypatch):
+    """Real time, which passes as the test says and by sleeping."""
+    now = SimpleNamespace(s=1000.0)
+    monkeypatch.setattr("edge.fake.clock.time.monotonic", lambda: now.s)
+    monkeypatch.setattr("edge.fake.clock.time.sleep", lambda s: setattr(now, "s", now.s + s))
+    return now
+
+
+def test_a_paced_clock_begins_with_the_first_wait_and_is_no_faster_than_real_time(real):
     clock = PacedClock()
-    began = time.monotonic()
+    real.s += 3.0
+    clock.sleep_until(clock.now())
+    assert (clock.now(), clock.real()) == (0.0, 0.0)
     clock.sleep_until(0.05)
-    assert time.monotonic() - began >= 0.0499
-    assert clock.now() == 0.05
+    assert (clock.now(), real.s) == (0.05, 1003.05)
+
+
+def test_a_paced_clock_goes_on_without_a_loop_that_comes_late(real):
+    """And does not hurry after it: what others send at real times would seem to come too late."""
+    clock = PacedClock()
+    clock.sleep_until(0.01)
+    real.s += 0.004
+    clock.sleep_until(0.01)
+    assert clock.now() == 0.01
+    real.s += 0.296
+    clock.sleep_until(0.02)
+    assert clock.now() == pytest.approx(0.31)
+    assert clock.real() == pytest.approx(0.31)
 
 
 def test_a_recording_of_another_shape_is_refused():
