@@ -11,7 +11,7 @@ import os
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 from edge.errors import InputError
 from edge.files import parsing, read_bytes, read_text
@@ -270,16 +270,16 @@ class ConfigTable:
             raise self.fail(key, "[row, col]", value)
         return value[0], value[1]
 
-    def table(self, key: str, default: Any = REQUIRED) -> ConfigTable:
+    def table(self, key: str, default: Any = REQUIRED) -> Self:
         """A table within this one."""
-        return ConfigTable(self.get(key, default), self.where, f"{self.prefix}{key}.")
+        return type(self)(self.get(key, default), self.where, f"{self.prefix}{key}.")
 
-    def tables(self, key: str, item: str) -> list[ConfigTable]:
+    def tables(self, key: str, item: str) -> list[Self]:
         """A list of at least one table; errors call each `item` and its number from 0."""
         entries = self.get(key, [])
         if not isinstance(entries, list) or not entries:
             raise self.fail(key, "a list of tables", entries)
-        return [ConfigTable(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)]
+        return [type(self)(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)]
 
     def done(self) -> None:
         """Refuse the keys that nobody took."""

@@ -11,8 +11,8 @@ import numpy as np
 from edge.touch.layout import SkinLayout
 from train.simulate import streams
 from train.simulate.motion import GRAVITY
-from train.simulate.reader import Reader
-from train.simulate.schema import LABELS, OBJECT, Field
+from train.simulate.reader import SceneTable
+from train.simulate.schema import CONDITIONS, LABELS, OBJECT, Field
 
 PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
 WHOLE = ("stem_count",)
@@ -20,7 +20,7 @@ DRAWS = 1000
 
 
 def draw_family(
-    read: Reader, table: Mapping[str, Any], seed: int, push_n: float, skin: SkinLayout
+    table: SceneTable, seed: int, push_n: float, skin: SkinLayout
 ) -> Iterator[dict[str, Any]]:
     """The objects, as [[object]] tables, of one [[family]].
 
@@ -32,19 +32,17 @@ def draw_family(
     Raises:
         InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
     """
-    name = read.text(table.get("name", ""), "family: name")
-    key = f"family {name!r}:"
-    count = read.number(table.get("count", 0), f"{key} count", Field(1, 1000, None, ""))
-    if count != int(count):
-        raise read.fail(f"{key} count", f"must be a whole number, not {count:g}")
-    ranges = {k: read.value(v, f"{key} {k}", OBJECT[k]) for k, v in table.items() if k in OBJECT}
-    part = read.value(table.get("kinetic_part", [0.8, 0.95]), f"{key} kinetic_part", PART)
-    push_n = read.number(table.get("push_n", push_n), f"{key} push_n", LABELS["push_n"])
+    name = table.text("name")
+    count = table.whole("count", allowed=range(1, 1001))
+    # In the file's order: the draws follow it.
+    ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in OBJECT}
+    part = table.value("kinetic_part", PART, [0.8, 0.95])
+    push_n = table.field("push_n", LABELS["push_n"], push_n)
+    movable = "movable" in table.names("conditions", CONDITIONS)
     own = (*OBJECT, "count", "kinetic_part", "push_n", "name")
-    others = {k: v for k, v in table.items() if k not in own}
+    others = {key: value for key, value in table.raw.items() if key not in own}
     generator = streams.stream(seed, "family", name)
-    movable = "movable" in (table.get("conditions") or ())
-    for number in range(int(count)):
+    for number in range(count):
         for _ in range(DRAWS):
             drawn = {k: _draw(generator, v.low, v.high) for k, v in ranges.items()}
             if "friction_static" in drawn:
@@ -57,10 +55,8 @@ def draw_family(
             if not movable or hold <= level * min(push_n, passed_on(drawn, skin)):
                 break
         else:
-            raise read.fail(
-                f"{key} mass_kg",
-                f"and friction_static leave nothing that {push_n:g} N move (labels.push_n)",
-            )
+            wanted = f"such that {push_n:g} N (labels.push_n) move it at its friction_static"
+            raise table.fail("mass_kg", wanted)
         whole = {k: round(drawn[k]) for k in WHOLE if k in drawn}
         yield {**others, "name": f"{name} {number + 1:02d}", **drawn, **whole}
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from edge.files import parsing, read_bytes
+from edge.config import REQUIRED, read_toml
+from edge.errors import InputError
 from edge.touch.arm import Chain
-from edge.touch.layout import SkinLayout
+from edge.touch.layout import RELEASE_S, SkinLayout
 from train.simulate import schema
 from train.simulate.families import draw_family
-from train.simulate.reader import Reader, Value
+from train.simulate.reader import SceneTable, Value
 from train.simulate.required_effects import check_supported
 from train.simulate.scene_model import Scene, SceneObject
-from train.simulate.schema import EFFECTS, Field
+from train.simulate.schema import EFFECTS
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
@@ -44,6 +44,12 @@ CODY_SKIN: dict[str, Any] = {
     "row0_z_m": 0.18432,
     "column_angles_deg": list(COLUMN_ANGLES_DEG),
 }
+SCALE: dict[str, Any] = {
+    "counts_per_newton": 1000.0,
+    "threshold_counts": 100,
+    "onset_counts": 200,
+    "release_s": RELEASE_S,
+}
 
 
 def load(
@@ -55,21 +61,12 @@ def load(
         InputError: the file cannot be read, a key is unknown, a value makes no sense, or an
             effect is named that the scene cannot support.
     """
-    name = os.fspath(path)
-    text = read_bytes(name)
-    with parsing(name, "TOML"):
-        table = tomllib.loads(text.decode())
+    table = dict(read_toml(path).raw)
     if seed is not None:
         table["seed"] = seed
-    if count is not None and isinstance(table.setdefault("trials", {}), dict):
-        table["trials"]["count"] = count
-    return from_dict(table, where=name)
-
-
-TOP = (
-    *("name", "seed", "trials", "labels", "step_s", "arm", "motion", "skin", "spread", "effects"),
-    *("object", "family"),
-)
+    if count is not None and isinstance(trials := table.get("trials", {}), dict):
+        table["trials"] = {**trials, "count": count}
+    return from_dict(table, where=os.fspath(path))
 
 
 def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
@@ -78,308 +75,193 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     Raises:
         InputError: as `load`.
     """
-    read = Reader(where)
-    read.known(table, "", TOP)
-    seed = table.get("seed", 0)
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
-        raise read.fail("seed", f"must be a whole number of 0 to 2^63 - 1, not {seed!r}")
-    trials, lead = _trials(read, read.table(table.get("trials", {}), "trials"))
-    step_s = _steps(read, read.table(table.get("step_s", {}), "step_s"), trials["rate_hz"])
-    chain, stiffness, damping, inertia = _arm(read, read.table(table.get("arm", {}), "arm"))
-    start, rate, travel_s, place = _motion(
-        read, read.table(table.get("motion", {}), "motion"), chain
-    )
-    skin, taxel = _skin(read, read.table(table.get("skin", {}), "skin"))
-    spread = _fields(read, table.get("spread", {}), "spread", schema.SPREAD)
-    labels = _fields(read, table.get("labels", {}), "labels", schema.LABELS)
-    objects = _objects(read, table, seed, labels["push_n"], skin)
-    add, leave_out, settings = _effects(read, table.get("effects", {}))
+    top = SceneTable(table, where)
+    seed = top.whole("seed", 0, range(2**63))
+    trials = top.table("trials", {})
+    lead = trials.value("lead_s", schema.LEAD)
+    each = trials.fields(schema.TRIALS)
+    chain, *gains = _arm(top.table("arm", {}))
+    skin, taxel = _skin(top.table("skin", {}))
+    start, rate, travel_s, place_m = _motion(top.table("motion", {}), chain, skin)
+    labels = top.table("labels", {}).fields(schema.LABELS)
+    add, leave_out, settings = _effects(top.table("effects", {}))
     scene = Scene(
-        name=read.text(table.get("name", Path(where).stem or "scene"), "name"),
+        name=top.text("name", Path(where).stem or "scene"),
         seed=seed,
-        trials=trials,
-        step_s=step_s,
+        trials=each,
+        step_s=_steps(top.table("step_s", {}), each["rate_hz"]),
         lead=lead,
         arm=chain,
-        stiffness=stiffness,
-        damping=damping,
-        inertia=inertia,
+        stiffness=gains[0],
+        damping=gains[1],
+        inertia=gains[2],
         start=start,
         rate=rate,
         travel_s=travel_s,
         skin=skin,
         taxel_n_m=taxel,
-        place_m=place,
-        spread=spread,
+        place_m=place_m,
+        spread=top.table("spread", {}).fields(schema.SPREAD),
         labels=labels,
-        objects=objects,
+        objects=_objects(top, seed, labels["push_n"], skin),
         add=add,
         leave_out=leave_out,
         settings=settings,
     )
-    rows = [skin.row0_z_m, skin.row0_z_m - scene.cylinder.row_pitch_m * (skin.rows - 1)]
-    if not min(rows) <= place <= max(rows):
-        raise read.fail(
-            "motion.place_m",
-            f"must lie on the skin, {min(rows):g} to {max(rows):g} m from the wrist, not {place:g}",
-        )
+    top.done()
     check_supported(scene, where)
     return scene
 
 
-def _fields(read: Reader, value: object, key: str, known: dict[str, Field]) -> dict[str, float]:
-    table = read.table(value, key)
-    read.known(table, key, tuple(known))
-    return {
-        name: read.number(table[name], f"{key}.{name}", limits)
-        if name in table
-        else float(limits.default or 0.0)
-        for name, limits in known.items()
-    }
-
-
-def _trials(read: Reader, table: Mapping[str, Any]) -> tuple[dict[str, float], Value]:
-    read.known(table, "trials", tuple(schema.TRIALS))
-    out = {
-        name: read.number(table.get(name, limits.default), f"trials.{name}", limits)
-        for name, limits in schema.TRIALS.items()
-        if name != "lead_s"
-    }
-    if out["count"] != int(out["count"]):
-        raise read.fail("trials.count", f"must be a whole number, not {out['count']!r}")
-    limits = schema.TRIALS["lead_s"]
-    return out, read.value(table.get("lead_s", limits.default), "trials.lead_s", limits)
-
-
-def _steps(read: Reader, table: Mapping[str, Any], rate_hz: float) -> dict[str, float]:
-    read.known(table, "step_s", ("base", *EFFECTS))
-    if table and "base" not in table:
-        raise read.fail("step_s.base", "is missing: the step of trials without the others named")
+def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
     frame = 1.0 / rate_hz
+    if table.raw:
+        table.get("base")  # the step of trials without the others named
     out: dict[str, float] = {}
-    for name, value in table.items():
-        step = read.number(value, f"step_s.{name}", schema.STEP)
-        ratio = frame / step
+    for name in filter(table.has, ("base", *EFFECTS)):
+        out[name] = table.field(name, schema.STEP)
+        ratio = frame / out[name]
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6 * ratio:
-            raise read.fail(
-                f"step_s.{name}", f"must divide the frame's {frame:g} s evenly, not {step:g}"
-            )
-        out[name] = step
+            raise table.fail(name, f"an even part of a frame's {frame:g} s")
+    table.done()
     return out
 
 
-def _chain(read: Reader, name: str, table: Mapping[str, Any]) -> Chain:
+def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
+    """The chain, and each joint's stiffness, damping and inertia (none where not known)."""
+    name = table.text("chain", "cody")
+    path = Path(table.where).parent / name
     if name == "cody":
-        return Chain.cody()
-    path = Path(read.where).parent / name
-    if path.suffix != ".urdf":
-        return Chain.from_toml(path)
-    if "base" not in table or "tip" not in table:
-        raise read.fail(
-            "arm", "takes a URDF from a base to a tip: name both links (the tip wears the skin)"
-        )
-    links = (read.text(table[key], f"arm.{key}") for key in ("base", "tip"))
-    return Chain.from_urdf(path, *links)
-
-
-def _arm(
-    read: Reader, table: Mapping[str, Any]
-) -> tuple[Chain, tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    keys = ("stiffness_nm_rad", "damping_nms_rad", "inertia_kg_m2")
-    read.known(table, "arm", ("chain", "base", "tip", *keys))
-    name = read.text(table.get("chain", "cody"), "arm.chain")
-    chain = _chain(read, name, table)
-    positive = Field(0.0, math.inf, None, "", open_low=True)
-    gains: list[tuple[float, ...]] = []
-    at_least_0 = Field(0.0, math.inf, None, "")
-    for key, cody, limits in (
-        ("stiffness_nm_rad", CODY_STIFFNESS, positive),
-        ("damping_nms_rad", CODY_DAMPING, at_least_0),
-        ("inertia_kg_m2", CODY_INERTIA, at_least_0),
+        chain = Chain.cody()
+    elif path.suffix == ".urdf":
+        chain = Chain.from_urdf(path, table.text("base"), table.text("tip"))
+    else:
+        chain = Chain.from_toml(path)
+    gains = []
+    for key, cody, absent in (
+        ("stiffness_nm_rad", CODY_STIFFNESS, REQUIRED),
+        ("damping_nms_rad", CODY_DAMPING, REQUIRED),
+        ("inertia_kg_m2", CODY_INERTIA, ()),
     ):
-        if key == "inertia_kg_m2" and key not in table and name != "cody":
-            gains.append(())
-            continue
-        if key not in table and name != "cody":
-            raise read.fail(f"arm.{key}", "is missing: one number a joint of arm.chain")
-        gains.append(read.numbers(table.get(key, list(cody)), f"arm.{key}", chain.dof, limits))
-    return chain, gains[0], gains[1], gains[2]
+        default = cody if name == "cody" else absent
+        count = chain.dof if table.has(key) or default else 0
+        above_0 = key == "stiffness_nm_rad"
+        gains.append(table.numbers(key, count, default, low=0.0, open_low=above_0))
+    table.done()
+    return chain, *gains
 
 
 def _motion(
-    read: Reader, table: Mapping[str, Any], chain: Chain
+    table: SceneTable, chain: Chain, skin: SkinLayout
 ) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
-    read.known(table, "motion", ("start_deg", "rate_deg_s", "travel_s", "place_m"))
-    angle = Field(-720.0, 720.0, None, "")
-    out: list[tuple[float, ...]] = []
-    for key, cody in (("start_deg", CODY_START_DEG), ("rate_deg_s", CODY_RATE_DEG_S)):
-        if key not in table and chain.dof != len(cody):
-            raise read.fail(f"motion.{key}", "is missing: one number a joint of arm.chain")
-        degrees = read.numbers(table.get(key, list(cody)), f"motion.{key}", chain.dof, angle)
-        out.append(tuple(math.radians(d) for d in degrees))
-    if not any(out[1]):
-        raise read.fail("motion.rate_deg_s", "is all zero: the arm would never reach an object")
-    travel = read.number(
-        table.get("travel_s", 1e6), "motion.travel_s", Field(0.0, 1e6, None, "", open_low=True)
+    start, rate = (
+        table.numbers(key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0)
+        for key, cody in (("start_deg", CODY_START_DEG), ("rate_deg_s", CODY_RATE_DEG_S))
     )
-    place = read.number(table.get("place_m", 0.103), "motion.place_m", Field(-10.0, 10.0, None, ""))
-    for (joint, limits), angle0 in zip(
-        zip(chain.names, chain.limits, strict=True), out[0], strict=True
-    ):
-        if limits is not None and not limits[0] - 1e-9 <= angle0 <= limits[1] + 1e-9:
-            low, high = (math.degrees(v) for v in limits)
-            raise read.fail(
-                "motion.start_deg",
-                f"of {joint} must be {low:g} to {high:g}, not {math.degrees(angle0):g}",
-            )
-    return out[0], out[1], travel, place
+    if not any(rate):
+        raise table.fail("rate_deg_s", "such that the arm reaches an object", rate)
+    for joint, limits, angle in zip(chain.names, chain.limits, start, strict=True):
+        if limits is not None:
+            low, high = (math.degrees(limit) for limit in limits)
+            if not low - 1e-7 <= angle <= high + 1e-7:
+                raise table.fail(f"start_deg of {joint}", f"{low:g} to {high:g}", angle)
+    travel_s = table.number("travel_s", 1e6, 0.0, 1e6, open_low=True)
+    last_m = skin.row0_z_m - skin.pitch[0] * (skin.rows - 1)
+    place_m = table.number("place_m", 0.103, last_m, skin.row0_z_m)
+    table.done()
+    return tuple(map(math.radians, start)), tuple(map(math.radians, rate)), travel_s, place_m
 
 
-def _skin(read: Reader, table: Mapping[str, Any]) -> tuple[SkinLayout, Value]:
-    shape = tuple(CODY_SKIN)
-    read.known(table, "skin", (*shape, *schema.SKIN))
-    layout: dict[str, Any] = {**CODY_SKIN, **{k: table[k] for k in shape if k in table}}
-    if "column_angles_deg" not in table and layout["cols"] != CODY_SKIN["cols"]:
-        layout |= _even_columns(read, layout, "pitch_m" in table)
-    for name in ("counts_per_newton", "threshold_counts", "onset_counts", "release_s"):
-        limits = schema.SKIN[name]
-        number = read.number(table.get(name, limits.default), f"skin.{name}", limits)
-        if name in ("threshold_counts", "onset_counts"):
-            if number != int(number):
-                raise read.fail(f"skin.{name}", f"must be a whole number, not {table[name]!r}")
-            layout[name] = int(number)
-        else:
-            layout[name] = number
-    skin = SkinLayout.from_dict(layout, where=read.where)
-    if skin.radius_m is None or skin.column_angles_deg is None or not skin.wraps:
-        raise read.fail("skin", "must be a cylinder: radius_m, column_angles_deg, wraps = true")
-    taxel = read.value(
-        table.get("taxel_n_m", schema.SKIN["taxel_n_m"].default),
-        "skin.taxel_n_m",
-        schema.SKIN["taxel_n_m"],
-    )
+def _skin(table: SceneTable) -> tuple[SkinLayout, Value]:
+    given = {key: table.get(key, default) for key, default in (CODY_SKIN | SCALE).items()}
+    cols = table.whole("cols", CODY_SKIN["cols"], range(1, 1001))
+    if not table.has("column_angles_deg") and cols != CODY_SKIN["cols"]:
+        # Evenly around the forearm, where the file gives their number alone.
+        angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
+        given["column_angles_deg"] = [a if a < 180.0 else a - 360.0 for a in angles]
+        if not table.has("pitch_m"):
+            radius = table.number("radius_m", CODY_SKIN["radius_m"], 0.0, 10.0, open_low=True)
+            given["pitch_m"] = [CODY_SKIN["pitch_m"][0], 2.0 * math.pi * radius / cols]
+    table.number("counts_per_newton", SCALE["counts_per_newton"], 0.0, 1e6, open_low=True)
+    taxel = table.value("taxel_n_m", schema.TAXEL)
+    table.done()
+    skin = SkinLayout.from_dict(given, where=table.where)
+    if not skin.wraps:
+        raise table.fail("wraps", "true: the skin is a cylinder")
     return skin, taxel
 
 
-def _even_columns(read: Reader, layout: dict[str, Any], pitched: bool) -> dict[str, Any]:
-    """Columns evenly around the forearm, where the file gives their number alone."""
-    cols = int(read.number(layout["cols"], "skin.cols", Field(1, 1000, None, "")))
-    radius = read.number(layout["radius_m"], "skin.radius_m", Field(0.0, 10.0, None, "", True))
-    angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
-    out: dict[str, Any] = {"column_angles_deg": [a if a < 180.0 else a - 360.0 for a in angles]}
-    if not pitched:
-        out["pitch_m"] = [CODY_SKIN["pitch_m"][0], 2.0 * math.pi * radius / cols]
-    return out
-
-
 def _objects(
-    read: Reader, table: Mapping[str, Any], seed: int, push_n: float, skin: SkinLayout
+    top: SceneTable, seed: int, push_n: float, skin: SkinLayout
 ) -> tuple[SceneObject, ...]:
-    entries: dict[str, list[object]] = {}
-    for key in ("object", "family"):
-        value = table.get(key, [])
-        if not isinstance(value, list):
-            raise read.fail(key, f"must be tables [[{key}]], not {value!r}")
-        entries[key] = value
-    if not entries["object"] and not entries["family"]:
-        raise read.fail("object", "is missing: give at least one [[object]] or [[family]]")
-    objects = tuple(
-        _object(read, read.table(entry, f"object {i}"), i)
-        for i, entry in enumerate(
-            [
-                *entries["object"],
-                *(
-                    member
-                    for i, entry in enumerate(entries["family"])
-                    for member in draw_family(
-                        read, read.table(entry, f"family {i}"), seed, push_n, skin
-                    )
-                ),
-            ]
-        )
-    )
+    tables = list(_named(top, "object"))
+    for family in _named(top, "family"):
+        for drawn in draw_family(family, seed, push_n, skin):
+            tables.append(SceneTable(drawn, top.where, f"object {drawn['name']!r}: "))
+    if not tables:
+        raise InputError(f"{top.where}: give at least one [[object]] or [[family]]")
+    objects = tuple(map(_object, tables))
     slugs = [o.slug for o in objects]
-    for o, slug in zip(objects, slugs, strict=True):
-        if slugs.count(slug) > 1:
-            raise read.fail(f"object {o.name!r}", "is there twice; give each its own name")
+    for table, item in zip(tables, objects, strict=True):
+        if not item.slug:
+            raise table.fail("name", "text with a letter or a digit")
+        if slugs.count(item.slug) > 1:
+            raise table.fail("name", "of one object only")
     return objects
 
 
-def _object(read: Reader, table: Mapping[str, Any], index: int) -> SceneObject:
-    name = read.text(table.get("name", ""), f"object {index}: name")
-    key = f"object {name!r}:"
-    if not any(c.isalnum() for c in name):
-        raise read.fail(key, "name needs a letter or a digit")
-    plain = ("name", "family", "conditions")
-    family = table.get("family")
-    if family not in schema.FAMILIES:
-        raise read.fail(
-            f"{key} family", f"must be one of {', '.join(schema.FAMILIES)}, not {family!r}"
-        )
-    family = str(family)
-    of_others = {
-        k
-        for other, keys in schema.FAMILY_KEYS.items()
-        if other != family
-        for k in keys
-        if k not in schema.FAMILY_KEYS[family]
-    }
-    allowed = tuple(k for k in schema.OBJECT if k not in of_others)
-    read.known(table, f"object {name!r}", (*plain, *allowed))
-    conditions = read.names(table.get("conditions"), f"{key} conditions", schema.CONDITIONS)
+def _named(top: SceneTable, key: str) -> Iterator[SceneTable]:
+    """The tables of a list, which errors call by their names."""
+    for table in top.tables(key, key) if top.get(key, []) != [] else ():
+        yield SceneTable(table.raw, top.where, f"{key} {table.text('name')!r}: ")
+
+
+def _object(table: SceneTable) -> SceneObject:
+    name = table.text("name")
+    family = table.choice("family", schema.FAMILIES)
+    conditions = table.names("conditions", schema.CONDITIONS)
     if not conditions:
-        raise read.fail(f"{key} conditions", "must name fixed, movable or both")
+        raise table.fail("conditions", "fixed, movable or both")
+    own = schema.FAMILY_KEYS[family]
+    others = {key for keys in schema.FAMILY_KEYS.values() for key in keys} - set(own)
     values: dict[str, Value] = {}
-    for k in allowed:
-        limits = schema.OBJECT[k]
-        if k in table:
-            values[k] = read.value(table[k], f"{key} {k}", limits)
-        elif k in schema.FAMILY_KEYS[family]:
-            default = schema.FAMILY_KEYS[family][k]
-            values[k] = Value(default, default)
-        elif limits.default is not None and k not in schema.FAMILY_KEYS[schema.FOLIAGE]:
-            values[k] = Value(limits.default, limits.default)
+    for key in schema.OBJECT:
+        if key in others:
+            continue
+        limits = schema.OBJECT[key]
+        default = own.get(key, limits.default)
+        if table.has(key) or default is not None:
+            values[key] = table.value(key, limits, default)
+    if table.has("stem_count"):  # a family's range is drawn by now
+        table.field("stem_count", schema.OBJECT["stem_count"])
     if "movable" in conditions:
-        for k in ("mass_kg", "friction_static", "friction_kinetic"):
-            if k not in values:
-                raise read.fail(f"{key} {k}", "is missing: a movable object slides on it")
-    _check_pairs(read, key, values)
-    return SceneObject(name, family, conditions, values, frozenset(table) & set(schema.OBJECT))
-
-
-def _check_pairs(read: Reader, key: str, values: dict[str, Value]) -> None:
+        for key in ("mass_kg", "friction_static", "friction_kinetic"):
+            table.get(key)
+    if table.has("base_m") or table.has("height_m"):
+        for key in ("base_m", "height_m"):
+            table.get(key)
     static, kinetic = values.get("friction_static"), values.get("friction_kinetic")
     if static is not None and kinetic is not None and kinetic.high > static.low:
-        raise read.fail(
-            f"{key} friction_kinetic",
-            f"must be at most friction_static ({static.low:g}), not {kinetic.high:g}",
-        )
-    if ("base_m" in values) != ("height_m" in values):
-        raise read.fail(f"{key}", "tipping needs both base_m and height_m")
-    count = values.get("stem_count")
-    if count is not None and (count.varies or count.low != int(count.low)):
-        raise read.fail(f"{key} stem_count", "must be one whole number")
+        wanted = f"at most friction_static ({static.low:g})"
+        raise table.fail("friction_kinetic", wanted, kinetic.high)
+    table.done()
+    return SceneObject(
+        name, family, conditions, values, frozenset(filter(table.has, schema.OBJECT))
+    )
 
 
 def _effects(
-    read: Reader, value: object
+    table: SceneTable,
 ) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, dict[str, float]]]:
-    table = read.table(value, "effects")
-    read.known(table, "effects", ("add", "leave_out", *EFFECTS))
-    add = read.names(table.get("add", []), "effects.add", tuple(EFFECTS))
-    leave_out = read.names(table.get("leave_out", []), "effects.leave_out", tuple(EFFECTS))
+    add = table.names("add", tuple(EFFECTS))
+    leave_out = table.names("leave_out", tuple(EFFECTS))
     settings = {
-        name: _fields(read, table.get(name, {}), f"effects.{name}", info.settings)
+        name: table.table(name).fields(info.settings)
         for name, info in EFFECTS.items()
-        if name in add or name in table
+        if info.settings and table.has(name)
     }
-    for name in table:
-        if name in EFFECTS and not EFFECTS[name].settings:
-            raise read.fail(
-                f"effects.{name}", "has no settings; name it in effects.add, or the object's keys"
-            )
-    add = (*add, *(n for n in EFFECTS if n in table and n not in add))
-    both = [n for n in add if n in leave_out]
-    if both:
-        raise read.fail("effects", f"both adds and leaves out {both[0]}")
+    table.done()
+    add = (*add, *(name for name in settings if name not in add))
+    for name in set(add) & set(leave_out):
+        raise table.fail("leave_out", f"without {name}, which effects.add adds")
     return add, leave_out, settings

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-
-from edge.touch.layout import RELEASE_S
-
-INF = math.inf
 
 
 @dataclass(frozen=True)
@@ -20,6 +15,7 @@ class Field:
     says: str
     open_low: bool = False
     """The lower limit itself is not allowed."""
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,19 +43,13 @@ FAMILIES = (RIGID, *SOFT_FAMILIES)
 CONDITIONS = ("fixed", "movable")
 
 TRIALS = {
-    "count": Field(1, 1_000_000, 5, "trials of each object in each condition"),
-    "lead_s": Field(0.02, 10.0, 0.2, "time before the skin reaches the object"),
+    "count": Field(1, 1_000_000, 5, "trials of each object in each condition", whole=True),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
     "tolerance": Field(1e-5, 0.5, 0.01, "what the step may cost, as a part of the peak force"),
 }
-SKIN = {
-    "counts_per_newton": Field(0.0, 1e6, 1000.0, "counts", open_low=True),
-    "threshold_counts": Field(0, 65535, 100, "a taxel above it is in contact"),
-    "onset_counts": Field(0, 65535, 200, "a contact begins when its peak is above it"),
-    "release_s": Field(0.0, 60.0, RELEASE_S, "a contact ends after so long without", open_low=True),
-    "taxel_n_m": Field(0.0, 1e18, 10_000.0, "stiffness of a taxel", open_low=True),
-}
+LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
+TAXEL = Field(0.0, 1e18, 10_000.0, "stiffness of a taxel in N/m", open_low=True)
 LABELS = {
     "window_s": Field(0.01, 60.0, 1.2, "time after the first touch within which a label shows"),
     "push_n": Field(0.1, 1e6, 6.0, "moves each movable object that a [[family]] gives"),
@@ -95,7 +85,7 @@ OBJECT = {
     "depth_m": Field(0.0, 10.0, None, "of the elastic foundation", open_low=True),
     "relax_ratio": Field(0.0, 100.0, None, "k1 / k_inf of the standard linear solid"),
     "relax_s": Field(0.0, 1e6, None, "its time", open_low=True),
-    "stem_count": Field(1, 200, None, "stems the forearm can meet"),
+    "stem_count": Field(1, 200, None, "stems the forearm can meet", whole=True),
     "stem_n_m": Field(0.0, 1e12, None, "stiffness of a stem, 3 E I / L^3", open_low=True),
     "stem_spread_m": Field(0.0, 1.0, None, "depth over which the stems stand"),
     "stem_slip_m": Field(0.0, 10.0, None, "bend at which a stem slips off", open_low=True),
@@ -242,7 +232,7 @@ EFFECTS: dict[str, EffectInfo] = {
         1,
         {
             "part": Field(0.0, 1.0, 0.01, "of all taxels"),
-            "known": Field(0, 1, 1, "1: the recording marks them invalid; 0: they read zero"),
+            "known": Field(0, 1, 1, "1: marked invalid; 0: they read zero", whole=True),
         },
     ),
     "jitter": EffectInfo(

@@ -154,7 +154,7 @@ class TestCommand:
             ([str(DEMO), "--out", "x", "--batch", "0"], "--batch must be at least 1"),
             ([str(DEMO), "--out", "x", "--backend", "dask"], "needs --address"),
             ([str(DEMO), "--out", "x", "--address", "tcp://h:1"], "needs --backend dask"),
-            ([str(DEMO), "--out", "x", "--trials", "0"], "trials.count must be at least 1"),
+            ([str(DEMO), "--out", "x", "--trials", "0"], "trials.count must be a whole number"),
         ],
     )
     def test_bad_usage_is_one_sentence(self, arguments, says, capsys, tmp_path, monkeypatch):

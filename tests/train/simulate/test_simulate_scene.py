@@ -63,7 +63,7 @@ def test_values_ranges_and_defaults():
     assert (box.values["mass_kg"].low, box.values["mass_kg"].high) == (1.0, 2.0)
     assert box.values["mass_kg"].varies
     assert not box.values["friction_static"].varies
-    assert scene.settings == {"tilt": {}, "noise": {"counts": 4.0}}
+    assert scene.settings == {"noise": {"counts": 4.0}}
     assert scene.arm.dof == 5
     assert scene.skin.shape == (16, 24)
 
@@ -71,45 +71,106 @@ def test_values_ranges_and_defaults():
 @pytest.mark.parametrize(
     ("path", "value", "says"),
     [
-        (("colour",), 1, "unknown key colour; allowed here: name, seed, trials"),
-        (("trials", "cuont"), 1, "unknown key trials.cuont; allowed here: count, lead_s"),
-        (("trials", "count"), 0, "trials.count must be at least 1"),
+        (("colour",), 1, "unknown key colour; allowed: seed, trials, arm"),
+        (("trials", "cuont"), 1, "unknown key trials.cuont; allowed: lead_s, count"),
+        (("trials", "count"), 0, "trials.count must be a whole number from 1 to 1000000, not 0"),
         (("trials", "count"), 2.5, "trials.count must be a whole number"),
-        (("trials", "lead_s"), [0.3, 0.1], "trials.lead_s has a lower limit above"),
+        (
+            ("trials", "lead_s"),
+            [0.3, 0.1],
+            "trials.lead_s must be a range with its lower limit first, [0.1, 0.3], not [0.3, 0.1]",
+        ),
         (("trials", "lead_s"), [0.1], "trials.lead_s must be one number or a range"),
-        (("trials", "rate_hz"), float("nan"), "trials.rate_hz must be at least 1"),
+        (
+            ("trials", "rate_hz"),
+            float("nan"),
+            "trials.rate_hz must be a number from 1 to 10000, not nan",
+        ),
         (("seed",), -1, "seed must be a whole number"),
         (("seed",), True, "seed must be a whole number"),
-        (("step_s", "sliding"), 0.003, "step_s.sliding must divide the frame's 0.01 s evenly"),
+        (("step_s", "sliding"), 0.003, "step_s.sliding must be an even part of a frame's 0.01 s"),
         (("step_s", "soup"), 0.01, "unknown key step_s.soup"),
-        (("skin", "taxel_n_m"), 0.0, "skin.taxel_n_m must be above 0"),
+        (("skin", "taxel_n_m"), 0.0, "skin.taxel_n_m must be a number above 0"),
         (("skin", "threshold_counts"), 1.5, "skin.threshold_counts must be a whole number"),
-        (("spread", "yaw_deg"), 50, "spread.yaw_deg must be at least 0, at most 30"),
-        (("motion",), {"rate_deg_s": [0, 0, 0, 0, 0]}, "motion.rate_deg_s is all zero"),
-        (("motion",), {"start_deg": [-60, 0, 0, 0, 0]}, "motion.start_deg of shoulder_pitch"),
-        (("motion",), {"start_deg": [1, 2]}, "motion.start_deg must be 5 numbers"),
-        (("arm",), {"stiffness_nm_rad": [1, 1, 1, 1, -1]}, "arm.stiffness_nm_rad must be above 0"),
-        (("effects", "add"), ["tlit"], "effects.add has no 'tlit'; allowed: foundation"),
+        (("spread", "yaw_deg"), 50, "spread.yaw_deg must be a number from 0 to 30, not 50"),
+        (
+            ("motion",),
+            {"rate_deg_s": [0, 0, 0, 0, 0]},
+            "motion.rate_deg_s must be such that the arm reaches",
+        ),
+        (
+            ("motion",),
+            {"start_deg": [-60, 0, 0, 0, 0]},
+            "motion.start_deg of shoulder_pitch must be -47.61 to 120, not -60.0",
+        ),
+        (
+            ("motion",),
+            {"start_deg": [1, 2]},
+            "motion.start_deg must be a list of 5 numbers, not [1, 2]",
+        ),
+        (
+            ("arm",),
+            {"stiffness_nm_rad": [1, 1, 1, 1, -1]},
+            "arm.stiffness_nm_rad must be a number above 0, not -1",
+        ),
+        (
+            ("effects", "add"),
+            ["tlit"],
+            "effects.add must be a list of different names out of foundation, lateral",
+        ),
         (("effects", "add"), ["stems"], "it needs an object of family foliage"),
         (("effects", "add"), ["relaxation"], "it needs an object of family foam or pillow"),
         (("effects", "add"), ["cover"], "it needs an object with cover_n_m"),
-        (("effects", "add"), ["noise", "noise"], "effects.add names one twice"),
-        (("effects", "leave_out"), ["tilt"], "effects both adds and leaves out tilt"),
-        (("effects", "tilt"), {"x": 1}, "unknown key effects.tilt.x"),
-        (("effects", "noise"), {"counts": -1}, "effects.noise.counts must be at least 0"),
+        (("effects", "add"), ["noise", "noise"], "effects.add must be a list of different names"),
+        (
+            ("effects", "leave_out"),
+            ["tilt"],
+            "effects.leave_out must be without tilt, which effects.add adds",
+        ),
+        (
+            ("effects", "tilt"),
+            {"x": 1},
+            "unknown key effects.tilt; allowed: add, leave_out, inertia",
+        ),
+        (
+            ("effects", "noise"),
+            {"counts": -1},
+            "effects.noise.counts must be a number from 0 to 65535, not -1",
+        ),
         (("effects", "noise"), 3, "effects.noise must be a table"),
-        (("object",), [], "object is missing"),
+        (("object",), {}, "object must be a list of tables, not {}"),
+        (("object",), [], "give at least one [[object]] or [[family]]"),
         (("object", 0, "family"), "metal", "family must be one of rigid, foam"),
-        (("object", 0, "mass_kg"), -1.0, "object 'box': mass_kg must be above 0"),
-        (("object", 0, "friction_static"), -0.1, "friction_static must be at least 0"),
+        (
+            ("object", 0, "mass_kg"),
+            -1.0,
+            "object 'box': mass_kg must be a number above 0, at most 1e+12, not -1.0",
+        ),
+        (
+            ("object", 0, "friction_static"),
+            -0.1,
+            "friction_static must be a number from 0 to 5, not -0.1",
+        ),
         (("object", 0, "friction_kinetic"), 0.6, "must be at most friction_static (0.5)"),
-        (("object", 0, "mass_kg"), [2.0, 1.0], "mass_kg has a lower limit above"),
-        (("object", 0, "mass_kg"), "heavy", "mass_kg must be a number (above 0"),
-        (("object", 0, "conditions"), ["flying"], "conditions has no 'flying'"),
-        (("object", 0, "conditions"), [], "conditions must name fixed, movable or both"),
-        (("object", 0, "modulus_pa"), 1e4, "unknown key object 'box'.modulus_pa"),
-        (("object", 0, "base_m"), 0.2, "tipping needs both base_m and height_m"),
-        (("object", 0, "name"), "", "name must be text"),
+        (
+            ("object", 0, "mass_kg"),
+            [2.0, 1.0],
+            "mass_kg must be a range with its lower limit first, [1, 2]",
+        ),
+        (
+            ("object", 0, "mass_kg"),
+            "heavy",
+            "mass_kg must be a number above 0, at most 1e+12, not 'heavy'",
+        ),
+        (
+            ("object", 0, "conditions"),
+            ["flying"],
+            "conditions must be a list of different names out of fixed, movable",
+        ),
+        (("object", 0, "conditions"), [], "conditions must be fixed, movable or both"),
+        (("object", 0, "modulus_pa"), 1e4, "object 'box': unknown key modulus_pa; allowed: name"),
+        (("object", 0, "base_m"), 0.2, "object 'box': height_m is missing"),
+        (("object", 0, "name"), "", "object 0: name must be text"),
     ],
 )
 def test_a_mistake_gets_one_sentence_with_the_key_and_what_is_allowed(path, value, says):
@@ -130,7 +191,7 @@ def test_a_movable_object_needs_what_it_slides_on():
 def test_two_objects_of_one_name():
     table = copy.deepcopy(GOOD)
     table["object"] = table["object"] * 2
-    with pytest.raises(InputError, match="'box' is there twice"):
+    with pytest.raises(InputError, match="object 'box': name must be of one object only"):
         from_dict(table)
 
 
@@ -139,7 +200,7 @@ def test_files_that_are_no_scene(tmp_path):
         scenes.load(tmp_path / "none.toml")
     path = tmp_path / "bad.toml"
     path.write_bytes(b"a = [1\n\xff")
-    with pytest.raises(InputError, match="not TOML"):
+    with pytest.raises(InputError, match="not a text file: it is not UTF-8"):
         scenes.load(path)
 
 
