@@ -251,16 +251,16 @@ class ConfigTable:
 
     def texts(self, key: str, default: Any = REQUIRED) -> tuple[str, ...]:
         """A list of texts."""
-        value = self.get(key, default)
-        if not isinstance(value, list | tuple) or not all(isinstance(x, str) for x in value):
-            raise self.fail(key, "a list of texts")
-        return tuple(value)
+        return self._list(key, default, str, "texts")
 
     def wholes(self, key: str, default: Any = REQUIRED) -> tuple[int, ...]:
         """A list of whole numbers."""
+        return self._list(key, default, int, "whole numbers")
+
+    def _list(self, key: str, default: Any, kind: type, what: str) -> tuple[Any, ...]:
         value = self.get(key, default)
-        if not isinstance(value, list | tuple) or not all(type(x) is int for x in value):
-            raise self.fail(key, "a list of whole numbers")
+        if not isinstance(value, list | tuple) or any(type(x) is not kind for x in value):
+            raise self.fail(key, f"a list of {what}")
         return tuple(value)
 
     def pair(self, key: str, value: object = REQUIRED) -> tuple[int, int]:
@@ -277,7 +277,7 @@ class ConfigTable:
     def tables(self, key: str, item: str) -> list[Self]:
         """A list of at least one table; errors call each `item` and its number from 0."""
         entries = self.get(key, [])
-        if not isinstance(entries, list) or not entries:
+        if not isinstance(entries, list | tuple) or not entries:
             raise self.fail(key, "a list of tables", entries)
         return [type(self)(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)]
 

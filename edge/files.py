@@ -88,14 +88,14 @@ def read_bytes(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> byt
             ) from None
 
 
-def read_text(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> str:
+def read_text(path: str | os.PathLike[str]) -> str:
     """The text of a regular file.
 
     Raises:
         InputError: as `open_regular`, or it is not UTF-8.
     """
     with parsing(os.fspath(path), "a text file"):
-        return read_bytes(path, at_most).decode()
+        return read_bytes(path).decode()
 
 
 class NameTaken(InputError):

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -263,7 +264,7 @@ def machine() -> dict[str, Any]:
             "edge-classify": __version__,
             "python": platform.python_version(),
             "numpy": np.__version__,
-            "onnxruntime": _onnxruntime_version(),
+            "onnxruntime": version("onnxruntime"),
         },
     }
 
@@ -281,12 +282,6 @@ def kind() -> str:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or "unknown"
-
-
-def _onnxruntime_version() -> str:
-    from importlib.metadata import version
-
-    return version("onnxruntime")
 
 
 def wire(skin: SkinFile) -> dict[str, Any]:

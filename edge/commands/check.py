@@ -28,14 +28,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("skin", metavar="skin.toml", help="the file that describes the skin")
 
 
-def highest_count(file: SkinFile) -> int:
-    """The most counts that a touch can give on the chip with the smallest range."""
-    return min(chip.highest for chip in file.chips)
-
-
 def faults(file: SkinFile) -> Iterator[str]:
     """Why the skin cannot work, a sentence each."""
-    top = highest_count(file)
+    top = min(chip.highest for chip in file.chips)
     if file.layout.onset >= top:
         yield (
             f"no contact can begin: onset_counts is {file.layout.onset}, and a taxel gives at "

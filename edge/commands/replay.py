@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier
@@ -66,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_error(model, arguments.error)
     summary, output = Summary(model.info.tasks), Output.of(arguments)
     failed = 0
-    for path in _paths(arguments.recordings):
+    for path in find(arguments.recordings):
         try:
             recording = load(path)
             events = decide(model, recording, str(path), arguments.error)
@@ -86,11 +85,3 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.summary:
         output.text(summary.text())
     return 2 if failed else 0
-
-
-def _paths(texts: list[str]) -> list[Path]:
-    """The recordings named; `load` reports a path that does not exist."""
-    paths: list[Path] = []
-    for text in texts:
-        paths += find([text])
-    return paths

@@ -66,8 +66,8 @@ class PacedClock(VirtualClock):
     other programs, which send joint angles at real times, a clock that changes its speed.
     """
 
-    def __init__(self, start: float = 0.0) -> None:
-        super().__init__(start)
+    def __init__(self) -> None:
+        super().__init__()
         self._ahead = math.nan
 
     def real(self) -> float:

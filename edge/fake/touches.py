@@ -94,17 +94,9 @@ def reach(file: SkinFile) -> int:
     return most
 
 
-def newtons(recording: Recording) -> NDArray[np.float64]:
-    """(n, rows, cols) forces; counts where their force is not known."""
-    return recording.frames / (recording.layout.counts_per_newton or 1.0)
-
-
 def pitch(layout: SkinLayout) -> tuple[float, float]:
     """Metres between rows and between columns."""
-    if isinstance(layout.pitch_m, tuple):
-        return layout.pitch_m
-    known = layout.pitch_m or PITCH_M
-    return known, known
+    return (PITCH_M, PITCH_M) if layout.pitch_m is None else layout.pitch
 
 
 def _mapped(
@@ -115,7 +107,7 @@ def _mapped(
     if onto.wraps:
         col = rng.uniform(0.0, onto.cols)
     strength, speed = rng.uniform(*STRENGTH), rng.uniform(*SPEED)
-    forces = strength * newtons(source)
+    forces = strength * (source.frames / (source.layout.counts_per_newton or 1.0))
     middle = _middle(forces)
     lasts = float(source.t[-1] - source.t[0]) / speed
     t = np.arange(int((LEAD_S + lasts + TAIL_S) * rate_hz) + 1) / rate_hz

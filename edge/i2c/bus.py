@@ -88,25 +88,19 @@ class Response:
         error: the exception that stands for it.
         retries: how often the transaction is sent again within the same frame.
         reopen: the bus is opened anew before it is used again.
-        passing: it may pass; otherwise it is for a person to mend.
         mend: the end of the sentence for that person.
     """
 
     error: type[BusError]
     retries: int = 0
     reopen: bool = False
-    passing: bool = True
     mend: str = ""
 
 
 _NACK = Response(BusNack, 3, mend="does not answer; check its power, wiring and address")
 _GONE = Response(BusGone, reopen=True, mend="the adapter has gone; plug it in again")
-_REFUSED = Response(
-    BusRefused, 1, passing=False, mend="the adapter refuses a transaction of this shape"
-)
-_DENIED = Response(
-    BusDenied, passing=False, mend="may not be opened; add yourself to the group i2c, or use sudo"
-)
+_REFUSED = Response(BusRefused, 1, mend="the adapter refuses a transaction of this shape")
+_DENIED = Response(BusDenied, mend="may not be opened; add yourself to the group i2c, or use sudo")
 RESPONSES: dict[int, Response] = {
     errno.EREMOTEIO: _NACK,
     errno.ENXIO: _NACK,
@@ -115,13 +109,11 @@ RESPONSES: dict[int, Response] = {
     ),
     errno.ETIMEDOUT: Response(BusTimeout, reopen=True, mend="the transfer hung until its timeout"),
     errno.EAGAIN: Response(BusArbitration, 3, mend="another master holds the bus"),
-    errno.EBUSY: Response(
-        BusBusy, passing=False, mend="a driver of the kernel owns the address; unbind it"
-    ),
+    errno.EBUSY: Response(BusBusy, mend="a driver of the kernel owns the address; unbind it"),
     errno.EOPNOTSUPP: _REFUSED,
     errno.EINVAL: _REFUSED,
     errno.ENOENT: Response(
-        BusMissing, passing=False, mend="no such bus; is I2C switched on, and the number right?"
+        BusMissing, mend="no such bus; is I2C switched on, and the number right?"
     ),
     errno.EACCES: _DENIED,
     errno.EPERM: _DENIED,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -47,7 +46,7 @@ class Task:
     features: tuple[str, ...] = ()
     left_out: str = "trial"
     no_contact: str | None = None
-    resolution: tuple[float, float] = (0.0, 0.0)
+    resolution: tuple[float, ...] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -161,8 +160,9 @@ class ModelInfo:
                     f"{FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
-            points = tuple(meta.numbers("decision_points_s", default=()))
-            stopping, novelty = _calibration(meta.raw, len(points), where)
+            points = meta.numbers("decision_points_s", default=())
+            rules = meta.table("stopping") if points else ConfigTable({}, where)
+            novelty = meta.table("novelty") if points else None
             info = cls(
                 tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
                 layout=SkinLayout.from_dict(meta.get("skin"), where=where),
@@ -180,8 +180,10 @@ class ModelInfo:
                 data_digest=meta.text("data_digest", empty=True),
                 versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
                 decision_points_s=points,
-                stopping=stopping,
-                novelty=novelty,
+                stopping={
+                    task: Stopping.from_table(rules.table(task), len(points)) for task in rules.raw
+                },
+                novelty=None if novelty is None else Novelty.from_table(novelty, len(points)),
                 joints=meta.whole("joints", 0, allowed=range(0, 1001)),
             )
             tracking.done()
@@ -233,26 +235,7 @@ def _task(table: ConfigTable) -> Task:
         features=table.texts("features"),
         left_out=table.text("left_out"),
         no_contact=table.text("no_contact") if table.has("no_contact") else None,
-        resolution=_pair(table.numbers("resolution", 2, low=0.0)),
+        resolution=table.numbers("resolution", 2, low=0.0),
     )
     table.done()
     return task
-
-
-def _pair(values: tuple[float, ...]) -> tuple[float, float]:
-    first, second = values
-    return first, second
-
-
-def _calibration(
-    meta: Mapping[str, Any], points: int, where: str
-) -> tuple[dict[str, Stopping], Novelty | None]:
-    """The stopping rules of each task and the limits of novelty, of a model that has them."""
-    if not points:
-        return {}, None
-    try:
-        stopping = meta["stopping"].items()
-        rules = {str(task): Stopping.from_dict(entry, points) for task, entry in stopping}
-        return rules, Novelty.from_dict(meta["novelty"], points)
-    except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
-        raise InputError(f"{where}: its stopping rules cannot be read") from None

@@ -67,8 +67,8 @@ class Model:
         InputError: the file is missing, is not an exported model, or contradicts itself.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, threads: int = 1) -> None:
-        """Load the file; one thread is fastest for models of this size."""
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Load the file."""
         name = os.fspath(path)
         contents, checked = _contents(name)
         text = contents.metadata.get(METADATA_KEY)
@@ -80,8 +80,8 @@ class Model:
         self.info = ModelInfo.from_json(text, name)
         runtime = _onnxruntime()
         options = runtime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
+        # One thread is fastest for models of this size.
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 3
         # The exported graph has nothing left to optimise, and the board's memory is dear.
         options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_DISABLE_ALL
@@ -157,22 +157,17 @@ class Model:
                 "export it again"
             )
         outputs = {output.name: output.shape for output in self._session.get_outputs()}
-        if len(outputs.get("reach", ())) != 1:
-            raise InputError(f"{name}: has no output reach; export it again")
+        widths: dict[str, list[int]] = {"reach": []}
         for task, entry in self.info.tasks.items():
-            widths = {"scores": len(entry.labels), "next": 1}
-            widths |= dict.fromkeys(("distances", "neighbours"), entry.k)
+            widths |= {f"{task}_label": [], f"{task}_scores": [len(entry.labels)]}
+            widths |= {f"{task}_distances": [entry.k], f"{task}_neighbours": [entry.k]}
+            widths[f"{task}_next"] = [1]
             if self.info.decision_points_s:
-                widths["label_distances"] = len(entry.labels)
-            if f"{task}_label" not in outputs:
-                raise InputError(f"{name}: has no output {task}_label; export it again")
-            for part, width in widths.items():
-                shape = outputs.get(f"{task}_{part}")
-                if shape is None or len(shape) != 2 or shape[1] != width:
-                    raise InputError(
-                        f"{name}: has no output {task}_{part} of width {width}, "
-                        "as its metadata says; export it again"
-                    )
+                widths[f"{task}_label_distances"] = [len(entry.labels)]
+        for output, width in widths.items():
+            if output not in outputs or outputs[output][1:] != width:
+                wide = f" of width {width[0]}, as its metadata says" if width else ""
+                raise InputError(f"{name}: has no output {output}{wide}; export it again")
 
     @property
     def decision_points_s(self) -> tuple[float, ...]:
@@ -293,7 +288,7 @@ class _Answer(NamedTuple):
 
     task: str
     labels: tuple[str, ...]
-    resolution: tuple[float, float]
+    resolution: tuple[float, ...]
     label: NDArray[np.int64]
     scores: NDArray[np.float64]
     near: NDArray[np.float64]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from edge.config import ConfigTable
 from edge.errors import InputError
 
 UNKNOWN = "unknown"
@@ -128,44 +129,29 @@ class Stopping:
         return asdict(self)
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], points: int) -> Stopping:
-        """Read `to_dict`.
-
-        Args:
-            values: parsed JSON.
-            points: how many decision points the model has.
+    def from_table(cls, table: ConfigTable, points: int) -> Stopping:
+        """Read `to_dict`, of a model that has so many decision points.
 
         Raises:
-            KeyError, TypeError, ValueError: it is not what `to_dict` gives.
+            InputError: it is not what `to_dict` gives.
         """
-        found = cls(
-            slopes=tuple(map(float, values["slopes"])),
-            intercepts=tuple(map(float, values["intercepts"])),
+        trials = table.whole("trials", allowed=range(1, 1 << 31))
+        return cls(
+            slopes=table.numbers("slopes", points, low=0.0, open_low=True),
+            intercepts=table.numbers("intercepts", points),
             rules=tuple(
                 StoppingRule(
-                    error=float(rule["error"]),
-                    mean_s=float(rule["mean_s"]),
-                    confidence=float(rule["confidence"]),
-                    last=int(rule["last"]),
+                    error=rule.number("error", low=0.0, high=1.0, open_low=True),
+                    mean_s=rule.number("mean_s"),
+                    confidence=rule.number("confidence"),
+                    last=rule.whole("last", allowed=range(points)),
                 )
-                for rule in values["rules"]
+                for rule in table.tables("rules", f"{table.prefix}rules")
             ),
-            trials=int(values["trials"]),
-            wrong=int(values["wrong"]),
-            risk=float(values["risk"]),
+            trials=trials,
+            wrong=table.whole("wrong", allowed=range(trials + 1)),
+            risk=table.number("risk", low=0.0, high=1.0, open_low=True),
         )
-        if not (
-            len(found.slopes) == len(found.intercepts) == points
-            and all(map(math.isfinite, found.intercepts))
-            and all(0.0 < slope < math.inf for slope in found.slopes)
-            and found.rules
-            and all(0 <= rule.last < points for rule in found.rules)
-            and all(0.0 < rule.error <= 1.0 for rule in found.rules)
-            and 0 <= found.wrong <= found.trials > 0
-            and 0.0 < found.risk < 1.0
-        ):
-            raise ValueError("a stopping rule makes no sense")
-        return found
 
 
 @dataclass(frozen=True)
@@ -198,21 +184,15 @@ class Novelty:
         return asdict(self)
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], points: int) -> Novelty:
-        """Read `to_dict`.
+    def from_table(cls, table: ConfigTable, points: int) -> Novelty:
+        """Read `to_dict`, of a model that has so many decision points.
 
         Raises:
-            KeyError, TypeError, ValueError: it is not what `to_dict` gives.
+            InputError: it is not what `to_dict` gives.
         """
-        found = cls(
-            str(values["task"]),
-            tuple(map(float, values["rates"])),
-            tuple(tuple(map(float, row)) for row in values["limits"]),
-        )
-        if (
-            len(found.limits) != points
-            or not found.rates
-            or any(len(row) != len(found.rates) for row in found.limits)
-        ):
-            raise ValueError("the limits of novelty make no sense")
-        return found
+        rates, rows = table.numbers("rates"), table.get("limits")
+        if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
+            raise table.fail("limits", f"{points} rows of a number for each of the rates")
+        lines = (ConfigTable({"limits": row}, table.where, table.prefix) for row in rows)
+        limits = tuple(line.numbers("limits", len(rates)) for line in lines)
+        return cls(table.text("task"), rates, limits)

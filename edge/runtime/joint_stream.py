@@ -90,7 +90,6 @@ class Joints:
         self._backward = 0
         self._window_ends = -math.inf
         self._ended = False
-        self.received = 0
         self.malformed = 0
         """Lines that were no pose."""
         self.problem = ""
@@ -196,7 +195,6 @@ class Joints:
             self._recent.clear()
             self._delay = [math.inf, math.inf]
         self._backward = 0
-        self.received += 1
         if arrived > self._window_ends:
             self._window_ends = arrived + WINDOW_S
             self._delay = [math.inf, self._delay[0]]
@@ -224,8 +222,8 @@ class Datagrams:
         others: {sender: datagrams that were left out}.
     """
 
-    def __init__(self, listener: socket.socket, now: Callable[[], float] = time.monotonic) -> None:
-        self._listener, self._now = listener, now
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener, self._now = listener, time.monotonic
         self._sender: object = None
         self._heard = -math.inf
         self.others: dict[str, int] = {}

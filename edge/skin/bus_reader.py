@@ -204,26 +204,24 @@ class BusReader:
         if isinstance(error, BusTimeout):
             pause = min(HUNG_PAUSE_S * 4.0 ** min(slot.failures - 1, 10), LONGEST_HUNG_PAUSE_S)
             self._timeouts += 1
-            self._reopen()
+            self._gone = not self._reopened()
         elif isinstance(error, BusGone):
             self._gone = True
         slot.retry_at = self.bus.now() + pause
 
-    def _reopen(self) -> None:
+    def _reopened(self) -> bool:
+        """Whether the bus could be opened anew."""
         for mux in self._muxes.values():
             mux.forget()
         try:
             self.bus.reopen()
         except BusError:
-            self._gone = True
+            return False
+        return True
 
     def _return(self) -> bool:
         """Try a bus that was gone."""
-        for mux in self._muxes.values():
-            mux.forget()
-        try:
-            self.bus.reopen()
-        except BusError:
+        if not self._reopened():
             self._resting_until = self.bus.now() + GONE_PAUSE_S
             return False
         self._gone = False

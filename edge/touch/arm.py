@@ -215,17 +215,14 @@ class Chain:
         Raises:
             InputError: a key is unknown or missing, or a value makes no sense.
         """
-        return cls._from_table(ConfigTable(arm, where))
-
-    @classmethod
-    def _from_table(cls, table: ConfigTable) -> Chain:
+        table = ConfigTable(arm, where)
         joints = [_joint_from(joint, i) for i, joint in enumerate(table.tables("joint", "joint"))]
         base, tip = table.text("base", "base"), table.text("tip", "tip")
         table.done()
         try:
             return cls(joints, base, tip)
         except InputError as error:
-            raise InputError(f"{table.where}: {error}") from None
+            raise InputError(f"{where}: {error}") from None
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Chain:
@@ -234,7 +231,7 @@ class Chain:
         Raises:
             InputError: the file cannot be read, or is not a chain.
         """
-        return cls._from_table(read_toml(path))
+        return cls.from_dict(read_toml(path).raw, where=os.fspath(path))
 
     @classmethod
     def cody(cls) -> Chain:

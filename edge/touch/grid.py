@@ -24,18 +24,6 @@ class Grid:
     Connectivity is 4 (taxels that share an edge) or 8 (a corner is enough).
     """
 
-    __slots__ = (
-        "_col_planes",
-        "_columns",
-        "_halves",
-        "_row_planes",
-        "cols",
-        "connectivity",
-        "rows",
-        "stride",
-        "wraps",
-    )
-
     def __init__(self, rows: int, cols: int, wraps: bool, connectivity: int) -> None:
         if connectivity not in (4, 8):
             raise InputError(f"connectivity must be 4 or 8, not {connectivity!r}")

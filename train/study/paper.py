@@ -18,7 +18,6 @@ Numbers = dict[tuple[str, str, str], float]
 """{(table, setting, task): accuracy in percent}."""
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140
-FIG10_TASKS = ("category", "object")
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.model.stopping import (
     Novelty,
@@ -79,30 +80,42 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
     assert "needs about" in stopping(wrong=0).refusal(0.01)
 
 
+def table(stored):
+    return ConfigTable(stored.to_dict(), "model.onnx", "stopping.t.")
+
+
 def test_what_is_stored_is_read_again():
-    assert Stopping.from_dict(stopping().to_dict(), 3) == stopping()
+    assert Stopping.from_table(table(stopping()), 3) == stopping()
     at_once = stopping(rules=(StoppingRule(0.2, 0.4, 0.0, 0),), wrong=0)
-    assert Stopping.from_dict(at_once.to_dict(), 3) == at_once
+    assert Stopping.from_table(table(at_once), 3) == at_once
     novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0, 4.0)))
-    assert Novelty.from_dict(novelty.to_dict(), 2) == novelty
+    assert Novelty.from_table(table(novelty), 2) == novelty
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "says"),
     [
-        {"slopes": (1.0, 1.0)},
-        {"slopes": (1.0, -1.0, 1.0)},
-        {"intercepts": (0.0, 0.0, math.nan)},
-        {"rules": ()},
-        {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
-        {"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)},
-        {"wrong": 141},
-        {"risk": 0.0},
+        ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
+        ({"slopes": (1.0, -1.0, 1.0)}, "slopes must be a number above 0, not -1.0"),
+        ({"intercepts": (0.0, 0.0, math.nan)}, "intercepts must be a finite number, not nan"),
+        ({"rules": ()}, "rules must be a list of tables"),
+        ({"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)}, "rules 0: last must be .* 0 to 2, not 3"),
+        ({"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)}, "rules 0: error must be a number above 0"),
+        ({"wrong": 141}, "wrong must be a whole number from 0 to 140, not 141"),
+        ({"risk": 0.0}, "risk must be a number above 0, at most 1, not 0.0"),
     ],
 )
-def test_what_contradicts_itself_is_no_stopping(changes):
-    with pytest.raises(ValueError, match="makes no sense"):
-        Stopping.from_dict(stopping(**changes).to_dict(), 3)
+def test_what_contradicts_itself_is_no_stopping(changes, says):
+    with pytest.raises(InputError, match=f"model.onnx: stopping.t.{says}"):
+        Stopping.from_table(table(stopping(**changes)), 3)
+
+
+def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
+    novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0,)))
+    with pytest.raises(InputError, match="limits must be a list of 2 numbers, not"):
+        Novelty.from_table(table(novelty), 2)
+    with pytest.raises(InputError, match="limits must be 3 rows of a number for each of the rates"):
+        Novelty.from_table(table(novelty), 3)
 
 
 def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():

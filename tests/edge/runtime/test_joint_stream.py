@@ -278,10 +278,9 @@ def test_a_flood_of_lines_is_bounded_in_each_frame(wire):
         return b"{}\n" * 20_000
 
     joints = Joints(flood, dof=2, now=lambda: 0.0)
-    joints.at(0.0)
+    assert joints.at(0.0) is None
     assert len(reads) <= 2
     assert joints.malformed >= 20_000
-    assert "more than 64 lines" in joints.problem or joints.received == 0
 
 
 def test_of_two_senders_one_is_heard_and_the_other_counted():
