@@ -4,8 +4,7 @@ many there are (a matrix product's do)."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +13,7 @@ from edge.touch.arm import Chain
 from train.simulate.contact import Array, total
 
 
-@dataclass(frozen=True)
-class Pose:
+class Pose(NamedTuple):
     """Where n arms are.
 
     Attributes:
@@ -59,11 +57,11 @@ class Kinematics:
     def pose(self, q: Array) -> Pose:
         """Poses at the angles q (dof, n)."""
         dof, n = q.shape
-        rotation = np.zeros((3, 3, n))
+        rotation = np.zeros_like(q, shape=(3, 3, n))
         for i in range(3):
             rotation[i, i] = 1.0
-        origin = np.zeros((3, n))
-        axes, origins = np.empty((3, dof, n)), np.empty((3, dof, n))
+        origin = np.zeros_like(q, shape=(3, n))
+        axes, origins = (np.empty_like(q, shape=(3, dof, n)) for _ in range(2))
         sine, cosine = np.sin(q), np.cos(q)
         for j, (shift, turn, axis) in enumerate(self._steps):
             rotation, origin = _move(rotation, origin, shift, turn)

@@ -81,8 +81,10 @@ def total(values: Array) -> Array:
     `np.sum` adds so too, unless the batch is one wide: then it adds in pairs.
     """
     if values.shape[-1] == 1:
-        return np.asarray(np.add.accumulate(values, axis=0)[-1])
-    return np.asarray(np.add.reduce(values, axis=0))
+        last: Array = np.add.accumulate(values, axis=0)[-1]
+        return last
+    whole: Array = np.add.reduce(values, axis=0)
+    return whole
 
 
 def sort_bed(gaps: Array, stiffness: Array) -> tuple[Array, Array]:

@@ -203,13 +203,15 @@ def run_physics(
     seen = SensorFrames(scene, plan, state, frames if images else 0)
     joints[0] = state.q
     sample = plan.sample if images else plan.sample[:1]
+    recorder: Recorder | None = None
     for k in range(1, frames):
-        for function in plan.frame:
-            function(state)
-        for _ in range(substeps):
-            for function in plan.step:
+        if recorder is None:
+            for function in (*plan.frame, *substeps * plan.step):
                 function(state)
-        state.t = k / rate_hz
+        else:
+            recorder.run(plan.frame, 1)
+            recorder.run(plan.step, substeps)
+        state.t = np.full(n, k / rate_hz)
         for function in sample:
             function(state)
         joints[k] = state.q
@@ -218,6 +220,10 @@ def run_physics(
             traces[name][k] = quantity(state)
         if images:
             seen.take(k, state)
+        if k == 1 and plan.taped:
+            from train.simulate.tape import Recorder
+
+            recorder = Recorder(state)
     t = np.arange(frames) / rate_hz
     check_start(scene, state, force[1])
     check_energy(scene, state, joints, t)

@@ -46,13 +46,16 @@ class Stopwatch:
 
 
 def timed_plan(scene: Scene, effects: tuple[str, ...], stopwatch: Stopwatch) -> Plan:
-    """A plan whose functions report their time under the effect that they belong to."""
+    """A plan whose functions report their time under the effect that they belong to.
+
+    They run as they are: a tape has no functions.
+    """
     plan = make_plan(scene, effects, around=stopwatch.around)
     stages: dict[str, Any] = {
         stage: tuple(stopwatch.around(plan.owners[f], f) for f in getattr(plan, stage))
         for stage in STAGES
     }
-    return replace(plan, **stages)
+    return replace(plan, taped=False, **stages)
 
 
 def costs(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> dict[str, float]:

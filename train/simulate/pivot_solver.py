@@ -6,25 +6,29 @@ answer; Newton's method finds it in a few rounds, and where it cycles between pi
 on the slope takes over. A trial's arithmetic does not know of its neighbours in the batch.
 
 numba compiles what is called when it is first called, and keeps the result beside this file: of the
-two functions that others call alone, as a kept one cannot be found again once a class that it takes
+functions that others call alone, as a kept one cannot be found again once a class that it takes
 has another name.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import cfunc, njit, types
+from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from train.simulate.contact import Array, Coordinates, Springs
+from train.simulate.replay import at, floats
 
 ROUNDS = 8
 """Plain Newton rounds before the line search takes over; two or three are usual."""
 CLOSE_M, CLOSE_RAD = 1e-14, 1e-13
 """A step below both is rounding."""
 CUTS = 40
+GUARDED_ROUNDS = 5000
+"""A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
 
 
 Answer = tuple[float, float, float, float, float]
@@ -94,6 +98,9 @@ def answer(contact: PivotContact, alive: Array, i: int, y0: float, y1: float, ou
     some_burst = alive.shape[0] > 0
     whole_force, moment, whole, first = 0.0, 0.0, 0.0, 0.0
     for row in range(len(weight)):
+        if weight[row] == 0.0:
+            out[row] = held[row] = 0.0
+            continue
         depth = y0 + lever[row] * y1 - line_gap[row]
         force, k_row = 0.0, 0.0
         for c in range(len(gaps)):
@@ -230,3 +237,56 @@ def line_forces(springs: Springs, y: Coordinates) -> Array:
         for row in range(size):
             forces[row, i] = out[row]
     return forces
+
+
+# The same two, called from a tape: with a table of addresses and lengths, four numbers an array.
+
+
+@njit(error_model="numpy")
+def _vector(table: Any, i: int) -> Array:
+    return carray(floats(table[4 * i]), (table[4 * i + 1],))
+
+
+@njit(error_model="numpy")
+def _matrix(table: Any, i: int) -> Array:
+    return carray(floats(table[4 * i]), (table[4 * i + 1], table[4 * i + 2]))
+
+
+@njit(error_model="numpy")
+def _springs(table: Any) -> Springs:
+    columns = carray(at(table[8], types.int64), (table[9], table[10]))
+    shape = (table[25], table[26], table[27])
+    alive = carray(floats(table[24]), shape)
+    return Springs(
+        _matrix(table, 0),
+        _matrix(table, 1),
+        columns,
+        _matrix(table, 3),
+        _matrix(table, 4),
+        _matrix(table, 5),
+        alive,
+        _vector(table, 7),
+        _matrix(table, 8),
+    )
+
+
+@cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
+def taped_search(table: Any) -> None:
+    """`search`, with the springs, the guess, y and C of the table; its results after them."""
+    v = 9
+    guess = (_vector(table, v), _vector(table, v + 1))
+    free = (_vector(table, v + 2), _vector(table, v + 3))
+    c = (_vector(table, v + 4), _vector(table, v + 5), _vector(table, v + 6))
+    forces, moments, lost = search(_springs(table), guess, free, c, GUARDED_ROUNDS)
+    _vector(table, v + 7)[:] = forces
+    _vector(table, v + 8)[:] = moments
+    out = _vector(table, v + 9)
+    for i in range(len(lost)):
+        out[i] = 1.0 if lost[i] else 0.0
+
+
+@cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
+def taped_line_forces(table: Any) -> None:
+    """`line_forces`, with the springs and the depths of the table; its result after them."""
+    forces = line_forces(_springs(table), (_vector(table, 9), _vector(table, 10)))
+    _matrix(table, 11)[:] = forces

@@ -14,11 +14,9 @@ from edge.errors import EdgeError
 from train.simulate import base, pivot_solver
 from train.simulate.arm import cross, dot
 from train.simulate.contact import Array, Coordinates, Springs, sorted_springs
+from train.simulate.pivot_solver import GUARDED_ROUNDS
 from train.simulate.plan import Build
 from train.simulate.state import State
-
-GUARDED_ROUNDS = 5000
-"""A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
 
 
 @dataclass
@@ -45,6 +43,7 @@ def add(build: Build) -> None:
     build.put("setup", base.ORDER + 2, upright)
     build.put("step", base.SETTLE + 20, remember)
     build.wrap(solve)
+    build.taped = True
 
 
 def upright(state: State) -> None:
@@ -63,17 +62,13 @@ def pivot(state: State) -> None:
     along, normal = pose.rotation[:, 2], state.normal
     row_z = state.row_z
     away = pose.origin - state.face
-    z = np.clip(-dot(away, along), float(row_z.min()), float(row_z.max()))
+    z = np.clip(-dot(away, along), row_z.min(axis=0), row_z.max(axis=0))
     tilt = dot(normal, along)
     upright = np.sqrt(1.0 - tilt * tilt)
     on_face = dot(away, state.along_face) + row_z * dot(along, state.along_face)
-    weight = base.covered(on_face, state)
-    rows = np.flatnonzero(weight.any(axis=1))
-    lines = slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 1)
-    state.bed.lines = lines
-    state.bed.weight = weight[lines]
-    state.bed.line_gap = base.curve_gap(on_face[lines], state)
-    state.of(Tilt).lever = row_z[lines] - z
+    state.bed.weight = base.covered(on_face, state)
+    state.bed.line_gap = base.curve_gap(on_face, state)
+    state.of(Tilt).lever = row_z - z
     state.point = pose.origin + along * z
     depth = dot(away + along * z, normal) + skin.radius_m * upright
     crossed = cross(normal[:, None], pose.axes)
@@ -122,7 +117,13 @@ def search(springs: Springs, guess: Coordinates, free: Coordinates, c: Coordinat
     Raises:
         EdgeError: they were not found.
     """
-    force, moment, lost = pivot_solver.search(springs, guess, free, c, GUARDED_ROUNDS)
+    tape = getattr(free[0], "tape", None)
+    if tape is None:
+        force, moment, lost = pivot_solver.search(springs, guess, free, c, GUARDED_ROUNDS)
+    else:
+        given = (*springs, *guess, *free, *c)
+        sizes = (free[0].shape,) * 3
+        force, moment, lost = tape.call(pivot_solver.taped_search, given, sizes)
     if lost.any():
         raise EdgeError(
             f"the tilt of {int(lost.sum())} contacts was not found in {GUARDED_ROUNDS} rounds; "
@@ -135,4 +136,9 @@ def line_forces(state: State) -> Array:
     """(L, n) newtons that each line bears."""
     own = state.of(Tilt)
     springs = state.bed.lines_of(own.springs, own.lever)
-    return np.asarray(pivot_solver.line_forces(springs, state.depth))
+    tape = getattr(state.depth[0], "tape", None)
+    if tape is None:
+        return np.asarray(pivot_solver.line_forces(springs, state.depth))
+    given = (*springs, *state.depth)
+    (forces,) = tape.call(pivot_solver.taped_line_forces, given, (springs.weight.shape,))
+    return np.asarray(forces)
