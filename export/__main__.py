@@ -37,7 +37,9 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument(
         "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
     )
-    top.add_argument("--out", type=Path, default=Path("build"), help="folder (build)")
+    top.add_argument(
+        "--out", type=Path, default=Path("build"), help="folder (default: %(default)s)"
+    )
     top.add_argument("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
     top.add_argument(
         "--features",
@@ -53,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
         help="fix the projection: principal components or discriminants",
     )
     top.add_argument(
-        "--samples", type=int, default=SAMPLES, help=f"values a feature has ({SAMPLES})"
+        "--samples", type=int, default=SAMPLES, help="values of each feature (default: %(default)s)"
     )
     top.add_argument("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
     top.add_argument("--components", type=int, help="fix the number of principal components")
@@ -66,13 +68,13 @@ def parser() -> argparse.ArgumentParser:
         f"of its classes has several ({LEAVE_OUT}); `{TRIAL}` leaves out single trials",
     )
     top.add_argument(
-        "--quick", action="store_true", help="a first look: few candidates, five folds"
+        "--quick", action="store_true", help="for a first look: few candidates, five folds"
     )
     top.add_argument(
         "--window",
         type=float,
-        help=f"seconds from onset ({WINDOW_S:g}; longer where touches last for long and that tells "
-        "so much more)",
+        help=f"seconds from onset to decide on (default: {WINDOW_S:g}, or more where touches last "
+        "longer and the rest of them tells much more)",
     )
     top.add_argument(
         "--decision-points",
@@ -93,11 +95,11 @@ def parser() -> argparse.ArgumentParser:
         "--fronts",
         type=Path,
         metavar="front.json",
-        help="where the points are (build/tradeoff/front.json; where there is none, those of the "
+        help="the file with the points (default: build/tradeoff/front.json, or else those of the "
         "simulated set)",
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
-    top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (all cores)")
+    top.add_argument("--jobs", type=int, default=jobs_here(), help="processes (default: all cores)")
     top.set_defaults(run=run)
     return top
 

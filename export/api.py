@@ -220,10 +220,10 @@ def warnings(fitted: Fitted) -> list[str]:
         )
     for task, one in fitted.chosen.items():
         if any(measures.feature(name).quantity == "joint_angle" for name in one.choice.features):
-            told = told_by_posture(dataset, task)
+            share = told_by_posture(dataset, task)
             lines.append(
-                f"{'warning: ' if told > LEAK else ''}{task}: the joint angles at onset, before "
-                f"the touch, tell {told:.1%} of the labels by themselves (1-NN, leave-one-out): "
+                f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset, before "
+                f"the touch, tell {share:.1%} of the labels by themselves (1-NN, leave-one-out): "
                 "where the arm was, not what it felt; --features without "
                 "posture tells what touch can"
             )

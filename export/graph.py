@@ -108,8 +108,8 @@ def _shortlisted(build: Builder, z: str, rows: Sequence[NDArray[np.float64]], k:
     near = build.node("Gather", [build.by_decision_point(rows), ordered], axis=0)
     gaps = build.node("Sub", [near, build.node("Unsqueeze", [z, ints(1)])])
     squares = _by_first(build, _running(build, gaps, 2), c, 2)
-    short, places = build.nodes("TopK", [squares, ints(k)], ["", ""], largest=0, sorted=1)
-    found = build.node("GatherElements", [ordered, places], axis=1)
+    short, order = build.nodes("TopK", [squares, ints(k)], ["", ""], largest=0, sorted=1)
+    found = build.node("GatherElements", [ordered, order], axis=1)
     kth = build.node("Slice", [short, ints(k - 1), ints(k), ints(1)])
     last = build.node("Slice", [values, ints(count - 1), ints(count), ints(1)])
     length = build.node("ReduceSumSquare", [z, ints(1)], keepdims=1)
@@ -182,8 +182,8 @@ def _decide(
         return
     # The first neighbour whose class has the most votes is the nearest of the tied.
     own = build.node("GatherElements", [votes, said], axis=1)
-    place = build.node("ArgMax", [own], axis=1, keepdims=1)
-    build.node("GatherND", [said, place], f"{task}_label", batch_dims=1)
+    first = build.node("ArgMax", [own], axis=1, keepdims=1)
+    build.node("GatherND", [said, first], f"{task}_label", batch_dims=1)
 
 
 def _decision_points(model: ContactClassifier | SequentialClassifier) -> list[ContactClassifier]:

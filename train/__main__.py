@@ -15,7 +15,9 @@ COMMANDS = ("import_", "simulate", "study", "tradeoff", "show", "split", "thresh
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     top = argparse.ArgumentParser(
-        prog="train", description="Recordings in, studies out; `python -m export` makes the model."
+        prog="train",
+        description="Imports, simulates, studies and draws recordings; `python -m export` makes "
+        "a model of them.",
     )
     list(add_commands(top, "train.commands", COMMANDS))
     return top

@@ -167,5 +167,5 @@ def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.in
         weights = choice.components * sum(widths[name] for name in choice.features or widths)
         price = sum(one.price_us for one in SETS.values() if set(one.features) <= set(kind[0]))
         sizes[kind] = max(sizes.get(kind, (0, 0.0)), (weights, price))
-    places = {kind: place for place, kind in enumerate(sorted(sizes, key=lambda one: sizes[one]))}
-    return np.array([places[kind] for kind in kinds], dtype=np.int64)
+    ranks = {kind: rank for rank, kind in enumerate(sorted(sizes, key=lambda one: sizes[one]))}
+    return np.array([ranks[kind] for kind in kinds], dtype=np.int64)

@@ -122,7 +122,7 @@ class Choosing:
         """
         if len(windows) == 1:
             return windows[0], []
-        told: dict[str, list[float]] = {task: [] for task in self._y}
+        accuracies: dict[str, list[float]] = {task: [] for task in self._y}
         right: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in self._y}
         for window_s in windows:
             X = self._dataset.features(window_s, self._samples)
@@ -132,7 +132,7 @@ class Choosing:
             for task in self._y:
                 answers = (whole if task in self._grouped else trials).held_out(task)
                 right[task].append(answers[[choose(answers)]])
-                told[task].append(float(right[task][-1].mean()))
+                accuracies[task].append(float(right[task][-1].mean()))
         order = np.arange(len(windows))
         needed = [
             choose(np.concatenate(answers), order, margin=WINDOW_MARGIN)
@@ -144,7 +144,7 @@ class Choosing:
             + "; ".join(
                 f"{task} "
                 + ", ".join(f"{a:.0%} at {w:g} s" for a, w in zip(shares, windows, strict=True))
-                for task, shares in told.items()
+                for task, shares in accuracies.items()
             )
             + " (--window sets it)"
         ]

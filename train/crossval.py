@@ -59,11 +59,11 @@ def split_neighbours(
     axes = Spectrum(scaled[train]).leading(max_components)
     exact = RoundingGrid(np.abs(scaled[train]).max(initial=0.0))
     z = exact.project(scaled, on_grid(axes.T))
-    places, queries = z[train], z[test]
+    references, queries = z[train], z[test]
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
     used = len(axes)
     for near, query in zip(rows, queries, strict=True):
-        order = _nearest(running_squares(places, query), max_k)
+        order = _nearest(running_squares(references, query), max_k)
         near[:used] = train[order]
         near[used:] = train[order[-1]] if used else train[:max_k]
     return rows

@@ -312,17 +312,17 @@ def choose(
         among: the candidates to choose from; all where None.
         margin: accuracy that is given up for less cost in any case.
     """
-    places = np.arange(len(right)) if among is None else among
-    means = right[places].mean(axis=1)
+    candidates = np.arange(len(right)) if among is None else among
+    means = right[candidates].mean(axis=1)
     if cost is None:
-        return int(places[means.argmax()])
-    costs = np.unique(cost[places])  # rising
-    best = np.array([np.where(cost[places] == one, means, -1.0).argmax() for one in costs])
-    answers = right[places[best]].astype(np.int64)
+        return int(candidates[means.argmax()])
+    costs = np.unique(cost[candidates])  # rising
+    best = np.array([np.where(cost[candidates] == one, means, -1.0).argmax() for one in costs])
+    answers = right[candidates[best]].astype(np.int64)
     worse = answers[means[best].argmax()] - answers
     error = worse.std(axis=1) / np.sqrt(right.shape[1])
     within = worse.mean(axis=1) <= np.maximum(error, margin)
-    return int(places[best[within.argmax()]])
+    return int(candidates[best[within.argmax()]])
 
 
 def evaluate(

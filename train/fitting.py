@@ -226,11 +226,11 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
     np.fill_diagonal(squares, np.inf)
     notes = []
     for task, labels in y.items():
-        told = float((labels[squares.argmin(axis=1)] == labels).mean())
+        share = float((labels[squares.argmin(axis=1)] == labels).mean())
         usual = float(np.unique(labels, return_counts=True)[1].max() / len(labels))
-        if told > usual + LEAK * (1.0 - usual):
+        if share > usual + LEAK * (1.0 - usual):
             notes.append(
-                f"warning: the first frame alone tells {task} in {told:.0%} of the trials, before "
+                f"warning: the first frame alone tells {task} in {share:.0%} of the trials, before "
                 "anything is felt: the accuracy holds only where the same is so; "
                 "`python -m train import --zero` subtracts the first frames"
             )

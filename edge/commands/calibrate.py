@@ -100,9 +100,9 @@ def mean_and_deviation(
 def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Taxels (row, col) whose values vary far more than the others', worst first."""
     limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
-    places = np.argwhere(noise > limit)
+    taxels = np.argwhere(noise > limit)
     order = np.argsort(-noise[noise > limit], kind="stable")
-    return [(int(r), int(c)) for r, c in places[order]]
+    return [(int(r), int(c)) for r, c in taxels[order]]
 
 
 def run(arguments: argparse.Namespace) -> int:

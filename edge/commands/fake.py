@@ -29,11 +29,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--skin", required=True, metavar="skin.toml", help="the file that describes the skin"
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="the folder")
     parser.add_argument(
-        "--trials", type=int, default=TRIALS, help="of each touch (default: %(default)s)"
+        "--out", required=True, type=Path, metavar="DIR", help="the folder to write to"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the variation between trials")
+    parser.add_argument(
+        "--trials", type=int, default=TRIALS, help="how many of each touch (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the variation between trials")
 
 
 def run(arguments: argparse.Namespace) -> int:

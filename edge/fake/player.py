@@ -157,8 +157,8 @@ class _Felt:
         self._gain = np.zeros(len(self._rest), dtype=np.int64)
         self._top = np.full(len(self._rest), 65534, dtype=np.int64)
         for chip in spec.chips:
-            places = list(chip.taxels)
-            self._gain[places], self._top[places] = chip.sign, chip.highest
+            taxels = list(chip.taxels)
+            self._gain[taxels], self._top[taxels] = chip.sign, chip.highest
         self._gain[UNUSED], self._rest[UNUSED] = 0, _rest(spec.chips[0])
         self._at, self._raw = math.nan, self._rest
 
@@ -174,15 +174,15 @@ class _Felt:
 
     def sense(self, chip: ChipSpec, noise: float, stream: np.random.Generator | None) -> Sense:
         """What one chip senses."""
-        places, top = np.array(chip.taxels), chip.highest
+        taxels, top = np.array(chip.taxels), chip.highest
 
         def quiet(t: float) -> NDArray[np.uint16]:
-            return self.raw(t).take(places, mode="wrap").astype(np.uint16)
+            return self.raw(t).take(taxels, mode="wrap").astype(np.uint16)
 
         def noisy(t: float) -> NDArray[np.uint16]:
             assert stream is not None
-            raw = self.raw(t).take(places, mode="wrap")
-            raw = raw + np.rint(noise * stream.standard_normal(len(places))).astype(np.int64)
+            raw = self.raw(t).take(taxels, mode="wrap")
+            raw = raw + np.rint(noise * stream.standard_normal(len(taxels))).astype(np.int64)
             return np.maximum(np.minimum(raw, top), 1).astype(np.uint16)
 
         return quiet if stream is None else noisy

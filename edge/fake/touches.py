@@ -140,7 +140,7 @@ def _spread(
     pitch: float,
     taxels: int,
     middle: float,
-    place: float,
+    centre: float,
     *,
     from_ring: bool = False,
     onto_ring: bool = False,
@@ -148,13 +148,13 @@ def _spread(
     """(sources, taxels) shares of each source row (or column) that fall on each taxel's.
 
     Each source is as wide as its pitch, and so is each taxel; `middle` of the sources comes to
-    lie on `place` of the taxels.
+    lie on `centre` of the taxels.
     """
     offset = np.arange(sources) - middle
     if from_ring:
         offset = (offset + sources / 2.0) % sources - sources / 2.0
     ratio = source_pitch / pitch
-    left = (place + offset * ratio - ratio / 2.0)[:, None]
+    left = (centre + offset * ratio - ratio / 2.0)[:, None]
     edges = np.arange(taxels) - 0.5
     shares = np.zeros((sources, taxels))
     # A contact that is wider than the skin goes round it as often as it must.

@@ -134,10 +134,10 @@ def bus_error(code: int | None, bus: str, address: int | None = None) -> BusErro
     BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)')
     """
     code = code or errno.EIO
-    place = bus if address is None else f"{bus}, address {address:#04x}"
+    where = bus if address is None else f"{bus}, address {address:#04x}"
     answer = response(code)
     name = errno.errorcode.get(code, str(code))
-    error = answer.error(f"{place}: {answer.mend} ({name})")
+    error = answer.error(f"{where}: {answer.mend} ({name})")
     error.errno, error.bus, error.address = code, bus, address
     return error
 

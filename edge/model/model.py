@@ -258,9 +258,9 @@ class Model:
             )
         bad = int(np.argmin(np.isfinite(x)))
         ends = np.cumsum(self.info.widths)
-        place = int(ends.searchsorted(bad, side="right"))
-        feature = self.info.features[place]
-        within = bad - int(ends[place]) + self.info.widths[place]
+        which = int(ends.searchsorted(bad, side="right"))
+        feature = self.info.features[which]
+        within = bad - int(ends[which]) + self.info.widths[which]
         return InputError(f"value {within} of {feature} is not finite")
 
 

@@ -211,8 +211,8 @@ class _Work:
             message = attributes.get(name, {})
             return _whole(message.get(NUMBER_OF_AN_ATTRIBUTE, [default]))[-1]
 
-        def axes(place: int) -> list[int]:
-            return self._numbers[names[place]] if len(names) > place and names[place] else []
+        def axes(number: int) -> list[int]:
+            return self._numbers[names[number]] if len(names) > number and names[number] else []
 
         each = 1
         first = taken[0]

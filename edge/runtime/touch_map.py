@@ -42,14 +42,14 @@ class Touch:
     """One contact on the map.
 
     Attributes:
-        place: (x, y, z) in the map's frame.
+        position: (x, y, z) in the map's frame.
         onset_s: seconds on the run's clock.
         labels: {task: label}, None where the model could not tell.
         confidence: {task: share of the votes}.
         flags: of any of its decisions.
     """
 
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     onset_s: float
     labels: dict[str, str | None] = field(default_factory=dict)
     confidence: dict[str, float] = field(default_factory=dict)
@@ -206,7 +206,7 @@ class TouchMap:
             except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
                 raise self._no_line(number) from None
             waiting[key] = touch = Touch(
-                touch.place, touch.onset_s, touch.labels, touch.confidence, (*touch.flags, *new)
+                touch.position, touch.onset_s, touch.labels, touch.confidence, (*touch.flags, *new)
             )
             if len(touch.labels) == len(tasks):
                 yield waiting.pop(key)

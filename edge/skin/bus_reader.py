@@ -27,7 +27,7 @@ from edge.i2c.bus import (
 from edge.i2c.chip import Chip
 from edge.i2c.mpr121 import MPR121
 from edge.i2c.tca9548a import TCA9548A
-from edge.skin.slot import Slot, State
+from edge.skin.slot import ChipState, Slot
 from edge.skin.wiring import BusSpec, ChipSpec
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
@@ -160,7 +160,7 @@ class BusReader:
             return
         read_any = False
         for slot in slots:
-            if slot.state is not State.RUNNING:
+            if slot.state is not ChipState.RUNNING:
                 continue
             try:
                 slot.send(slot.frame)  # type: ignore[arg-type]
@@ -192,10 +192,10 @@ class BusReader:
         """
         if isinstance(error, BusRefused) and self._starting and slot.failures:
             raise error
-        if slot.state is State.RUNNING:
+        if slot.state is ChipState.RUNNING:
             self.doubt_all()
         slot.good = False
-        slot.state, slot.error, slot.revival = State.DOWN, error, None
+        slot.state, slot.error, slot.revival = ChipState.DOWN, error, None
         self._all_running = False
         slot.failures += 1
         pause = 0.0
@@ -226,7 +226,7 @@ class BusReader:
             return False
         self._gone = False
         for slot in self.slots:
-            slot.state, slot.revival, slot.retry_at = State.DOWN, None, -math.inf
+            slot.state, slot.revival, slot.retry_at = ChipState.DOWN, None, -math.inf
         self._all_running = False
         return True
 
@@ -245,7 +245,7 @@ class BusReader:
 
     def doubt(self, slot: Slot) -> None:
         """Have a running chip's settings checked after this frame's or the next one's reading."""
-        if slot.state is State.RUNNING:
+        if slot.state is ChipState.RUNNING:
             slot.suspect = self._doubts = True
 
     def _check_suspects(self, deadline: float, *, damaged: bool) -> None:
@@ -255,13 +255,13 @@ class BusReader:
         after it, so that a doubt costs no reading.
         """
         for slot in self.slots:
-            if not slot.suspect or slot.damaged != damaged or slot.state is not State.RUNNING:
+            if not slot.suspect or slot.damaged != damaged or slot.state is not ChipState.RUNNING:
                 continue
             if self._timeouts or self._gone or self.bus.now() >= deadline:
                 return
             slot.suspect = slot.damaged = False
             self.check(slot)
-            if damaged and slot.state is State.RUNNING:
+            if damaged and slot.state is ChipState.RUNNING:
                 slot.check_from = self._frames + min(1 << slot.found_healthy, LONGEST_DOUBT)
                 slot.found_healthy += 1
                 if slot.found_healthy >= CHECKS_BEFORE_SET_UP:
@@ -289,14 +289,14 @@ class BusReader:
         A bus that is nearly full would need twice the time to set all its chips up if it went on
         reading those that are back; in the end as many readings are lost either way.
         """
-        lost = sum(slot.state is State.STARTING for slot in self.slots)
+        lost = sum(slot.state is ChipState.STARTING for slot in self.slots)
         if 2 * lost >= len(self.slots) > 1 and self._frames > self._rescued_from + RESCUE_PAUSE:
             self._rescued_from = self._frames
         if lost == 0 or self._frames >= self._rescued_from + RESCUE_FRAMES:
             return False
         now = self.bus.now()
         self._revive(now + (deadline - now) * RESCUE_SHARE)
-        return any(slot.state is State.STARTING for slot in self.slots)
+        return any(slot.state is ChipState.STARTING for slot in self.slots)
 
     def _revive(self, deadline: float) -> None:
         """Bring chips back, as far as the frame has time, and by one step where it has none."""
@@ -320,12 +320,12 @@ class BusReader:
         """One step of a chip's return; False where it failed."""
         if slot.revival is None:
             slot.revival = self._revival(slot)
-            slot.state = State.STARTING
+            slot.state = ChipState.STARTING
         try:
             next(slot.revival)
         except StopIteration:
             slot.recoveries += slot.error is not None
-            slot.state, slot.revival, slot.error = State.RUNNING, None, None
+            slot.state, slot.revival, slot.error = ChipState.RUNNING, None, None
             slot.failures, slot.suspect, slot.set_up = 0, False, True
         except BusError as error:
             self._fail(slot, error)
@@ -363,14 +363,14 @@ class BusReader:
 
     def _check_next(self) -> None:
         """Read the settings of one running chip again, each in its turn."""
-        running = [slot for slot in self.slots if slot.state is State.RUNNING]
+        running = [slot for slot in self.slots if slot.state is ChipState.RUNNING]
         if running:
             self._turn += 1
             self.check(running[self._turn % len(running)])
 
     def check(self, slot: Slot) -> None:
         """Read a running chip's settings; where they are gone, what it serves is not good."""
-        if slot.chip is None or slot.state is not State.RUNNING:
+        if slot.chip is None or slot.state is not ChipState.RUNNING:
             return
         try:
             if not slot.chip.healthy():
@@ -384,4 +384,4 @@ class BusReader:
         assert slot.chip is not None
         slot.recoveries += 1
         slot.good = slot.set_up = self._all_running = False
-        slot.state, slot.revival = State.STARTING, slot.chip.settings()
+        slot.state, slot.revival = ChipState.STARTING, slot.chip.settings()

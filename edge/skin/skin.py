@@ -22,7 +22,7 @@ from edge.skin.calibration import dead_band
 from edge.skin.file import SkinFile, load
 from edge.skin.read_scheduler import MARGIN, ReadScheduler
 from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
-from edge.skin.slot import NEVER, Slot, State
+from edge.skin.slot import NEVER, ChipState, Slot
 from edge.skin.wiring import UNUSED, BusSpec
 from edge.touch.frame import Frame
 
@@ -255,7 +255,7 @@ class Skin:
         for reader in self.readers:
             reader.start()
         self._states = [slot.state for slot in self._slots]
-        down = [s for s in self.status() if s.state != State.RUNNING.value]
+        down = [s for s in self.status() if s.state != ChipState.RUNNING.value]
         if len(down) == len(self._slots):
             raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {down[0].error}")
         return down

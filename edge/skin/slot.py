@@ -18,7 +18,7 @@ NEVER = -1.0e9
 """When a chip that was never read was read: long ago, but a number."""
 
 
-class State(enum.Enum):
+class ChipState(enum.Enum):
     """The state of one chip."""
 
     RUNNING = "running"
@@ -32,7 +32,7 @@ class Slot:
     Attributes:
         spec: as in the skin's file.
         row: (bytes,) that its frame is read into.
-        state: see `State`.
+        state: see `ChipState`.
         error: why it is down.
         at: when it was last read, on the bus's clock.
         good: the bytes in `row` are of one whole transfer of a chip with its settings.
@@ -46,7 +46,7 @@ class Slot:
         """Its settings were written, read back, and not seen to be lost since."""
         self.read_twice = spec.kind == "ad7147"
         """A last byte of 0xFF may be a transfer that broke off: nothing else tells."""
-        self.state = State.DOWN
+        self.state = ChipState.DOWN
         self.error: BusError | None = None
         self.at = NEVER
         self.good = False
@@ -68,7 +68,7 @@ class Slot:
     @property
     def running(self) -> bool:
         """Set up and answering."""
-        return self.state is State.RUNNING
+        return self.state is ChipState.RUNNING
 
 
 def _nothing(transfer: Transfer) -> None:

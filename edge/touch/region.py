@@ -150,8 +150,8 @@ class ActiveTaxels:
     def largest(self, previous: Region | None = None) -> Region | None:
         """The largest region, as `largest_region` gives it."""
         counts = self.counts
-        place = int(counts.argmax())
-        highest = int(counts.item(place))
+        index = int(counts.argmax())
+        highest = int(counts.item(index))
         if isinstance(self._threshold, int) and highest <= self._threshold:
             return None
         of, bits = self._grid, self.bits
@@ -159,7 +159,7 @@ class ActiveTaxels:
             return None
         # The region with the frame's peak is nearly always the largest one: it comes first, and
         # what is left is looked at only where it is large enough to matter.
-        top = of.bit(place)
+        top = of.bit(index)
         found = of.flood(top if bits & top else bits & -bits, bits)
         rest = bits ^ found
         if rest.bit_count() >= found.bit_count():

@@ -23,7 +23,7 @@ ZERO_FRAMES = 3
 HELP = "turn another lab's data into recordings"
 DESCRIPTION = (
     "Writes one recording per trial; existing files of the same name are "
-    "replaced. Where the data say no thresholds, those that `python -m train thresholds` proposes "
+    "replaced. Where the data give no thresholds, those that `python -m train thresholds` proposes "
     "are written. "
     "To add a format, see train/importers/__init__.py."
 )
@@ -31,7 +31,7 @@ DESCRIPTION = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("format", choices=names(), help="what kind of file it is")
+    parser.add_argument("format", choices=names(), help="the format of the file")
     parser.add_argument("file", type=Path, help="the file")
     parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
     add_arm(parser, "whose joint names say which angles of a log are kept, and in what order")

@@ -10,9 +10,9 @@ from edge.errors import InputError
 
 HELP = "draw a recording or a map of touch"
 DESCRIPTION = (
-    "Draw a recording: frames over time with the region found, and the three "
-    "features; with --scene, what happens, seen from the side. Draw several "
-    "recordings side by side, with the decisions of --model. Draw a map that "
+    "Draws a recording: frames over time with the region found, and the three "
+    "features; with --scene, what happens, seen from the side. Draws several "
+    "recordings side by side, with the decisions of --model. Draws a map that "
     "`edge-classify run --map` wrote: where things were touched, and what they were."
 )
 
@@ -27,13 +27,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="model.onnx",
         help="show its decisions on several recordings, or its skin or arm behind a map",
     )
-    parser.add_argument("--out", metavar="PNG", help="the picture; beside the recording without it")
+    parser.add_argument(
+        "--out", metavar="PNG", help="the picture to write (default: beside the recording)"
+    )
     parser.add_argument(
         "--scene", action="store_true", help="sketch arm, contact and its path from the side too"
     )
-    parser.add_argument("--dark", action="store_true", help="several recordings: for a dark page")
-    parser.add_argument("--threshold", type=int, metavar="COUNTS", help="in place of the skin's")
-    parser.add_argument("--task", help="of a map: which labels to show (default: category)")
+    parser.add_argument(
+        "--dark", action="store_true", help="draw several recordings for a dark page"
+    )
+    parser.add_argument(
+        "--threshold", type=int, metavar="COUNTS", help="threshold, instead of the skin's"
+    )
+    parser.add_argument(
+        "--task", help="on a map, the task whose labels are shown (default: category)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

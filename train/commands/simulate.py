@@ -7,8 +7,8 @@ import sys
 
 HELP = "simulate a scene into recordings"
 DESCRIPTION = (
-    "Simulate the touches that a scene file describes, and only the effects it "
-    "calls for. The same scene gives the same files, whatever the batch or the machine."
+    "Simulates the touches that a scene file describes, and only the effects that "
+    "it calls for. The same scene gives the same files, whatever the batch or the machine."
 )
 
 
@@ -19,14 +19,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--explain", action="store_true", help="print what runs, what called for it and its cost"
     )
-    parser.add_argument("--seed", type=int, help="in place of the scene's")
-    parser.add_argument("--trials", type=int, metavar="N", help="of each object and condition")
-    parser.add_argument("--batch", type=int, default=256, help="trials simulated together")
+    parser.add_argument("--seed", type=int, help="seed, instead of the scene's")
+    parser.add_argument(
+        "--trials",
+        type=int,
+        metavar="N",
+        help="trials of each object in each condition, instead of the scene's",
+    )
+    parser.add_argument("--batch", type=int, default=256, help="trials that are simulated together")
     parser.add_argument("--jobs", type=int, default=1, help="processes; -1 for all cores")
     parser.add_argument(
         "--backend", choices=("local", "dask"), default="local", help="where the batches run"
     )
-    parser.add_argument("--address", help="of a Dask scheduler, like tcp://127.0.0.1:8786")
+    parser.add_argument("--address", help="address of a Dask scheduler, like tcp://127.0.0.1:8786")
 
 
 def run(arguments: argparse.Namespace) -> int:

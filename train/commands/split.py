@@ -18,11 +18,11 @@ LEAD_S = 0.25
 """Kept of what lies before a contact, where no other contact does."""
 
 
-HELP = "cut recordings into one a contact"
+HELP = "cut recordings into one for each contact"
 DESCRIPTION = (
     "Writes each contact of each recording to a file of its own, named after the "
     "recording and the contact's number. The labels are those of meta.contacts, a list of one "
-    "set of labels a contact, or else the recording's."
+    "set of labels for each contact, or else the recording's."
 )
 
 

@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-HELP = "every analysis of the paper on a data set, ours beside the paper's"
+HELP = "repeat every analysis of the paper on a data set, beside the paper's own numbers"
 DESCRIPTION = (
     "Writes OUT/report.html (nothing outside it is linked), each plot as PNG and each table as CSV."
 )
@@ -23,19 +23,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "(speeds, stiffness, sensor effects) and the paper's numbers",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("build/study"), help="folder (build/study)"
+        "--out", type=Path, default=Path("build/study"), help="folder (default: %(default)s)"
     )
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (all cores)"
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
     )
     parser.add_argument(
         "--seeds",
         type=int,
         default=1,
-        help="data sets of the scene whose mean stands beside the paper's numbers (1: these "
-        "recordings alone; 8 take about half a minute each)",
+        help="data sets of the scene whose mean is set beside the paper's numbers (default: 1, "
+        "these recordings alone; with 8, each takes about half a minute)",
     )
-    parser.add_argument("--address", help="of a Dask scheduler that runs the sweeps instead")
+    parser.add_argument(
+        "--address", help="address of a Dask scheduler that runs the sweeps instead"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

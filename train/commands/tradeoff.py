@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-HELP = "what accuracy costs in time: waiting, the wire, arithmetic"
+HELP = "show what accuracy costs in time: waiting, the wire, arithmetic"
 DESCRIPTION = (
     "Writes OUT/report.html (nothing outside it is linked), each plot as PNG, "
     "each table as CSV, and front.json, which `python -m export --front` reads."
@@ -22,23 +22,26 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--board",
         required=True,
         metavar="board.json",
-        help="of `edge-classify bench` with a model that was fitted on these recordings",
+        help="what `edge-classify bench` wrote of a model that was fitted on these recordings",
     )
     parser.add_argument(
         "--prices",
         metavar="prices.json",
-        help="of `python -m export.prices` with these recordings: shows what components, "
-        "neighbours and training rows cost",
-    )
-    parser.add_argument("--scene", help="what they were simulated from: draws the physical floor")
-    parser.add_argument(
-        "--task", help="of the picture and of front.json (category, else the first)"
+        help="what `python -m export.prices` wrote of these recordings: shows what "
+        "components, neighbours and training rows cost",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("build/tradeoff"), help="folder (build/tradeoff)"
+        "--scene", help="the scene that they were simulated from: adds the physical limit"
     )
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (all cores)"
+        "--task",
+        help="task of the picture and of front.json (default: category, or else the first)",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("build/tradeoff"), help="folder (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
     )
 
 

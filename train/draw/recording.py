@@ -161,7 +161,7 @@ def _side(
     simulated = recording.meta.get("simulation")
     drawn = simulated if isinstance(simulated, dict) else {}
     first: tuple[np.ndarray, np.ndarray] | None = None
-    told = ""
+    motion = ""
     for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
         k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
         points = link_positions(chain, joints[k])
@@ -174,13 +174,13 @@ def _side(
         if since == 0.0:
             axis.plot(found[0][0], found[0][2], "*", color=style, markersize=13)
         if drawn:
-            told = _thing(axis, drawn, first, found[0], since, style)
+            motion = _thing(axis, drawn, first, found[0], since, style)
     if drawn:
         effects = drawn.get("effects")
         names = ", ".join(map(str, effects)) if isinstance(effects, list) else ""
         mass = _size(drawn, "mass_kg")
         what = str(drawn.get("family", "")) + (f", {mass:.2g} kg" if mass is not None else "")
-        axis.set_title(f"seen from the side: {what}{told}\n{names}", fontsize=9)
+        axis.set_title(f"seen from the side: {what}{motion}\n{names}", fontsize=9)
     else:
         axis.set_title("seen from the side", fontsize=9)
     axis.set_xlabel(f"x in the frame of {chain.base}, metres")
@@ -242,7 +242,7 @@ def _thing(
     axis.plot(
         start[0] + ahead * np.array([-0.1, depth + 0.25]), 2 * [start[1] + floor], color="sienna"
     )
-    told, moved = "", max(ahead * float(now[0] - first[0][0]), 0.0)
+    motion, moved = "", max(ahead * float(now[0] - first[0][0]), 0.0)
     given = drawn.get("effects")
     effects = given if isinstance(given, list) else []
     if "sliding" not in effects:
@@ -254,16 +254,16 @@ def _thing(
         edge = np.array([depth, floor])
         turn = np.array([[math.cos(lean), math.sin(lean)], [-math.sin(lean), math.cos(lean)]])
         outline = (outline - edge) @ turn.T + edge
-        told = ", has fallen over" if fallen else f", leans by {math.degrees(lean):.0f} degrees"
+        motion = ", has fallen over" if fallen else f", leans by {math.degrees(lean):.0f} degrees"
     else:
         outline[:, 0] += moved
         aside, foot = _size(drawn, "aside_m"), _size(drawn, "foot_m")
         if moved and "turning" in effects and aside is not None and foot is not None:
             angle = moved * aside / ((foot / 3.0) ** 2 + aside**2)
-            told = f", turns by {math.degrees(angle):.0f} degrees seen from above"
+            motion = f", turns by {math.degrees(angle):.0f} degrees seen from above"
     shown = start + outline * [ahead, 1.0]
     axis.fill(*shown.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
-    return told
+    return motion
 
 
 def _contact(

@@ -64,7 +64,7 @@ def draw(
         raise InputError(f"{where}: has no task {chosen!r}; it has {', '.join(tasks)}")
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
-    positions = np.array([touch.place for touch in touches])
+    positions = np.array([touch.position for touch in touches])
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
     name, lines = ("", []) if info is None else outline(info)
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):

@@ -102,10 +102,10 @@ def lines(
             if paper and name in paper:
                 px, py = np.array(paper[name]).T
                 axes.plot(px, py, "s--", color=colour, mfc="white", ms=5, label=f"{name}, paper")
-        for text, place in (marks or {}).items():
-            axes.axvline(place, color="0.4", lw=1, ls=":")
+        for text, at in (marks or {}).items():
+            axes.axvline(at, color="0.4", lw=1, ls=":")
             axes.text(
-                place, 1.0, f" {text}", transform=axes.get_xaxis_transform(), fontsize=8, va="top"
+                at, 1.0, f" {text}", transform=axes.get_xaxis_transform(), fontsize=8, va="top"
             )
         if logarithmic:
             axes.set_xscale("log")
@@ -146,21 +146,21 @@ def bars(
         height = 0.8 / g
         for i, (colour, (group, row)) in enumerate(zip(COLOURS, groups.items(), strict=False)):
             y = np.arange(m) + (i - (g - 1) / 2) * height
-            there = [(place, r) for place, r in zip(y, row, strict=True) if r is not None]
-            places = np.array([place for place, _ in there])
+            there = [(bar_y, r) for bar_y, r in zip(y, row, strict=True) if r is not None]
+            bars_y = np.array([bar_y for bar_y, _ in there])
             values = np.array([100 * r.accuracy for _, r in there])
             low, high = np.array([r.interval for _, r in there]).T * 100
-            axes.barh(places, values, height * 0.92, color=colour, alpha=0.85, label=group)
+            axes.barh(bars_y, values, height * 0.92, color=colour, alpha=0.85, label=group)
             spread = [np.maximum(values - low, 0), np.maximum(high - values, 0)]
-            axes.errorbar(values, places, xerr=spread, fmt="none", ecolor="0.25", lw=0.8)
+            axes.errorbar(values, bars_y, xerr=spread, fmt="none", ecolor="0.25", lw=0.8)
             if paper and group in paper:
                 seen = [(paper[group][n], y[j]) for j, n in enumerate(names) if n in paper[group]]
                 if seen:
                     px, py = zip(*seen, strict=True)
                     mark = "paper" if i == 0 else None
                     axes.plot(px, py, "D", color="black", mfc="gold", ms=5, label=mark)
-        for text, place in (reference or {}).items():
-            axes.axvline(place, color="0.35", lw=1, ls=":", label=text)
+        for text, at in (reference or {}).items():
+            axes.axvline(at, color="0.35", lw=1, ls=":", label=text)
         axes.set_yticks(range(m), names)
         axes.invert_yaxis()
         axes.set_xlim(0, 100)

@@ -52,13 +52,13 @@ def table_csv(table: Table) -> dict[str, str]:
     files = {f"{table.name}.csv": [i for i in every if i not in timed]}
     if timed:
         files[f"{table.name}_timings.csv"] = [i for i in every if i in timed or i < KEYS]
-    return {name: _csv(table, places) for name, places in files.items()}
+    return {name: _csv(table, columns) for name, columns in files.items()}
 
 
-def _csv(table: Table, places: Sequence[int]) -> str:
+def _csv(table: Table, columns: Sequence[int]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([row[i] for i in places] for row in [table.columns, *table.rows])
+    writer.writerows([row[i] for i in columns] for row in [table.columns, *table.rows])
     return text.getvalue()
 
 

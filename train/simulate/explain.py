@@ -107,12 +107,12 @@ def _step_lines(step_s: float, found: Convergence, scene: Scene) -> list[str]:
         for s, e in zip(found.steps_s, found.errors, strict=False)
     )
     goal = f"{100.0 * scene.trials['tolerance']:g} %"
-    told = (
+    verdict = (
         f"{1e3 * found.step_s:g} ms is enough for {goal}"
         if found.within
         else f"none is within {goal}; {1e3 * found.step_s:g} ms errs by {100.0 * found.error:.2g} %"
     )
     return [
-        f"  step {1e3 * step_s:g} ms; measured: {told} (order {found.order:.2g}; error {tried}; "
+        f"  step {1e3 * step_s:g} ms; measured: {verdict} (order {found.order:.2g}; error {tried}; "
         f"verified at {1e3 * found.steps_s[-1]:.2g} ms)"
     ]

@@ -16,7 +16,7 @@ from train.study.paper import Numbers, difference
 
 
 @dataclass(frozen=True)
-class Reading:
+class PaperReading:
     """One way to read the paper.
 
     Attributes:
@@ -38,7 +38,7 @@ class Reading:
         return f"{self.table}: {self.name}"
 
 
-EACH_TRIAL = Reading(
+EACH_TRIAL = PaperReading(
     "statistics of each trial",
     "II",
     "statistics of a feature over all trials",
@@ -49,7 +49,7 @@ EACH_TRIAL = Reading(
     'data" that is scaled, which speaks for one scale for all trials; and scaled by its own '
     "maximum a trial loses how hard it pressed.",
 )
-BY_MEAN = Reading(
+BY_MEAN = PaperReading(
     "coarse taxels by the mean",
     "I",
     "coarse taxels by the sum of their parts",

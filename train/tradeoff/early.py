@@ -101,10 +101,10 @@ class StoppingComparison:
     def reliability(self) -> list[tuple[float, float, int]]:
         """(mean confidence, share right, decisions) of `BINS` equal ranges of confidence."""
         confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
-        place = np.minimum((confidence * BINS).astype(int), BINS - 1)
+        ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
         return [
             (float(confidence[own].mean()), float(right[own].mean()), int(own.sum()))
-            for own in (place == i for i in range(BINS))
+            for own in (ranges == i for i in range(BINS))
             if own.any()
         ]
 
@@ -321,13 +321,14 @@ def breakaway_times(scene: Scene) -> dict[str, float]:
     """
     q = np.array(scene.start)
 
-    def place(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def position(q: NDArray[np.float64]) -> NDArray[np.float64]:
         pose = scene.arm.pose(q)
         return np.asarray(pose[:3, :3] @ [0.0, 0.0, scene.place_m] + pose[:3, 3])
 
     step = 1e-6
     jacobian = np.stack(
-        [(place(q + step * e) - place(q - step * e)) / (2 * step) for e in np.eye(len(q))], axis=1
+        [(position(q + step * e) - position(q - step * e)) / (2 * step) for e in np.eye(len(q))],
+        axis=1,
     )
     velocity = jacobian @ np.array(scene.rate)
     speed = float(np.linalg.norm(velocity))

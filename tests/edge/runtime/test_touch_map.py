@@ -142,9 +142,9 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, capsys):
     }
     assert second.onset_s - first.onset_s == pytest.approx(0.35, abs=0.02)  # 0.05 of it their own
     for touch in touches:
-        assert on_the_skin(touch.place, both)
+        assert on_the_skin(touch.position, both)
     # Opposite sides of the forearm.
-    assert np.linalg.norm(np.subtract(first.place, second.place)) > both.layout.radius_m
+    assert np.linalg.norm(np.subtract(first.position, second.position)) > both.layout.radius_m
 
 
 def on_the_skin(place, recording):
@@ -203,7 +203,7 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     write(path, info, [event, *others])
     first, second = touchmap.TouchMap(path)
     assert first == second
-    assert first.place == (0.1, 0.2, 0.3)
+    assert first.position == (0.1, 0.2, 0.3)
     assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
     assert first.flags == ("tie", "short")
 

@@ -7,7 +7,7 @@ import pytest
 
 from edge.fake.player import still
 from edge.skin import file as skinfile
-from edge.skin.slot import NEVER, Slot, State, frame_bytes, frame_wire_bits
+from edge.skin.slot import NEVER, ChipState, Slot, frame_bytes, frame_wire_bits
 
 AD7147 = skinfile.load(skinfile.shipped("cody")).chips[0]
 MPR121 = skinfile.load(skinfile.shipped("mpr121")).chips[0]
@@ -24,7 +24,7 @@ def test_a_reading_costs_the_bits_of_the_notes(spec, bits, size):
 def test_a_chip_is_down_and_its_bytes_are_no_good_until_it_has_been_read():
     slot = Slot(AD7147, np.zeros(24, dtype=np.uint8))
     assert (slot.state, slot.running, slot.good, slot.set_up, slot.at) == (
-        State.DOWN, False, False, False, NEVER,
+        ChipState.DOWN, False, False, False, NEVER,
     )  # fmt: skip
     with pytest.raises(AssertionError, match="a chip that is down is not read"):
         slot.send(None)
