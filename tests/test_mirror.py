@@ -24,6 +24,7 @@ TOPICS = {
     "train/importers/test_log_importers.py",
     # The simulator against laws of physics, whichever effects they need.
     "train/simulate/test_simulate_oracles.py",
+    "train/simulate/test_simulate_soft_oracles.py",
     "train/simulate/test_simulate_pushing.py",
     "train/simulate/test_simulate_stability.py",
     "train/simulate/test_simulate_truth.py",

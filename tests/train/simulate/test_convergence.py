@@ -5,26 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.train.simulate.scenes import make, one_object
 from train.simulate.convergence import measure, physics
 from train.simulate.run import kinds
-from train.simulate.scene import Scene, from_dict
-
-
-def one_object(**keys):
-    thing = {"name": "thing", "family": "rigid", "conditions": ["fixed"], **keys}
-    return [thing]
-
-
-def make(objects, *add, **trials) -> Scene:
-    return from_dict(
-        {
-            "trials": {"count": 2, **trials},
-            "step_s": {"base": 1.0 / trials.get("rate_hz", 100)},
-            "effects": {"add": list(add)},
-            "object": objects,
-        }
-    )
-
 
 OBJECTS = (
     ("fixed", {}, ()),

@@ -1,49 +1,24 @@
-"""The simulator held against answers that are known."""
+"""The simulated arm, and rigid things that it pushes, held against answers that are known."""
 
 from __future__ import annotations
 
 import math
 from copy import copy
-from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import solve, toeplitz
 
 from edge.touch.arm import Chain
-from train.simulate import arm, base, contact
-from train.simulate.effects import lateral
+from tests.train.simulate.scenes import make, one_object, run
+from train.simulate import arm, base
 from train.simulate.effects.friction import Shear
 from train.simulate.effects.tipping import Tipping
-from train.simulate.engine import run_batch
 from train.simulate.motion import GRAVITY, Mover
-from train.simulate.run import kinds
-from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, Scene, from_dict, load
+from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, load
 
 ARM_K = 115.0
 RADIUS = 0.04604
-
-
-def one_object(**keys):
-    thing = {"name": "thing", "family": "rigid", "conditions": ["fixed"], **keys}
-    return [thing]
-
-
-def make(objects, *add, **trials) -> Scene:
-    return from_dict(
-        {
-            "trials": {"count": 2, **trials},
-            "step_s": {"base": 1.0 / trials.get("rate_hz", 100)},
-            "effects": {"add": list(add)},
-            "object": objects,
-        }
-    )
-
-
-def run(scene, step_s=0.01):
-    return run_batch(scene, tuple(next(iter(kinds(scene).values()))), step_s)
 
 
 class TestArm:
@@ -198,129 +173,6 @@ class TestSliding:
             assert batch.force[0, start - 1] > 0.9 * hold
 
 
-class TestRelaxation:
-    @pytest.mark.parametrize("tau", [0.05, 0.5, 2.0])
-    def test_ramp_and_hold_of_the_standard_linear_solid(self, tools, tau):
-        k, ratio, rate, up = 500.0, 1.2, 0.02, 0.5
-        rig = tools.Rig(
-            h=0.01,
-            arm_k=1e12,
-            speed=rate,
-            travel_s=up,
-            slopes=[[k]],
-            effects=("relaxation",),
-            relax_ratio=ratio,
-            relax_s=tau,
-        )
-        trace = rig.run(150)
-        t = trace.t[:, 0]
-        ramp = np.minimum(t, up)
-        z = ratio * k * rate * tau * (1.0 - np.exp(-ramp / tau)) * np.exp(-(t - ramp) / tau)
-        np.testing.assert_allclose(trace.force[:, 0], k * rate * ramp + z, rtol=1e-8)
-
-    def test_foam_never_gives_back_more_than_it_took(self, tools):
-        rng = np.random.default_rng(8)
-        gaps = np.sort(rng.uniform(0.0, 0.02, (6, 40)), axis=0)
-        gaps[0] = 0.0
-        slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
-        rig = tools.Rig(
-            h=0.01,
-            arm_k=1e12,
-            speed=0.0,
-            slopes=slopes,
-            intercepts=intercepts,
-            effects=("relaxation",),
-            relax_ratio=rng.uniform(0.2, 2.0, 40),
-            relax_s=rng.uniform(0.05, 2.0, 40),
-        )
-        # Presses and lets go at many speeds, always in small steps.
-        t = np.arange(2000)[:, None] * 1e-2
-        beat = rng.uniform(0.05, 3.0, (3, 1, 40))
-        depth = (np.sin(beat * t + rng.uniform(0, 6, (3, 1, 40))) * 0.01).sum(axis=0)
-        depth += 0.005 - depth[0]
-        taken = np.zeros(40)
-        least = np.zeros(40)
-        before = force = np.zeros(40)
-        for place in np.vstack([np.linspace(0.0, 0.005, 50)[:, None] + np.zeros(40), depth]):
-            rig.state.start = place[None]
-            now = rig.run(1).force[0]
-            assert (now >= 0.0).all()
-            taken += 0.5 * (force + now) * (place - before)
-            least = np.minimum(least, taken)
-            force, before = now, place
-        assert (taken > 0.0).all()
-        assert (least > -1e-3 * taken).all()
-
-
-class TestBed:
-    def bed(self, rows, columns, depth, *, modulus=10e3, thickness=0.1, curve=None, shift=0.0):
-        """Total force and taxels touched of a cylinder on a foundation, as the base lays it."""
-        pitch = RADIUS * 2.0 * math.pi / columns
-        row_pitch = 0.173 / rows
-        z = (np.arange(rows) - (rows - 1) / 2.0)[:, None] * row_pitch
-        angles = (np.arange(columns) + 0.5)[:, None] * (2.0 * math.pi / columns)
-        away = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
-        stiffness = np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
-        gaps = RADIUS * (1.0 - np.cos(away))
-        state = SimpleNamespace(values={"radius_m": np.array([curve or 1e6])})
-        depths = depth - base.curve_gap(z, state)
-        loads = contact.spring_loads(depths, gaps, stiffness, np.ones((rows, 1)))
-        return loads.sum(), (loads > 0.0).sum() * pitch * row_pitch, rows * row_pitch
-
-    @staticmethod
-    def cylinder(depth, modulus=10e3, thickness=0.1):
-        return (4.0 / 3.0) * (modulus / thickness) * depth * math.sqrt(2.0 * RADIUS * depth)
-
-    @pytest.mark.parametrize(
-        ("depth", "low", "high"), [(0.5e-3, 0.54, 1.35), (2e-3, 0.93, 1.08), (5e-3, 0.95, 1.06)]
-    )
-    def test_sampled_on_taxels_it_keeps_to_the_continuum_law(self, depth, low, high):
-        ratios = []
-        for shift in np.linspace(-0.5, 0.5, 21):
-            force, _, length = self.bed(16, 24, depth, shift=shift)
-            ratios.append(force / length / self.cylinder(depth))
-        assert low <= min(ratios)
-        assert max(ratios) <= high
-        if depth < 1e-3:  # the trap: a shallow contact falls between the taxels
-            assert max(ratios) / min(ratios) > 1.5
-
-    def test_fine_taxels_give_the_cylinder_law(self):
-        force, _, length = self.bed(16, 4800, 3e-3)
-        assert force / length == pytest.approx(self.cylinder(3e-3), rel=0.01)
-
-    def test_a_round_thing_across_gives_the_foundations_area_twice_hertz(self):
-        # Crossed cylinders of one radius press as a sphere does: F = pi (E/H) R d^2 and
-        # area 2 pi R d on a foundation; Hertz's half space has pi R d and d^1.5.
-        depth = 3e-3
-        force, area, _ = self.bed(600, 1000, depth, curve=RADIUS)
-        assert area == pytest.approx(2.0 * math.pi * RADIUS * depth, rel=0.02)
-        assert area == pytest.approx(2.0 * (math.pi * RADIUS * depth), rel=0.02)
-        assert force == pytest.approx(math.pi * 10e3 / 0.1 * RADIUS * depth**2, rel=0.02)
-        twice, _, _ = self.bed(600, 1000, 2 * depth, curve=RADIUS)
-        assert math.log2(twice / force) == pytest.approx(2.0, abs=0.05)
-
-    def test_the_closed_form_is_the_bed_in_fractions(self):
-        from fractions import Fraction
-
-        rng = np.random.default_rng(11)
-        for _ in range(60):
-            gaps = np.sort(rng.integers(0, 50, 5)) / 1024.0
-            k = 2.0 ** rng.integers(-3, 30, 5)
-            c = float(2.0 ** rng.integers(-12, 2))
-            free = float(rng.integers(1, 4000)) / 1024.0
-            slopes, intercepts = contact.sort_bed(gaps[:, None], k[:, None])
-            (force,) = contact.closed_form(
-                slopes, intercepts, (np.array([free]),), (np.array([c]),)
-            )
-            best = Fraction(0)
-            total_k = total_b = Fraction(0)
-            for g, s in zip(gaps, k, strict=True):
-                total_k += Fraction(float(s))
-                total_b += Fraction(float(s)) * Fraction(float(g))
-                best = max(best, (total_k * Fraction(free) - total_b) / (1 + Fraction(c) * total_k))
-            assert force[0] == pytest.approx(float(best), rel=1e-14, abs=1e-300)
-
-
 class TestInertia:
     """One joint that swings a bar of 0.3 m against a narrow post."""
 
@@ -429,61 +281,6 @@ class TestFriction:
             GRAVITY - shear.pull[0] * held.state.along_face[2, 0], rel=0.01
         )
         assert held.force[0].max() > 1.2 * plain.force[0].max()
-
-
-def layer_solution(half_width, step=1 / 200):
-    """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer of E = 1
-    and H = 1 without lateral strain, by its Green's function (Fourier), half_width a."""
-    n, length = 8192, 8192 * step
-    w = 2.0 * np.pi * np.fft.rfftfreq(n, step)
-    v = np.clip(w, 1e-9, 20.0)
-    bonded = (6.0 * np.sinh(2 * v) - 4.0 * v) / (6.0 * np.cosh(2 * v) + 4.0 * v**2 + 10.0)
-    u = 2.0 * np.where(w > 20.0, 1.0, bonded) / np.maximum(w, 1e-9)
-    u[0] = 1.0
-    assert length > 30.0
-    green = np.fft.irfft(u, n) / step
-    points = 2 * round(half_width / step) + 1
-    x = (np.arange(points) - points // 2) * step
-    flat, curved = solve(toeplitz(green[:points]), np.stack([np.ones(points), x * x / 2.0]).T).T
-    depth = curved[0] / flat[0]  # no pressure at the edge
-    pressure = depth * flat - curved
-    return pressure.sum(), depth, pressure.max() / pressure.mean()
-
-
-class TestLateral:
-    @pytest.mark.parametrize(("part", "bound"), [(0.1, 0.2), (0.3, 0.1), (0.6, 0.1), (1.0, 0.1)])
-    def test_load_and_width_are_the_elastic_layers(self, part, bound):
-        load, depth, peak = layer_solution(part)
-        # Columns so fine that the sum is the integral; E = H = R = 1.
-        x = np.linspace(0.0, 2.0, 4001)
-        gaps = x * x / 2.0 + lateral.delay(x, np.array(1.0))
-        inside = np.maximum(depth - gaps, 0.0)
-        force = 2.0 * inside.sum() * (x[1] - x[0]) + 2.0 * lateral.MARGIN * depth
-        assert force == pytest.approx(load, rel=bound)
-        assert x[inside > 0.0].max() == pytest.approx(part, rel=bound)
-        shape = np.sqrt(inside[inside > 0.0])
-        assert shape.max() / shape.mean() == pytest.approx(peak, rel=0.05)
-        # Independent springs are as wide as the square root of the depth says, and too soft.
-        assert math.sqrt(2.0 * depth) > 1.15 * part
-
-    def test_the_bed_of_taxels_keeps_to_it(self):
-        foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
-        batch = run(make(foam))
-        depth = batch.traces["depth_m"][0, -1] / 0.1
-        widths = np.array([layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)])
-        scale = RADIUS / 0.1
-        want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
-        length = batch.state.skin.row_pitch_m * batch.state.bed.weight[:, 0].sum()
-        assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
-
-
-class TestBottoming:
-    def test_thin_foam_ends(self):
-        foam = {"family": "foam", "modulus_pa": 2e3, "depth_m": 0.02, "relax_ratio": 0.0}
-        scene = make(one_object(**foam))
-        assert run(scene).traces["depth_m"][0].max() < 0.021
-        endless = replace(scene, leave_out=("bottoming",))
-        assert run(endless).traces["depth_m"][0].max() > 0.021
 
 
 class TestTilt:
