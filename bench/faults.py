@@ -4,7 +4,7 @@
 script of faults onto a fake skin in virtual time that advances by the bits on the wire, 100
 frames a second, and judges every taxel that is called valid by what the chips really felt. Then
 one fault of each kind is played at every transaction of a frame and of set-up: 28,501 positions,
-half an hour of one core; `--every 10` takes every tenth.
+half an hour of one core; `--every 10` takes every tenth, `--first 3` from the fourth on.
 """
 
 from __future__ import annotations
@@ -376,6 +376,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--every", type=int, default=1, help="every so many positions")
+    parser.add_argument("--first", type=int, default=0, help="the first of them")
     arguments = parser.parse_args()
     rows = [
         run(name, file, faults, seed=arguments.seed, **more)
@@ -384,7 +385,9 @@ def main() -> None:
     print(table(rows))
     print(UNKNOWABLE)
     jobs = [
-        delayed(sweep)(name, file, kind, set_up=set_up, every=arguments.every)
+        delayed(sweep)(
+            name, file, kind, set_up=set_up, every=arguments.every, offset=arguments.first
+        )
         for name, file in skins().items()
         for kind in KINDS
         for set_up in (False, True)

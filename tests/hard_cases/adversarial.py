@@ -370,7 +370,7 @@ def ratio(part: int, whole: int) -> float:
 def single(job: tuple[str, int, bool]) -> tuple[tuple[str, int], Found]:
     """A set in another process."""
     family, seed, reference = job
-    with threadpool_limits(1), np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
         return (family, seed), judged(family, seed, reference)
 
 
@@ -378,7 +378,7 @@ def search(
     families: Sequence[str], sets: int, jobs: int, first: int = 0
 ) -> Iterator[tuple[str, Found]]:
     """Each family with what came of its sets."""
-    with ProcessPoolExecutor(jobs) as pool:
+    with ProcessPoolExecutor(jobs, initializer=threadpool_limits, initargs=(1,)) as pool:
         for family in families:
             every = Found()
             work = [(family, i, i % REFERENCE == 0) for i in range(first, first + sets)]

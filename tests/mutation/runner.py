@@ -16,11 +16,12 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 from tests.mutation.shapes import ROOT
 
-LEFT = (".*", "__pycache__", "build", "dist", "*.egg-info")
-"""What a copy leaves behind."""
+LEFT = (".*", "build", "dist", "*.egg-info")
+"""What a copy leaves behind; compiled files go with it, which saves each mutant their making."""
 PRELOADED = ("hypothesis", "onnxruntime", "scipy.ndimage", "skl2onnx", "sklearn.neighbors")
 """Loaded once, so that each forked process begins with them; none of the project's own."""
 LIMIT_S = 600.0
@@ -70,18 +71,31 @@ IN_A_BROWSER = (
 """Tests that would fail for want of memory, whatever the change."""
 
 
+class First:
+    """A pytest plugin that remembers the first test, or file of tests, that failed."""
+
+    name = ""
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        """Called with what came of each part of a test."""
+        if report.failed and not self.name:
+            path, _, test = report.nodeid.partition("::")
+            self.name = f"{Path(path).name}::{test}" if test else Path(path).name
+
+    pytest_collectreport = pytest_runtest_logreport
+
+
 def failed(folder: str, job: Job) -> str:
     """The first test that fails on the copy; "" where none does."""
     import pytest
 
     for stage in job.stages:
-        said = io.StringIO()
+        first = First()
         options = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist", *IN_A_BROWSER]
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            status = pytest.main([*options, "--rootdir", folder, *stage])
-        found = [s for s in said.getvalue().splitlines() if s.startswith(("FAILED", "ERROR"))]
-        if found:
-            return found[0].split(" - ")[0].split(" ", 1)[1].split("/")[-1]
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            status = pytest.main([*options, "--rootdir", folder, *stage], plugins=[first])
+        if first.name:
+            return first.name
         if status not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
             return f"{stage[0]} did not run: {status!r}"
     return ""

@@ -4,7 +4,8 @@
 conditions. A change is made on a copy of the tree, and the tests that run through its line are
 asked, the fastest first. What survives is printed with its line; `EQUIVALENT` says of those that
 change nothing why they do not: they are not tried, and count as neither. `--part 1/4` tries a
-quarter of them, and `--reach FILE` keeps which tests run through which line for the next part.
+quarter of them, `--reach FILE` keeps which tests run through which line for the next part, and
+`--done FILE` leaves out those that an earlier run printed there.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from random import Random
 
@@ -26,11 +28,11 @@ from edge.files import write_whole
 from tests.mutation import runner, shapes
 from tests.mutation.equivalent import EQUIVALENT
 
-ASKED = ("tests/edge", "tests/golden", "tests/hard_cases")
-"""Tests whose way through edge/ is measured."""
-APART = ("tests/edge/commands", "tests/edge/runtime", "tests/test_demo_data.py", "tests/export")
-"""Tests that run edge/ in processes of their own, or through an export: asked at the end."""
-MOST_TESTS = 200
+MEASURED = ("edge", "golden", "hard_cases", "export", "test_demo_data.py")
+"""Of tests/: those whose way through edge/ is measured."""
+APART = ("subprocess", "python(", "start(")
+"""What a test calls that runs edge/ in a process of its own: such tests are asked at the end."""
+FEW_TESTS, MOST_TESTS = 10, 200
 SHARE = 0.9
 
 COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -167,7 +169,7 @@ def measured() -> dict[str, dict[str, list[str]]]:
             "no:xdist",
             "-k",
             "not simulator",
-            *ASKED,
+            *(f"tests/{name}" for name in MEASURED),
         ]
         environment = {**os.environ, "REACH_FILE": kept.name, "PYTHONPATH": str(shapes.ROOT)}
         # A test that fails where its lines are measured still says which lines those are.
@@ -178,20 +180,36 @@ def measured() -> dict[str, dict[str, list[str]]]:
         return found
 
 
+@cache
+def apart() -> tuple[str, ...]:
+    """The tests that run edge/ where its lines are not measured."""
+    found = []
+    for path in sorted((shapes.ROOT / "tests" / "edge").rglob("test_*.py")):
+        text = path.read_text()
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                code = ast.get_source_segment(text, node) or ""
+                if any(call in code for call in APART):
+                    found.append(f"{path.relative_to(shapes.ROOT).as_posix()}::{node.name}")
+    return tuple(found)
+
+
 def job(change: Change, reached: dict[str, dict[str, list[str]]]) -> runner.Job:
     """The change and those who are asked: the tests of its line, its mirror, those apart."""
     mirror, package = runner.mirror(change.file), Path("tests", change.file).parent
-    # Those of the module itself first, then the fastest.
+    # Those of the module itself first, then the fastest; each file of tests takes time to load.
     tests = reached.get(change.file, {}).get(str(change.line), [])
-    tests = sorted(tests, key=lambda test: not test.startswith(mirror))[:MOST_TESTS]
-    stages: list[tuple[str, ...]] = [tuple(tests)] if tests else []
+    own = [test for test in tests if test.startswith(mirror)]
+    rest = [test for test in tests if not test.startswith(mirror)]
+    asked = (own, rest[:FEW_TESTS], rest[FEW_TESTS:MOST_TESTS])
+    stages: list[tuple[str, ...]] = [tuple(some) for some in asked if some]
     # A default or a constant is run through but once, where the module is first imported.
     if (shapes.ROOT / mirror).exists():
         stages.append((mirror,))
     if not tests and package.name != "edge" and (shapes.ROOT / package).is_dir():
         stages.append((package.as_posix(),))
     text = shapes.swapped(change.file, change.node, change.other)
-    return runner.Job(change.name, change.file, text, (*stages, APART))
+    return runner.Job(change.name, change.file, text, (*stages, apart()))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -203,10 +221,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", default="", help="changes whose line holds this text")
     parser.add_argument("--part", default="1/1", help="such as 2/4: the second quarter")
     parser.add_argument("--reach", type=Path, help="keep here which tests run through which line")
+    parser.add_argument("--done", type=Path, help="what earlier runs printed: leave those out")
     arguments = parser.parse_args(argv)
     part, parts = map(int, arguments.part.split("/"))
     chosen = [c for c in drawn(arguments.count, arguments.seed) if arguments.only in c.name]
-    chosen = chosen[part - 1 :: parts]
+    done = arguments.done.read_text() if arguments.done else ""
+    chosen = [c for c in chosen[part - 1 :: parts] if f" {c.name}\n" not in done]
     alive, tried = 0, [change for change in chosen if not change.same]
     for change in chosen:
         if change.same:

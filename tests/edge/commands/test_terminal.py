@@ -54,7 +54,9 @@ def test_the_caption_is_for_a_person():
         "     1.25 s  |  1000 counts on 2 taxels at row 1.0, column 1.5  |  1 more"
     )
     newtons = SkinLayout(rows=4, cols=4, counts_per_newton=500.0)
-    assert "2.00 N on 2 taxels" in terminal.caption(f, regions, newtons)
+    assert terminal.caption(f, regions[:1], newtons) == (
+        "     1.25 s  |  2.00 N on 2 taxels at row 1.0, column 1.5"
+    )
     valid = np.ones((4, 4), dtype=bool)
     valid[0] = False
     assert terminal.caption(frame(valid=valid), [], LAYOUT).endswith(

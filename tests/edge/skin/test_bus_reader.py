@@ -3,6 +3,7 @@
 import errno
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -81,6 +82,21 @@ def test_one_fault_anywhere_gives_no_wrong_value_and_is_over_in_ten_frames(name,
         found = sweep(name, SKINS[name], kind, **at)
         assert (found.wrong, found.escaped) == (0, ""), found
         assert found.frames <= FRAMES_BACK, found
+
+
+def test_a_frame_that_breaks_off_before_its_last_byte_is_read_again():
+    """All other bytes are whole, and what is left of the last value might be one."""
+    file = SKINS["cody"]
+    feels = Pattern(file)
+    met = wrong = 0
+    with fake_skin(file, feels, timed=True) as skin:
+        bus = skin.readers[0].bus
+        for position in range(15):
+            bus.inject([replace(KINDS["a frame that breaks off"], at=[position])], 0)
+            bus.script.random = SimpleNamespace(randrange=lambda n: n - 1)
+            wrong += feels.wrong(skin.read())
+            met += bus.script.met
+    assert (met, wrong) == (15, 0)
 
 
 @pytest.mark.parametrize("position", [17, 18, 40])

@@ -111,6 +111,7 @@ def test_a_calibration_that_cannot_be_replaced_is_refused():
         ("baseline", "[[1, 2], [3, 4]]"),
         ("baseline", "[" + "[0.5, 1, 1, 1, 1, 1]," * 4 + "]"),
         ("baseline", "[" + "[-1, 1, 1, 1, 1, 1]," * 4 + "]"),
+        ("baseline", "[" + "[65536, 1, 1, 1, 1, 1]," * 4 + "]"),
         ("noise", "[" + "[nan, 1, 1, 1, 1, 1]," * 4 + "]"),
     ],
 )
@@ -120,6 +121,12 @@ def test_a_damaged_calibration_is_refused(key, value):
     text = SMALL + "[calibration]\n" + "".join(f"{k} = {v}\n" for k, v in rows.items())
     with pytest.raises(InputError, match=rf"calibration.{key}"):
         skinfile.parse(text)
+
+
+def test_a_calibration_may_lie_at_the_ends_of_what_a_chip_gives():
+    ends = "[" + "[0, 65535, 0, 0, 0, 0]," * 4 + "]"
+    text = SMALL + f"[calibration]\nbaseline = {ends}\nnoise = {ends}\n"
+    assert skinfile.parse(text).calibration.baseline[:, :2].tolist() == [[0, 65535]] * 4
 
 
 def test_saving_a_calibration_keeps_the_old_file(tmp_path):
