@@ -12,7 +12,6 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from difflib import get_close_matches
 from importlib import import_module
 
 from edge import __version__
@@ -181,6 +180,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         top.print_help()
         return 2
     if not wanted and words and not words[0].startswith("-"):
+        from difflib import get_close_matches  # a slow board starts sooner without it
+
         near = get_close_matches(words[0], COMMANDS, 1, 0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"the commands are {', '.join(COMMANDS)}"
         print(f"{top.prog}: there is no command {words[0]!r}; {hint}", file=sys.stderr)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -125,3 +128,26 @@ Event = Onset | Decided | Release
 
 def _which(contact: int | None) -> dict[str, int]:
     return {} if contact is None else {"contact": contact}
+
+
+def json_line(event: Mapping[str, Any]) -> str:
+    """An event as one line of JSON, without its end.
+
+    In ASCII, which every encoding of stdout has, so that no label can break a line or reach a
+    terminal as an escape sequence; a number that is not finite, which JSON lacks, is null.
+
+    >>> json_line({"label": "Bär", "confidence": float("nan")})
+    '{"label": "B\\\\u00e4r", "confidence": null}'
+    """
+    try:
+        return json.dumps(event, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(event), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(one) for key, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value

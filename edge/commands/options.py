@@ -9,7 +9,6 @@ import math
 from edge.classifier import stopping_rules
 from edge.errors import InputError
 from edge.model.model import Model
-from edge.runtime.joint_stream import OLDEST_S
 from edge.touch.arm import Chain
 
 LOG = logging.getLogger(__name__)
@@ -51,6 +50,8 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
 
 def add_joints(parser: argparse.ArgumentParser) -> None:
     """Add the options that say where joint angles come from; `source.open_joints` opens it."""
+    from edge.runtime.joint_stream import OLDEST_S  # a replay needs no sockets
+
     parser.add_argument(
         "--joints",
         metavar="stdin|udp:[HOST:]PORT",

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from edge.errors import printable
-from edge.runtime.event_writer import json_line
+from edge.events import json_line
 
 BAR = 10
 """Characters of a bar that shows a share."""

@@ -6,8 +6,6 @@ network that is down costs lines, which are counted.
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import queue
 import socket
@@ -19,6 +17,7 @@ from contextlib import suppress
 from typing import Any, TextIO
 
 from edge.errors import InputError
+from edge.events import json_line
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
@@ -34,29 +33,6 @@ Patience = Callable[[], bool]
 def impatient() -> bool:
     """Where time is real: decisions must not wait."""
     return False
-
-
-def json_line(event: Mapping[str, Any]) -> str:
-    """An event as one line of JSON, without its end.
-
-    In ASCII, which every encoding of stdout has, so that no label can break a line or reach a
-    terminal as an escape sequence; a number that is not finite, which JSON lacks, is null.
-
-    >>> json_line({"label": "Bär", "confidence": float("nan")})
-    '{"label": "B\\\\u00e4r", "confidence": null}'
-    """
-    try:
-        return json.dumps(event, allow_nan=False)
-    except ValueError:
-        return json.dumps(_finite(event), allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(one) for key, one in value.items()}
-    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 class LineWriter:

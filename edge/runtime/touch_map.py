@@ -18,9 +18,10 @@ from typing import Any, NamedTuple
 
 from edge.config import parse_json
 from edge.errors import InputError
+from edge.events import json_line
 from edge.files import open_regular
 from edge.model.info import ModelInfo
-from edge.runtime.event_writer import LineWriter, json_line
+from edge.runtime.event_writer import LineWriter
 
 LARGEST_BYTES = 1 << 32
 LONGEST_LINE = 1 << 16

@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import os
 import socket
 import threading
@@ -12,7 +11,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.runtime import event_writer
-from edge.runtime.event_writer import Lines, json_line
+from edge.runtime.event_writer import Lines
 
 
 @pytest.fixture
@@ -62,14 +61,6 @@ def test_an_address_that_makes_no_sense_is_one_sentence(address):
 def test_a_host_that_is_none_is_one_sentence(address):
     with pytest.raises(InputError, match="cannot be reached"):
         Lines(udp=address)
-
-
-def test_a_line_is_ascii_and_json_whatever_a_label_holds():
-    label = "a\u001b[2J\u202e\u2028\ud800\u0085é"
-    line = json_line({"label": label, "confidence": math.nan, "list": [math.inf, 1.0]})
-    assert line.isascii()
-    assert line.isprintable()
-    assert json.loads(line) == {"label": label, "confidence": None, "list": [None, 1.0]}
 
 
 def test_a_reader_that_reads_nothing_costs_lines_and_no_time(monkeypatch):
