@@ -16,7 +16,7 @@ FRAMES = 120
 @pytest.fixture(params=SETS)
 def one_set(request):
     """Names of a set's features, and a recording of a contact."""
-    return SETS[request.param].features, load(FOLDER / "pillow-movable.npz")
+    return SETS[request.param], load(FOLDER / "pillow-movable.npz")
 
 
 def tracker_of(names, recording):
@@ -25,7 +25,7 @@ def tracker_of(names, recording):
 
 
 def bench_following(against, note, one_set):
-    """A frame in contact; `FeatureSet.price_us` comes from here."""
+    """A frame in contact."""
     names, recording = one_set
     onset_s, _ = first_contact(recording, tracker_of(names, recording))
     frames = [frame for frame in recording if frame.t >= onset_s][:FRAMES]

@@ -303,11 +303,10 @@ class Classifier:
         last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
         if not sure and at < last:
             return None
-        unknown = novel <= self.novelty_rate
-        if unknown:
+        if novel <= self.novelty_rate:
             flags = (*flags, "unknown")
-        # A new object can still be told to be soft or to move: only what it is has no answer.
-        if unknown and info.novelty is not None and none.task == info.novelty.task:
+        novelty = info.novelty
+        if novelty is not None and novelty.withholds(none.task, novel, self.novelty_rate):
             label, confidence = UNKNOWN, 1.0 - novel
         elif rule is not None and not sure and not rule.fixed:
             flags = (*flags, "unsure")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.feature_sets import SETS, expand
+from edge.touch.feature_sets import expand
 from train.evaluate import NEIGHBOURS, SHRINKAGES, Labels, SearchGrid
 from train.pipeline import Choice
 from train.projection import KINDS
@@ -154,18 +154,16 @@ def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.in
     """(candidates,) how dear the features and projection of each are, from 0.
 
     By the weights of the largest projection that they may take: these are the numbers that are
-    fitted, stored on the board and multiplied for a decision. What following a contact costs more
-    with one set than with another, microseconds of each frame, decides between equal ones.
+    fitted, stored on the board and multiplied for a decision. Of equal ones the first is cheaper.
 
     Args:
         choices: the candidates.
         widths: columns of each feature.
     """
-    sizes: dict[tuple[tuple[str, ...], str], tuple[int, float]] = {}
+    sizes: dict[tuple[tuple[str, ...], str], int] = {}
     kinds = [(choice.features, choice.projection) for choice in choices]
     for kind, choice in zip(kinds, choices, strict=True):
         weights = choice.components * sum(widths[name] for name in choice.features or widths)
-        price = sum(one.price_us for one in SETS.values() if set(one.features) <= set(kind[0]))
-        sizes[kind] = max(sizes.get(kind, (0, 0.0)), (weights, price))
+        sizes[kind] = max(sizes.get(kind, 0), weights)
     ranks = {kind: rank for rank, kind in enumerate(sorted(sizes, key=lambda one: sizes[one]))}
     return np.array([ranks[kind] for kind in kinds], dtype=np.int64)

@@ -195,7 +195,7 @@ def _among(choices: Sequence[Choice], names: Set[str], unseen: bool) -> NDArray[
 def without_folds(
     trials: AnswerTable, dataset: DataSet, samples: int, chosen: Mapping[str, Chosen]
 ) -> list[dict[str, Choice]]:
-    """{task: what is chosen without it} of each fold, of the features that the model takes."""
+    """{task: what is chosen without it} of each fold."""
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
     out: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
     for task, choices in trials.choices.items():

@@ -178,10 +178,13 @@ def fit(
     points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes)
     sequential = None
     if points:
-        at_points = np.stack([dataset.features(s, samples) for s in points])
-        sequential = SequentialClassifier(choices, points, names, jobs=jobs, widths=widths)
-        without = without_folds(trials, dataset, samples, chosen)
-        sequential.fit(at_points, y, trials.folds, without)
+        without = without_folds(trials, measured, samples, chosen)
+        told = [choice for by_task in (choices, *without) for choice in by_task.values()]
+        seen = measured.of([name for choice in told for name in choice.features])
+        at_points = np.stack([seen.features(s, samples) for s in points])
+        sequential = SequentialClassifier(
+            choices, points, seen.names, jobs=jobs, widths=seen.widths(samples)
+        ).fit(at_points, y, trials.folds, without)
         classifier = sequential.decision_points_[-1]
     else:
         classifier = ContactClassifier(choices, names, widths).fit(X, y)

@@ -16,6 +16,11 @@ NOVELTY_RATE = 0.02
 """How often a contact with a trained object may be called unknown. At this rate such answers are
 counted among the certified errors."""
 
+TEST_SHARE = 0.5
+"""Part of the risk that the tests on calibration trials take. The rest is for what these cannot
+show: the exported model is one of many that such trials may give, and errs more or less often than
+the folds' models do on average."""
+
 
 def check_rate(value: float, what: str) -> float:
     """The value where it is a rate inside (0, 1).
@@ -121,7 +126,8 @@ class Stopping:
         divergence = (1.0 - share) * math.log((1.0 - share) / (1.0 - error))
         if share > 0.0:
             divergence += share * math.log(share / error)
-        needed = max(math.ceil(-math.log(self.risk) / divergence), self.trials + 1)
+        level = TEST_SHARE * self.risk
+        needed = max(math.ceil(-math.log(level) / divergence), self.trials + 1)
         return f"{known}; {error:g} needs about {needed} trials"
 
     def to_dict(self) -> dict[str, Any]:
@@ -178,6 +184,13 @@ class Novelty:
             if distance > limit:
                 found = rate
         return found
+
+    def withholds(self, task: str, rate: float, asked: float = NOVELTY_RATE) -> bool:
+        """Whether a task names nothing, where the contact counts as unknown from a rate on.
+
+        A new object can still be told to be soft or to move: only what it is has no answer.
+        """
+        return task == self.task and rate <= asked
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""

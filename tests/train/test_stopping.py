@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from edge.errors import InputError
-from edge.model.stopping import StoppingRule
+from edge.model.stopping import NOVELTY_RATE, TEST_SHARE, Novelty, StoppingRule
 from train.pipeline import Choice
 from train.stopping import (
     NEVER,
@@ -18,6 +18,7 @@ from train.stopping import (
     logistic,
     stops,
     upper_limit,
+    withheld,
 )
 
 
@@ -94,7 +95,7 @@ def test_the_first_rule_is_the_full_window_at_the_whole_level():
     confidence, right = drawn(140, np.random.default_rng(1))
     rules = certify(confidence, ~right, SECONDS)
     wrong = int((~right[-1]).sum())
-    assert rules[0].error == pytest.approx(upper_limit(wrong, 140, RISK))
+    assert rules[0].error == pytest.approx(upper_limit(wrong, 140, TEST_SHARE * RISK))
 
 
 def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
@@ -103,7 +104,9 @@ def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[-1, :20] = True
     rules = certify(np.full((3, 100), 0.9), wrong, SECONDS)
-    assert [rule.error for rule in rules] == [pytest.approx(upper_limit(20, 100, RISK))]
+    assert [rule.error for rule in rules] == [
+        pytest.approx(upper_limit(20, 100, TEST_SHARE * RISK))
+    ]
 
 
 @pytest.mark.parametrize("error", [0.15, 0.2, 0.3])
@@ -118,7 +121,7 @@ def test_certificates_fail_no_oftener_than_they_say(error):
         if able:
             at = stops(world_confidence, able[-1])
             failed += 1.0 - world[at, np.arange(20_000)].mean() > error
-    assert failed <= binom.ppf(0.99, 300, RISK)
+    assert failed <= binom.ppf(0.99, 300, TEST_SHARE * RISK)
 
 
 def touches(n, seed=0):
@@ -165,6 +168,49 @@ def test_a_held_out_trial_is_never_its_own_neighbour():
     assert (model.held_out_["t"].distances > 0.0).all()
     _, _, own = answers(model.decision_points_, "t", X)
     assert (own == 0.0).all()
+
+
+def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
+    """A fiftieth lies far away: of the many labels it counts as wrong, of the two it does not."""
+    X, labels = touches(200)
+    X[:, ::50, 5] = 500.0 * (1 + np.arange(4))
+    each = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
+    choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    model.fit(X, {"kind": labels, "thing": each})
+    assert model.novelty_.task == "thing"
+    right = {task: one.right[-1] for task, one in model.held_out_.items()}
+    assert model.stopping_["kind"].wrong == int((~right["kind"]).sum())
+    far = np.arange(200) % 50 == 0
+    assert model.stopping_["thing"].wrong >= int((~right["thing"] | far).sum())
+
+
+def test_only_the_task_of_the_novelty_names_nothing_and_only_beyond_the_limit():
+    limits = Novelty("thing", (0.5, NOVELTY_RATE), ((1.0, 3.0), (2.0, 4.0)))
+    distances = np.array([[2.0, 3.0, 3.5], [3.5, 4.5, 4.0]])
+    assert withheld(limits, "thing", distances).tolist() == [
+        [False, False, True],
+        [False, True, False],
+    ]
+    assert not withheld(limits, "kind", distances).any()
+
+
+def test_what_no_task_takes_is_there_for_the_folds_alone():
+    """The folds may choose what the model does not: its own vectors are the narrower ones."""
+    X, labels = touches(60)
+    names = ("max_force", "contact_area")
+    folds = folds_of(60, 0)
+    count = int(folds.max()) + 1
+    blind = {"t": Choice("none", 3, 3, features=names[1:])}
+    seeing = {"t": Choice("none", 3, 3, features=names[:1])}
+    model = SequentialClassifier(blind, SECONDS, names).fit(
+        X, {"t": labels}, folds, [seeing] * count
+    )
+    assert model.columns_.tolist() == list(range(6, 12))
+    assert model.n_features_in_ == 6
+    assert model.held_out_["t"].right[-1].all()
+    _, _, distances = answers(model.decision_points_, "t", X[..., model.columns_])
+    assert (distances == 0.0).all()
 
 
 def test_too_few_trials_are_refused():

@@ -30,8 +30,8 @@ TREES = 200
 TIMES = 10
 """Times at which every taxel is sampled, for the peers."""
 GROUP_TASK = "object"
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of the trials in the learning curve."""
+PARTS = 4
+"""Parts of the trials in the learning curve: one of them, two, three, all."""
 CURVE = (("paper", "pca"), ("contact", "lda"))
 
 Peer = Callable[[NDArray[np.float64], NDArray[np.str_], NDArray[np.float64]], NDArray[np.str_]]
@@ -98,7 +98,7 @@ def taxels(context: Context) -> NDArray[np.float64]:
 
 def vectors(series: Sequence[FeatureSeries | None], name: str) -> NDArray[np.float64]:
     """(n, width) the vectors of a set; zeros where there was no contact."""
-    names = SETS[name].features
+    names = SETS[name]
     rows = [None if s is None else feature_vector(s, WINDOW_S, SAMPLES, names) for s in series]
     width = next(len(row) for row in rows if row is not None)
     return np.stack([np.zeros(width) if row is None else row for row in rows])
@@ -112,7 +112,7 @@ def _ours(
     name: str,
     projection: str,
 ) -> dict[str, Result]:
-    names = SETS[name].features
+    names = SETS[name]
     columns = widths(names, SAMPLES, layout)
     grid = SearchGrid(SCALING, projection)
     table = evaluate(X, y, folds, [grid], features=names, widths=columns)
@@ -133,7 +133,7 @@ def _theirs(
 
 
 def section(context: Context) -> Section:
-    """Sets of features, discriminants and peers; what they cost; how many trials they need."""
+    """Sets of features, discriminants and peers; how many trials they need."""
     y, layout = context.labels, context.dataset.layout
     finest = max(sorted(y), key=lambda task: len(set(y[task])))
     sets = list(dict.fromkeys(name for name, _ in OURS))
@@ -149,7 +149,7 @@ def section(context: Context) -> Section:
     for how, fold in folds.items():
         asked = y if how == "trials" else others
         for name, projection in OURS:
-            words = f"`{name}` ({len(SETS[name].features)} features), {projection.upper()} + k-NN"
+            words = f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"
             cases.append((words, how, _ours, (X[name], asked, fold, layout, name, projection)))
         for words, peer in peers().items():
             cases.append((words, how, _theirs, (raw, asked, fold, peer)))
@@ -157,13 +157,10 @@ def section(context: Context) -> Section:
     results: dict[str, dict[str, dict[str, Result]]] = {}
     for (words, how, _, _), found in zip(cases, answers, strict=True):
         results.setdefault(words, {})[how] = found
-    prices = {
-        words: SETS[name].price_us for (words, *_), (name, _) in zip(cases, OURS, strict=False)
-    }
     table = Table(
         "beyond_sets",
         "Nested accuracy: trials left out, and whole objects left out",
-        ("task", "accuracy %", "95 % interval", "objects not met %", "what decides", "us a frame"),
+        ("task", "accuracy %", "95 % interval", "objects not met %", "what decides"),
         narrow=5,
     )
     for task in y:
@@ -177,7 +174,6 @@ def section(context: Context) -> Section:
                     f"{100 * low:.0f} to {100 * high:.0f}",
                     "" if unseen is None else percent(unseen.accuracy),
                     words,
-                    prices.get(words, ""),
                 )
             )
     png = figures.bars(
@@ -192,9 +188,7 @@ def section(context: Context) -> Section:
         "shrinkage, components and k are chosen by the other folds alone; the outside methods take "
         "their usual settings.",
         _best(results, y),
-        "The price is what following a contact costs more than with the paper's features, in "
-        "microseconds a frame on the machine that `bench/README.md` names. `make export` chooses "
-        "among the sets by itself.",
+        "`make export` chooses among the sets by itself, and says what a decision with each costs.",
     ]
     if len(peers()) < 3:
         text.append("MiniRocket is left out, as aeon is not installed (`pip install aeon`).")
@@ -219,38 +213,40 @@ def _best(results: dict[str, dict[str, dict[str, Result]]], y: Labels) -> str:
 
 
 def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels, finest: str) -> Table:
-    """Accuracy against the number of trials: how many touches are worth recording."""
+    """Accuracy against the number of trials: how many touches are worth recording.
+
+    Which trials they are matters as much as how many: each share is drawn once for each part that
+    it may begin with.
+    """
     layout = context.dataset.layout
-    parts = stratified_folds(y[finest], len(SHARES))
+    parts = stratified_folds(y[finest], PARTS)
     cases, heads = [], []
-    for count in range(1, len(SHARES) + 1):
-        some = np.flatnonzero(parts < count)
-        labels = {task: one[some] for task, one in y.items() if len(set(one[some])) > 1}
-        if len(some) < 20 or not labels:
-            continue
-        for name, projection in CURVE:
-            folds = stratified_folds(y[finest][some])
-            heads.append((len(some), name, projection))
-            cases.append((_ours, (X[name][some], labels, folds, layout, name, projection)))
-    table = Table(
+    for count in range(1, PARTS + 1):
+        for first in range(PARTS if count < PARTS else 1):
+            some = np.flatnonzero((parts - first) % PARTS < count)
+            labels = {task: one[some] for task, one in y.items() if len(set(one[some])) > 1}
+            if len(some) < 20 or not labels:
+                continue
+            for name, projection in CURVE:
+                folds = stratified_folds(y[finest][some])
+                heads.append((count, name, projection))
+                cases.append((_ours, (X[name][some], labels, folds, layout, name, projection)))
+    found: dict[tuple[str, str, int], list[Result]] = {}
+    answers = context.map("learning curve", _call, cases)
+    for (count, name, projection), by in zip(heads, answers, strict=True):
+        for task, result in by.items():
+            key = task, f"`{name}`, {projection.upper()}", count
+            found.setdefault(key, []).append(result)
+    rows = []
+    for (task, words, _), results in sorted(found.items()):
+        shares = [result.accuracy for result in results]
+        spread = f"{100 * min(shares):.0f} to {100 * max(shares):.0f}" if len(shares) > 1 else ""
+        trials = round(float(np.mean([result.total for result in results])))
+        rows.append((task, trials, percent(float(np.mean(shares))), spread, words))
+    return Table(
         "learning",
-        "More trials: nested accuracy among so many",
-        ("task", "trials", "accuracy %", "95 % interval", "what decides"),
+        f"More trials: nested accuracy among so many, the mean of {PARTS} draws",
+        ("task", "trials", "accuracy %", "lowest to highest draw %", "what decides"),
+        rows,
         narrow=5,
     )
-    for (n, name, projection), found in zip(
-        heads, context.map("learning curve", _call, cases), strict=True
-    ):
-        for task, result in found.items():
-            low, high = result.interval
-            table.rows.append(
-                (
-                    task,
-                    n,
-                    percent(result.accuracy),
-                    f"{100 * low:.0f} to {100 * high:.0f}",
-                    f"`{name}`, {projection.upper()}",
-                )
-            )
-    table.rows.sort(key=lambda row: (row[0], row[4], row[1]))
-    return table

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from edge.touch.features import FEATURES
 from train.evaluate import Labels, Result, SearchGrid, evaluate, stratified_folds
 from train.pipeline import Choice
-from train.stopping import finest
+from train.stopping import FEWER_FOLDS, FOLDS, MANY_TRIALS, finest
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 """Numbers of components to choose from."""
 NEIGHBOURS = 6
 """Most neighbours to choose from."""
-CHOICE_FOLDS = 5
-"""Folds in which `Chooser` compares the candidates."""
 
 
 def nested(
@@ -47,6 +45,21 @@ def nested(
 
 
 @dataclass(frozen=True)
+class NestedChoice:
+    """What some trials choose, and what they choose without each of their folds.
+
+    Attributes:
+        choices: {task: Choice} by all of them.
+        folds: (n,) from 0.
+        without: [fold]{task: Choice}, by the trials of the other folds.
+    """
+
+    choices: dict[str, Choice]
+    folds: NDArray[np.int64]
+    without: list[dict[str, Choice]]
+
+
+@dataclass(frozen=True)
 class Chooser:
     """Chooses every task's projection and neighbours by some of the trials alone.
 
@@ -64,14 +77,22 @@ class Chooser:
     features: tuple[str, ...]
     widths: tuple[int, ...] | None = None
 
-    def __call__(self, rows: NDArray[np.int64]) -> dict[str, Choice]:
-        """{task: the candidate that is best in a cross-validation among the rows}."""
+    def __call__(self, rows: NDArray[np.int64]) -> NestedChoice:
+        """The candidates that are best in a cross-validation among the rows."""
         y = {task: labels[rows] for task, labels in self.y.items()}
-        folds = stratified_folds(y[finest(y)], CHOICE_FOLDS)
+        count = FOLDS if len(rows) < MANY_TRIALS else FEWER_FOLDS
+        folds = stratified_folds(y[finest(y)], count)
         table = evaluate(
             self.X[rows], y, folds, self.grids, features=self.features, widths=self.widths
         )
-        return {task: table.choices[task][table.chosen(task)] for task in y}
+        return NestedChoice(
+            {task: table.choices[task][table.chosen(task)] for task in y},
+            folds,
+            [
+                {task: table.choices[task][table.without(task, fold)] for task in y}
+                for fold in range(int(folds.max()) + 1)
+            ],
+        )
 
 
 @dataclass(frozen=True)

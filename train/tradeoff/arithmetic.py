@@ -141,7 +141,7 @@ def section(
         accuracy(X, y, fewer, dataset),
         how,
     )
-    paper = Choice("IV", 5, min(3, choice.k + 2), features=SETS["paper"].features)
+    paper = Choice("IV", 5, min(3, choice.k + 2), features=SETS["paper"])
     add(
         "the paper's three features alone",
         stages["features"] * (1 - 3 / len(dataset.names)),

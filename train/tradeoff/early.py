@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from edge.model.stopping import NOVELTY_RATE, StoppingRule
+from edge.model.stopping import StoppingRule
 from train.evaluate import Labels, stratified_folds
 from train.pipeline import Choice, ContactClassifier
 from train.simulate.scene_model import Scene
@@ -23,7 +23,9 @@ from train.stopping import (
     confidences,
     finest,
     stops,
+    withheld,
 )
+from train.tradeoff.accuracy import NestedChoice
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -31,7 +33,7 @@ RATES = (0.02, 0.05, 0.1, 0.2)
 BINS = 10
 G = 9.80665
 
-Choose = Callable[[NDArray[np.int64]], Mapping[str, Choice]]
+Choose = Callable[[NDArray[np.int64]], NestedChoice]
 """Chooses every task's features, projection and k by some rows of the trials alone."""
 
 
@@ -43,7 +45,7 @@ class Certified:
         asked: the error rate.
         folds: how many of `FOLDS` certified it.
         wrong: share of decisions that were wrong, `unknown` among them; NaN of no fold.
-        unknown: share of trials called unknown.
+        unknown: share of decisions that name nothing, as the touch is unlike all trained ones.
         early: share of trials decided before the full window.
         mean_s: mean time to decision.
     """
@@ -123,7 +125,7 @@ class _Fold:
     test: NDArray[np.int64]
     named: dict[str, NDArray[np.str_]]
     confidence: dict[str, NDArray[np.float64]]
-    unknown: NDArray[np.bool_]
+    unknown: dict[str, NDArray[np.bool_]]
     rules: dict[str, dict[float, StoppingRule | None]]
 
 
@@ -175,7 +177,7 @@ def compare_stopping(
                     continue
                 at = stops(part.confidence[task], rule)
                 every = np.arange(len(part.test))
-                unknown = part.unknown[at, every]
+                unknown = part.unknown[task][at, every]
                 wrong = ~right[:, part.test][at, every] | unknown
                 rows.append(np.stack([wrong, unknown, at < points - 1, seconds[at]]))
             means = np.hstack(rows).mean(axis=1) if rows else np.full(4, np.nan)
@@ -201,22 +203,21 @@ def _held_out(
     widths: Sequence[int] | None,
 ) -> _Fold:
     train = np.setdiff1d(np.arange(X.shape[1]), test)
-    model = SequentialClassifier(choose(train), decision_points_s, features, widths=widths).fit(
-        X[:, train], {task: labels[train] for task, labels in y.items()}
+    chosen = choose(train)
+    model = SequentialClassifier(chosen.choices, decision_points_s, features, widths=widths).fit(
+        X[:, train],
+        {task: labels[train] for task, labels in y.items()},
+        chosen.folds,
+        chosen.without,
     )
-    named, confidence = {}, {}
-    unknown = np.zeros((len(X), len(test)), dtype=bool)
+    named, confidence, unknown = {}, {}, {}
+    new = X[:, test][..., model.columns_]
     with threadpool_limits(1):
         for task in y:
-            named[task], margins, distances = answers(model.decision_points_, task, X[:, test])
+            named[task], margins, distances = answers(model.decision_points_, task, new)
             stopping = model.stopping_[task]
             confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
-            if task == model.novelty_.task:
-                rates = [
-                    [model.novelty_.rate(i, d) for d in row]
-                    for i, row in enumerate(distances.tolist())
-                ]
-                unknown = np.array(rates) <= NOVELTY_RATE
+            unknown[task] = withheld(model.novelty_, task, distances)
     rules = {
         task: {error: stopping.rule(error) for error in ERRORS}
         for task, stopping in model.stopping_.items()

@@ -36,7 +36,7 @@ FEWER = (("max_force",), ("max_force", "contact_area"))
 PAPER = ("none", 1.2)
 """The paper's operating point: no scaling, 1.2 s, its three features, all taxels (IV-A)."""
 FEWEST = 40
-CONTACT = SETS["contact"].features
+CONTACT = SETS["contact"]
 NAMES = expand(["paper", "contact"])
 GRIDS = (SearchGrid("IV", features=FEATURES), SearchGrid("IV", "lda", features=CONTACT))
 """Candidates for every task's decision: the paper's way, and the discriminants of `contact`."""
@@ -200,7 +200,7 @@ def _early(
     found = early.compare_stopping(
         X, y, DECISION_POINTS_S, dataset.names, choose, widths=columns, jobs=jobs
     )
-    choices = choose(np.arange(X.shape[1]))
+    choices = choose(np.arange(X.shape[1])).choices
     most = finest(y)
     return found, choices, early.novelty(X[-1], y[most], choices[most], dataset.names, columns)
 

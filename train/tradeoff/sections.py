@@ -88,7 +88,7 @@ def operating_points(
 
 def _named(features: Sequence[str]) -> str:
     """The name of the set that holds just these features, or their own names."""
-    sets = (name for name, one in SETS.items() if one.features == tuple(features))
+    sets = (name for name, one in SETS.items() if one == tuple(features))
     return next(sets, " ".join(features))
 
 

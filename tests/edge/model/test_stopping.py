@@ -72,7 +72,7 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
     # So many trials with the same share of errors pass the exact binomial test.
     wrong = math.floor(needed * 7 / 140)
     tail = sum(math.comb(needed, k) * 0.08**k * 0.92 ** (needed - k) for k in range(wrong + 1))
-    assert 0.005 < tail <= 0.1
+    assert 0.0025 < tail <= 0.05
 
 
 def test_where_the_full_window_errs_more_often_trials_do_not_help():

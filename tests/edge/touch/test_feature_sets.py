@@ -57,14 +57,14 @@ PEAKS = (100, 300, 200, 400, 400)
 
 
 def test_every_set_has_features_that_exist_and_none_is_in_two_sets():
-    members = [name for one in SETS.values() for name in one.features]
+    members = [name for one in SETS.values() for name in one]
     assert len(members) == len(set(members))
     assert [feature(name).name for name in members] == members
-    assert SETS["paper"].features == paper.FEATURES == FEATURES
-    assert SETS["moments"].features == moments.FEATURES
-    assert SETS["contact"].features == contact.FEATURES
-    assert SETS["sqrt_taxels"].features == taxels.SQRT
-    assert SETS["posture"].features == joints.POSTURE
+    assert SETS["paper"] == paper.FEATURES == FEATURES
+    assert SETS["moments"] == moments.FEATURES
+    assert SETS["contact"] == contact.FEATURES
+    assert SETS["sqrt_taxels"] == taxels.SQRT
+    assert SETS["posture"] == joints.POSTURE
 
 
 def test_sets_and_features_expand_to_features_in_their_order_each_once():
@@ -84,7 +84,7 @@ def test_sets_and_features_expand_to_features_in_their_order_each_once():
 @pytest.mark.parametrize("name", SETS)
 @pytest.mark.parametrize("samples", [2, 10, 40])
 def test_a_vector_has_the_widths_that_are_told(name, samples):
-    wanted = SETS[name].features
+    wanted = SETS[name]
     frames = touch(PEAKS, joints=np.zeros((5, 3)))
     vector = vector_of(frames, *wanted, samples=samples, joints=3)
     told = widths(wanted, samples, SKIN, joints=3)
@@ -240,7 +240,7 @@ def test_another_number_of_angles_is_one_sentence():
 
 
 def test_every_nth_frame_of_a_series_has_all_that_was_measured():
-    wanted = [*SETS["moments"].features, "taxel_force", "joint_angle", "regions", "force_motion"]
+    wanted = [*SETS["moments"], "taxel_force", "joint_angle", "regions", "force_motion"]
     whole = series_of(touch(PEAKS, joints=np.arange(10.0).reshape(5, 2)), wanted, joints=2)
     thin = whole.thinned(2)
     assert thin.integers.tolist() == whole.integers[::2].tolist()

@@ -16,11 +16,18 @@ from edge.touch.layout import SkinLayout
 from export.__main__ import main as export
 from tests import browser
 from train.__main__ import main as train
+from train.evaluate import SearchGrid
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.pipeline import Choice
 from train.study.score import Result
 from train.tradeoff import answer, board, early
-from train.tradeoff.accuracy import MeasuredPoint, nested, pareto_front
+from train.tradeoff.accuracy import (
+    Chooser,
+    MeasuredPoint,
+    NestedChoice,
+    nested,
+    pareto_front,
+)
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
 
@@ -81,6 +88,28 @@ def test_nested_accuracy_of_what_is_plain_is_one():
     found = nested(X, {"t": y}, "IV", ("max_force", "contact_area", "contact_motion"))["t"]
     assert (found.right, found.total) == (60, 60)
     assert (found.components, found.k) == (1, 1)
+
+
+def test_what_is_chosen_without_a_fold_is_chosen_by_the_others_alone():
+    """One feature tells all trials but those of a fold, the other nearly all."""
+    rng = np.random.default_rng(0)
+    labels = rng.choice(["a", "b"], 60)
+    names = ("max_force", "contact_area")
+    grids = tuple(SearchGrid(features=(f,), components=(1,), neighbours=(5,)) for f in names)
+    rows = np.arange(5, 60)
+    X = np.repeat(9.0 * (labels == "a")[:, None], 4, axis=1) + rng.normal(size=(60, 4))
+
+    def chosen():
+        return Chooser(X, {"t": labels}, grids, names)(rows)
+
+    folds = chosen().folds
+    X[rows[folds == 3], :2] = 9.0 - X[rows[folds == 3], :2]
+    X[rows[::25], 2:] = 9.0 - X[rows[::25], 2:]
+    found = chosen()
+    assert found.choices["t"].features == names[1:]
+    assert [one["t"].features == names[:1] for one in found.without] == [
+        fold == 3 for fold in range(10)
+    ]
 
 
 def point(seconds, right, **changes):
@@ -243,7 +272,8 @@ class TestEarly:
         X[1:, :, 0] += 30.0 * (labels == "a")
 
         def choose(rows):
-            return {"task": Choice("none", 3, 3)}
+            choices = {"task": Choice("none", 3, 3)}
+            return NestedChoice(choices, np.arange(len(rows)) % 5, [choices] * 5)
 
         found = early.compare_stopping(
             X, {"task": labels}, (0.2, 0.6, 1.0), ("max_force",), choose
