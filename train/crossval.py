@@ -14,7 +14,6 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
@@ -130,7 +129,6 @@ def neighbours(
     max_k: int = MAX_K,
     features: Sequence[str] = FEATURES,
     jobs: int = 1,
-    progress: bool = False,
 ) -> NDArray[np.int64]:
     """Each trial's neighbours among the others: (n, components, k) rows, nearest first.
 
@@ -150,9 +148,7 @@ def neighbours(
     work = (
         delayed(_chunk)(X, tests, scaling, max_components, k, tuple(features)) for tests in chunks
     )
-    parts = Parallel(n_jobs=jobs, return_as="generator")(work)
-    bar = tqdm(parts, total=len(chunks), desc=f"scaling {scaling}", disable=not progress)
-    return np.concatenate(list(bar))
+    return np.concatenate(Parallel(n_jobs=jobs)(work))
 
 
 def _chunk(

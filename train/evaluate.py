@@ -29,6 +29,8 @@ from train.pipeline import Choice, columns_of
 from train.projection import Spectrum, gains_of, widths_of
 
 FOLDS = 10
+SEED = 2012
+"""Of the folds: the same for the same labels."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
@@ -108,21 +110,19 @@ class SearchGrid:
         ]
 
 
-def stratified_folds(
-    y: NDArray[np.str_], count: int = FOLDS, seed: int = 2012
-) -> NDArray[np.int64]:
+def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int64]:
     """(n,) folds in which each class is spread evenly; the same for the same labels."""
-    order = np.random.default_rng(seed).permutation(len(y))
+    order = np.random.default_rng(SEED).permutation(len(y))
     order = order[np.argsort(y[order], kind="stable")]
     folds = np.empty(len(y), dtype=np.int64)
     folds[order] = np.arange(len(y)) % min(count, len(y))
     return folds
 
 
-def group_folds(groups: NDArray[np.str_], count: int = 20, seed: int = 2012) -> NDArray[np.int64]:
+def group_folds(groups: NDArray[np.str_], count: int = 20) -> NDArray[np.int64]:
     """(n,) folds that keep groups whole: a group each, or several where there are over `count`."""
     names, members = np.unique(groups, return_inverse=True)
-    order = np.random.default_rng(seed).permutation(len(names))
+    order = np.random.default_rng(SEED).permutation(len(names))
     return np.asarray((order % count)[members], dtype=np.int64)
 
 

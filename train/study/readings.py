@@ -61,16 +61,14 @@ BY_MEAN = PaperReading(
 READINGS = (EACH_TRIAL, BY_MEAN)
 
 
-def scaled_by_trial(
-    X: NDArray[np.float64], method: str, types: int = len(FEATURES)
-) -> NDArray[np.float64]:
+def scaled_by_trial(X: NDArray[np.float64], method: str) -> NDArray[np.float64]:
     """Eqs. 1 to 4 with mean, maximum and deviation of each feature of each trial.
 
     Args:
-        X: (n, p) feature vectors, p / types columns each feature.
+        X: (n, p) feature vectors of the paper's features.
         method: none or I to IV; V is one number a feature and is as it was.
     """
-    f = X.reshape(len(X), types, -1)
+    f = X.reshape(len(X), len(FEATURES), -1)
     mean, most = f.mean(axis=2, keepdims=True), np.abs(f).max(axis=2, keepdims=True)
     deviation = f.std(axis=2, keepdims=True)
     one = {

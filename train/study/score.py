@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from edge.touch.features import FEATURES
-from train.crossval import (
-    MAX_COMPONENTS,
-    MAX_K,
-    accuracies,
-    neighbours,
-    split_neighbours,
-)
+from train.crossval import MAX_COMPONENTS, MAX_K, accuracies, neighbours, split_neighbours
 from train.evaluate import Labels, Result
 from train.pipeline import vote
 
@@ -35,16 +28,9 @@ def said_by(
     return np.asarray(classes[winners])
 
 
-def grid_search(
-    X: NDArray[np.float64],
-    y: Labels,
-    scaling: str = "none",
-    features: Sequence[str] = FEATURES,
-) -> dict[str, Result]:
+def grid_search(X: NDArray[np.float64], y: Labels) -> dict[str, Result]:
     """Each task's best leave-one-out accuracy over 1 to 20 components and k (section IV-A)."""
-    rows = neighbours(
-        X, scaling=scaling, features=features, max_components=min(MAX_COMPONENTS, len(X) - 1)
-    )
+    rows = neighbours(X, max_components=min(MAX_COMPONENTS, len(X) - 1))
     found: dict[str, Result] = {}
     for task, labels in y.items():
         c, j = best_cell(accuracies(rows, labels))
@@ -58,8 +44,6 @@ def transfer(
     y: Labels,
     chosen: Mapping[str, Result],
     changed: NDArray[np.float64],
-    scaling: str = "none",
-    features: Sequence[str] = FEATURES,
 ) -> dict[str, Result]:
     """Trained on trials as they are, tested on the same trials under some change.
 
@@ -71,8 +55,6 @@ def transfer(
         y: labels of both.
         chosen: components and k of each task, as `grid_search` chose them on X.
         changed: (n, p) the same trials, changed.
-        scaling: fitted on the training trials.
-        features: of X.
     """
     n = len(X)
     both = np.concatenate([X, changed])
@@ -81,13 +63,7 @@ def transfer(
         rows = np.concatenate(
             [
                 split_neighbours(
-                    both,
-                    np.delete(np.arange(n), i),
-                    np.array([n + i]),
-                    scaling,
-                    MAX_COMPONENTS,
-                    k,
-                    features,
+                    both, np.delete(np.arange(n), i), np.array([n + i]), "none", MAX_COMPONENTS, k
                 )
                 for i in range(n)
             ]
@@ -98,68 +74,6 @@ def transfer(
         right = int((said == y[task]).sum())
         found[task] = Result(right, n, best.components, best.k, said)
     return found
-
-
-def nested_fold(
-    X: NDArray[np.float64],
-    y: Labels,
-    test: NDArray[np.int64],
-    scaling: str,
-    features: Sequence[str],
-) -> dict[str, tuple[NDArray[np.str_], tuple[int, int]]]:
-    """What is said of the trials `test` with the cell that is best among the others.
-
-    Args:
-        X: (n, p).
-        y: labels.
-        test: rows left out.
-        scaling: fitted inside.
-        features: of X.
-
-    Returns:
-        {task: ((t,) labels, (components - 1, k - 1))}.
-    """
-    train = np.setdiff1d(np.arange(len(X)), test)
-    inner_X = X[train]
-    with threadpool_limits(1):
-        inner = neighbours(inner_X, scaling=scaling, features=features)
-        outer = split_neighbours(X, train, test, scaling, MAX_COMPONENTS, inner.shape[2], features)
-    found: dict[str, tuple[NDArray[np.str_], tuple[int, int]]] = {}
-    for task, labels in y.items():
-        c, j = best_cell(accuracies(inner, labels[train]))
-        found[task] = said_by(outer, labels, c + 1, j + 1), (c, j)
-    return found
-
-
-def collect(
-    y: Labels,
-    folds: Sequence[NDArray[np.int64]],
-    answers: Sequence[Mapping[str, tuple[NDArray[np.str_], tuple[int, int]]]],
-) -> dict[str, Result]:
-    """The results of `nested_fold` for folds that cover all trials."""
-    found: dict[str, Result] = {}
-    for task, labels in y.items():
-        said = np.empty_like(labels)
-        for test, answer in zip(folds, answers, strict=True):
-            said[test] = answer[task][0]
-        found[task] = _most_often(said, labels, [answer[task][1] for answer in answers])
-    return found
-
-
-def _most_often(
-    said: NDArray[np.str_], labels: NDArray[np.str_], cells: Sequence[tuple[int, int]]
-) -> Result:
-    unique, counts = np.unique(np.array(cells), axis=0, return_counts=True)
-    c, j = unique[int(np.argmax(counts))].tolist()
-    return Result(int((said == labels).sum()), len(labels), c + 1, j + 1, said)
-
-
-def shuffled_folds(y: NDArray[np.str_], count: int, seed: int = 2012) -> list[NDArray[np.int64]]:
-    """Folds in which each class is spread evenly; the same for the same labels."""
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(len(y))
-    order = order[np.argsort(y[order], kind="stable")]
-    return [np.sort(order[i::count]) for i in range(count)]
 
 
 def majority(y: NDArray[np.str_]) -> Result:

@@ -13,9 +13,9 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.crossval import MAX_K, accuracies, neighbours
 from train.dataset import DataSet
-from train.evaluate import Result
+from train.evaluate import Result, stratified_folds
 from train.report.tables import Section, Table
-from train.study.score import best_cell, shuffled_folds
+from train.study.score import best_cell
 
 SCALING = "IV"
 PARTS = 5
@@ -107,9 +107,9 @@ def section(prices: Prices, dataset: DataSet, task: str) -> Section:
         f"More training trials, {task}: leave-one-out among so many, best cell",
         ("trials", "accuracy %", "from %", "to %", "components", "k"),
     )
-    folds = shuffled_folds(y, PARTS)
+    folds = stratified_folds(y, PARTS)
     for count in range(1, PARTS + 1):
-        some = np.sort(np.concatenate(folds[:count]))
+        some = np.flatnonzero(folds < count)
         if len(set(y[some])) < 2 or len(some) < 4:
             continue
         result = _best(X[some], y[some])

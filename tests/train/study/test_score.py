@@ -1,18 +1,10 @@
-"""Scores of the study: nested against doing it the long way, groups, transfers, baselines."""
+"""Scores of the study: the best cell, transfers, baselines."""
 
 import numpy as np
 import pytest
 
 from train.crossval import leave_one_out
-from train.study.score import (
-    Result,
-    collect,
-    grid_search,
-    majority,
-    nested_fold,
-    shuffled_folds,
-    transfer,
-)
+from train.study.score import Result, grid_search, majority, transfer
 
 ONE = ("max_force",)
 
@@ -28,7 +20,7 @@ def overlapping(n=26, seed=0, spread=1.0):
 
 def test_the_best_cell_is_reported_with_what_it_said():
     X, y = overlapping()
-    found = grid_search(X, {"t": y}, "none", ONE)["t"]
+    found = grid_search(X, {"t": y})["t"]
     table = leave_one_out(X, y, features=ONE)
     assert found.accuracy == table.max() == table[found.components - 1, found.k - 1]
     assert found.right == int((found.said == y).sum())
@@ -36,46 +28,23 @@ def test_the_best_cell_is_reported_with_what_it_said():
     assert low < found.accuracy < high
 
 
-def test_a_nested_search_does_not_see_the_trial_it_tells():
-    """With labels that say nothing, the best cell flatters and the nested score does not."""
-    rng = np.random.default_rng(3)
-    flattered, honest = [], []
-    for seed in range(3):
-        X = np.random.default_rng(seed).normal(size=(24, 8))
-        y = rng.permutation(np.repeat(["a", "b"], 12))
-        folds = shuffled_folds(y, 10)
-        flattered.append(grid_search(X, {"t": y}, "none", ONE)["t"].accuracy)
-        answers = [nested_fold(X, {"t": y}, fold, "none", ONE) for fold in folds]
-        honest.append(collect({"t": y}, folds, answers)["t"].accuracy)
-    assert np.mean(flattered) > 0.6
-    assert np.mean(honest) < 0.55
-
-
-def test_folds_cover_every_trial_once_and_spread_the_classes():
-    y = np.repeat(["a", "b", "c"], [40, 20, 10])
-    folds = shuffled_folds(y, 10)
-    assert np.sort(np.concatenate(folds)).tolist() == list(range(70))
-    assert [sorted(y[fold]).count("a") for fold in folds] == [4] * 10
-    assert all((a == b).all() for a, b in zip(folds, shuffled_folds(y, 10), strict=True))
-
-
 def test_a_changed_trial_is_never_told_by_its_own_twin():
     """Trials that tell nothing of each other are told by chance, though their twins know."""
     rng = np.random.default_rng(4)
-    X = rng.normal(size=(40, 8))
+    X = rng.normal(size=(40, 9))
     y = {"t": rng.permutation(np.repeat(["a", "b"], 20))}
-    found = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X + 1e-6, "none", ONE)["t"]
-    same = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X, "none", ONE)["t"]
+    found = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X + 1e-6)["t"]
+    same = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X)["t"]
     assert found.accuracy < 0.75
     assert same.accuracy == leave_one_out(X, y["t"], features=ONE)[7, 0]
 
 
 def test_a_change_that_moves_trials_among_others_costs():
     X, y = overlapping(30, spread=0.2)
-    best = grid_search(X, {"t": y}, "none", ONE)
-    assert transfer(X, {"t": y}, best, X + 0.01, "none", ONE)["t"].accuracy > 0.8
+    best = grid_search(X, {"t": y})
+    assert transfer(X, {"t": y}, best, X + 0.01)["t"].accuracy > 0.8
     others = X[np.roll(np.arange(30), 1)]
-    assert transfer(X, {"t": y}, best, others, "none", ONE)["t"].accuracy < 0.3
+    assert transfer(X, {"t": y}, best, others)["t"].accuracy < 0.3
 
 
 def test_the_majority():
