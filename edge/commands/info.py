@@ -8,11 +8,11 @@ import os
 import shutil
 import statistics
 import textwrap
-import time
 from typing import Any
 
 import numpy as np
 
+from edge.commands.bench import timed
 from edge.commands.output import Output
 from edge.model.info import ModelInfo
 from edge.model.model import Model
@@ -37,12 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def decision_us(model: Model) -> float:
     """Median microseconds of a decision on this machine."""
     vector = np.zeros(model.info.width)
-    times = []
-    for _ in range(ROUNDS):
-        began = time.perf_counter_ns()
-        model.decide(vector)
-        times.append((time.perf_counter_ns() - began) / 1e3)
-    return statistics.median(times)
+    return statistics.median(timed(lambda _: model.decide(vector), range(ROUNDS)))
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -152,21 +152,22 @@ class FakeMPR121:
         return out
 
 
+BLOCK_RATE_HZ = 100.0
+"""How often a microcontroller samples; its sequence number counts that."""
+
+
 class FakeBlock:
     """A model of a microcontroller that serves frames (`edge.i2c.block`)."""
 
-    def __init__(
-        self, sense: Sense, *, taxels: int, bits: int = 16, rate_hz: float = 100.0
-    ) -> None:
+    def __init__(self, sense: Sense, *, taxels: int, bits: int = 16) -> None:
         """Model one.
 
         Args:
             sense: raw values at a time.
             taxels: how many it serves.
             bits: of one taxel.
-            rate_hz: how often it samples; its sequence number counts that.
         """
-        self._sense, self._taxels, self._bits, self._rate = sense, taxels, bits, rate_hz
+        self._sense, self._taxels, self._bits = sense, taxels, bits
         self.reset()
 
     def reset(self) -> None:
@@ -186,7 +187,7 @@ class FakeBlock:
         if self._pointer == block.IDENTITY[0]:
             out = block.sealed(block.MAGIC + bytes([self._bits]) + self._taxels.to_bytes(2, "big"))
         elif self._pointer == block.FRAME[0]:
-            sample = int((t + TIME_ROUNDING_S) * self._rate)
+            sample = int((t + TIME_ROUNDING_S) * BLOCK_RATE_HZ)
             values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
             out = block.sealed(
                 (sample & 0xFFFF).to_bytes(2, "big") + block.pack(values, self._bits)

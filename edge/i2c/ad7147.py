@@ -80,7 +80,7 @@ class AD7147:
     """One AD7147-1.
 
     >>> chip = AD7147(bus, 0x2C)                                 # doctest: +SKIP
-    >>> start(chip); bus.transfer(chip.frame)                    # doctest: +SKIP
+    >>> list(chip.settings()); bus.transfer(chip.frame)          # doctest: +SKIP
     >>> chip.parse(chip.frame.buffer[None])                      # doctest: +SKIP
     """
 

@@ -15,7 +15,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fcntl import ioctl
-from typing import Any, NoReturn, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -316,15 +316,12 @@ class LinuxBus:
         try:
             done = ioctl(self._fd, I2C_RDWR, prepared.handle)
         except (OSError, ValueError) as error:
-            self._fail(error, prepared)
+            # A closed bus has the file descriptor -1, which ioctl answers with ValueError.
+            code = error.errno if isinstance(error, OSError) else errno.ENODEV
+            raise bus_error(code, self.name, prepared.messages[0].address) from None
         if done != len(prepared.messages):
             # The kernel stopped half way without an error: the buffer holds an older reading.
             raise bus_error(errno.EIO, self.name, prepared.messages[0].address)
-
-    def _fail(self, error: OSError | ValueError, prepared: Transfer) -> NoReturn:
-        # A closed bus has the file descriptor -1, which ioctl answers with ValueError.
-        code = error.errno if isinstance(error, OSError) else errno.ENODEV
-        raise bus_error(code, self.name, prepared.messages[0].address) from None
 
     def close(self) -> None:
         """Let it go; twice is fine."""

@@ -65,13 +65,3 @@ def wrong_chip(bus: Bus, address: int, what: str) -> WrongChip:
     error = WrongChip(f"{bus.name}, address {address:#04x}: {what}")
     error.bus, error.address = bus.name, address
     return error
-
-
-def start(chip: Chip) -> None:
-    """Write all settings at once.
-
-    Raises:
-        BusError: a transaction failed, or what was read back differs.
-    """
-    for _ in chip.settings():
-        pass

@@ -58,7 +58,7 @@ class MPR121:
     """One MPR121.
 
     >>> chip = MPR121(bus, 0x5A)                                 # doctest: +SKIP
-    >>> start(chip); bus.transfer(chip.frame)                    # doctest: +SKIP
+    >>> list(chip.settings()); bus.transfer(chip.frame)          # doctest: +SKIP
     """
 
     kind: ClassVar[str] = "mpr121"

@@ -94,8 +94,6 @@ class Joints:
         """Lines that were no pose."""
         self.problem = ""
         """What was wrong with the last of them."""
-        self.missing = 0
-        """Times that `at` had no pose to give."""
 
     def at(self, t: float) -> NDArray[np.float64] | None:
         """Angles (dof,) at a time of the loop's clock, or None where they are not known.
@@ -105,7 +103,6 @@ class Joints:
         """
         self._take()
         if not self._poses:
-            self.missing += 1
             return None
         offset = 0.0 if self._shared else min(self._delay)
         theirs = t - offset
@@ -123,7 +120,6 @@ class Joints:
                     return pose[1]
                 break
             after = pose
-        self.missing += 1
         return None
 
     def _take(self) -> None:

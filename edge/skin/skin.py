@@ -7,6 +7,7 @@ import os
 import queue
 import threading
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
@@ -163,20 +164,15 @@ class Skin:
                 f"{file.path}: has no calibration; run "
                 f"`edge-classify calibrate --skin {file.path}` with nothing touching"
             )
-        buses: list[Bus] = []
-        try:
+        with ExitStack() as opened:
+            buses: list[Bus] = []
             for spec in file.buses:
                 buses.append(_open(spec, file.reading.timeout_s))
-        except EdgeError:
-            for bus in buses:
-                bus.close()
-            raise
-        skin = cls(file, buses, touch_counts=touch_counts)
-        try:
+                opened.callback(buses[-1].close)
+            skin = cls(file, buses, touch_counts=touch_counts)
+            opened.callback(skin.close)
             skin.start()
-        except BaseException:
-            skin.close()
-            raise
+            opened.pop_all()
         return skin
 
     def _wire(self, groups: Buffers) -> None:

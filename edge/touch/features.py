@@ -183,7 +183,10 @@ class _Course:
         else:
             for feature, row in zip(group, values, strict=True):
                 if np.isinf(row).any():
-                    raise _too_large(feature)
+                    raise InputError(
+                        f"{feature.name} is too large for a number of 64 bits; look at the skin's "
+                        "counts_per_newton and pitch_m"
+                    )
             sampled = np.zeros((len(group), samples))
             sampled[whole] = _resample(times, series.t, values[whole])
             for i in np.flatnonzero(~whole & known.any(axis=1)):
@@ -252,13 +255,6 @@ class _Course:
         if values is None:
             raise _not_measured(feature)
         return np.asarray(values, dtype=np.float64)
-
-
-def _too_large(feature: Feature) -> InputError:
-    return InputError(
-        f"{feature.name} is too large for a number of 64 bits; look at the skin's "
-        "counts_per_newton and pitch_m"
-    )
 
 
 def _not_measured(feature: Feature) -> InputError:

@@ -7,7 +7,6 @@ from edge.fake.chips import FakeAD7147
 from edge.i2c import ad7147
 from edge.i2c.ad7147 import AD7147
 from edge.i2c.bus import wire_bits
-from edge.i2c.chip import start
 from tests.edge.i2c.chips import parsed, sense
 
 
@@ -55,6 +54,6 @@ def test_model_converts_in_its_own_time():
     model = FakeAD7147(lambda t: np.full(12, round(t * 1e6), dtype=np.uint16), refresh_s=0.009216)
     bus = FakeBus(chips={0x2C: model})
     chip = AD7147(bus, 0x2C)
-    start(chip)
+    list(chip.settings())
     bus.sleep(0.020)
     assert parsed(chip)[0].tolist() == [18432] * 12

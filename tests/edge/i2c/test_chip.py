@@ -9,7 +9,7 @@ from edge.i2c import ad7147, mpr121
 from edge.i2c.ad7147 import AD7147
 from edge.i2c.block import Block
 from edge.i2c.bus import BusNack
-from edge.i2c.chip import WrongChip, start
+from edge.i2c.chip import WrongChip
 from edge.i2c.mpr121 import MPR121
 from tests.edge.i2c.chips import CHIPS, VALUES, parsed, sense
 
@@ -23,7 +23,7 @@ def pair(request):
 
 def test_a_chip_serves_its_values_once_it_is_set_up(pair):
     _, _, chip = pair
-    start(chip)
+    list(chip.settings())
     values, whole = parsed(chip)
     np.testing.assert_array_equal(values, VALUES)
     assert whole.all()
@@ -32,7 +32,7 @@ def test_a_chip_serves_its_values_once_it_is_set_up(pair):
 
 def test_a_chip_that_lost_its_settings_is_found_out_and_set_up_again(pair):
     _, model, chip = pair
-    start(chip)
+    list(chip.settings())
     model.reset()
     if chip.kind == "block":
         return  # it comes up by itself
@@ -40,7 +40,7 @@ def test_a_chip_that_lost_its_settings_is_found_out_and_set_up_again(pair):
     values, whole = parsed(chip)
     assert (values == 0).all()
     assert not whole.any()
-    start(chip)
+    list(chip.settings())
     assert chip.healthy()
     np.testing.assert_array_equal(parsed(chip)[0], VALUES)
 
@@ -86,4 +86,4 @@ def test_every_register_that_does_not_keep_its_value_is_found_by_reading_back(na
         model.write = forgetful
         chip = driver(FakeBus(chips={address: model}), address)
         with pytest.raises(WrongChip, match=f"register {register:#04x}"):
-            start(chip)
+            list(chip.settings())

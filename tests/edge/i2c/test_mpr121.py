@@ -6,7 +6,6 @@ from edge.fake.bus import FakeBus
 from edge.fake.chips import FakeMPR121
 from edge.i2c import mpr121
 from edge.i2c.bus import fetch, send, wire_bits
-from edge.i2c.chip import start
 from edge.i2c.mpr121 import MPR121
 from tests.edge.i2c.chips import sense
 
@@ -17,7 +16,7 @@ def test_is_stopped_written_and_started_once():
     chip = MPR121(bus, 0x5A)
     model_write = bus.chips[0x5A].write
     bus.chips[0x5A].write = lambda data, t: (sent.append(data), model_write(data, t))
-    start(chip)
+    list(chip.settings())
     ecr = [d for d in sent if len(d) == 2 and d[0] == mpr121.ECR]
     assert ecr == [b"\x5e\x00", b"\x5e\x8f"]
     assert sent[0] == b"\x80\x63"
@@ -25,7 +24,7 @@ def test_is_stopped_written_and_started_once():
 
 def test_model_loses_writes_while_it_runs():
     bus = FakeBus(chips={0x5A: FakeMPR121(sense)})
-    start(MPR121(bus, 0x5A))
+    list(MPR121(bus, 0x5A).settings())
     send(bus, 0x5A, [mpr121.CONFIG2, 0x77])
     assert fetch(bus, 0x5A, bytes([mpr121.CONFIG2]), 1) == b"\x20"
 

@@ -10,7 +10,6 @@ from edge.fake.chips import FakeAD7147, FakeTCA9548A
 from edge.fake.faults import Fault
 from edge.i2c.ad7147 import AD7147
 from edge.i2c.bus import BusFault
-from edge.i2c.chip import start
 from edge.i2c.tca9548a import TCA9548A
 from tests.edge.i2c.chips import parsed
 
@@ -28,7 +27,7 @@ def test_each_channel_is_a_bus_with_its_own_chip():
     _, mux = muxed()
     chips = [AD7147(mux.channel(n), 0x2C) for n in range(8)]
     for chip in chips:
-        start(chip)
+        list(chip.settings())
     for n in (3, 3, 0, 7):
         assert parsed(chips[n])[0].tolist() == [1000 + n] * 12
 
@@ -38,7 +37,7 @@ def test_two_muxes_on_one_bus_are_never_open_at_once():
     second = TCA9548A(bus, 0x71, beside=(first,))
     chips = [AD7147(mux.channel(2), 0x2C) for mux in (first, second)]
     for chip in chips:
-        start(chip)
+        list(chip.settings())
     for i in (0, 1, 0, 1):
         assert parsed(chips[i])[0].tolist() == [1000 * (i + 1) + 2] * 12
         assert [m.connected for m in bus.chips.values()].count([2]) == 1
