@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TextIO
 
 from edge.classifier import Classifier
 from edge.commands import terminal
@@ -18,7 +19,7 @@ from edge.commands.source import check_joints, open_joints, open_skin
 from edge.errors import InputError, printable
 from edge.events import Decided, Onset
 from edge.model.model import Model
-from edge.skin.loop import Loop, Stop, stop_on
+from edge.skin.loop import STOP_S, Loop, Stop, stop_on
 from edge.skin.skin import Skin
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -87,7 +88,29 @@ def quit_on_q(stop: Stop) -> Iterator[Callable[[], None]]:
         tty.setcbreak(fd)
         yield look
     finally:
-        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+        termios.tcsetattr(fd, termios.TCSANOW, before)  # a terminal that is stopped drains nothing
+
+
+def sender(out: TextIO, stop: Stop) -> Callable[[str], None]:
+    """Writes a text to the terminal, or gives it up once `stop` is asked for and nobody reads.
+
+    A write that waits for a reader would not hear of it.
+    """
+    try:
+        out.flush()
+        fd = out.fileno()
+    except (OSError, ValueError):  # no file behind it
+        return lambda text: print(text, end="", file=out, flush=True)
+
+    def send(text: str) -> None:
+        data = text.encode(out.encoding, out.errors or "strict")
+        while data:
+            if select.select([], [fd], [], 0.0 if stop.asked else STOP_S)[1]:
+                data = data[os.write(fd, data[: select.PIPE_BUF]) :]
+            elif stop.asked:
+                return
+
+    return send
 
 
 def spoken(event: Decided) -> str:
@@ -116,7 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
                 lasts_s=opened.lasts_s,
                 stop=stop,
             )
-            _show(arguments, opened.skin, model, loop, look)
+            _show(arguments, opened.skin, model, loop, look, sender(sys.stdout, stop))
     return 0
 
 
@@ -126,14 +149,14 @@ def _show(
     model: Model | None,
     loop: Loop,
     look: Callable[[], None],
+    send: Callable[[str], None],
 ) -> None:
     classifier = None if model is None else Classifier(model, skin.layout)
     layout = skin.layout if classifier is None else classifier.layout
     tasks = () if model is None else tuple(model.info.tasks)
     decisions = dict.fromkeys(tasks, "no contact yet")
     due, before = -float("inf"), ""
-    out = sys.stdout
-    out.write(terminal.HIDE + terminal.CLEAR)
+    send(terminal.HIDE + terminal.CLEAR)
     try:
         for frame in loop.frames():
             look()
@@ -147,9 +170,7 @@ def _show(
             due = frame.t + 1.0 / arguments.rate - 0.5 * skin.period_s
             text = terminal.screen(draw(frame, layout, decisions))
             if text != before:
-                out.write(text)
-                out.flush()
+                send(text)
                 before = text
     finally:
-        out.write(terminal.PLAIN + terminal.SHOW)
-        out.flush()
+        send(terminal.PLAIN + terminal.SHOW)

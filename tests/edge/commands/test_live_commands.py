@@ -21,6 +21,7 @@ from edge.commands import record, run, view
 from edge.commands.record import Trials
 from edge.recording import Recording
 from edge.skin import file as skinfile
+from edge.skin.loop import Stop
 
 ROOT = Path(__file__).parents[3]
 
@@ -441,6 +442,19 @@ def test_two_contacts_are_two_trials(edge, make_touch, tmp_path):
                   tmp_path / "t")[1]  # fmt: skip
     # 20 frames of lead-in, 50 of contact, 30 that show its end.
     assert [(e["frames"], e["complete"]) for e in events] == [(100, True)] * 2
+
+
+def test_view_gives_a_picture_up_where_nobody_reads_once_it_is_told_to_end():
+    reading, writing = os.pipe()
+    with open(reading, "rb") as reader, open(writing, "w") as out:
+        stop = Stop()
+        send = view.sender(out, stop)
+        send("▀" * 10)
+        assert reader.read(30).decode() == "▀" * 10
+        stop.asked = True
+        send("a" * 10**6)
+        out.close()
+        assert 0 < len(reader.read()) < 10**6
 
 
 def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):

@@ -16,7 +16,9 @@ from edge.fake.player import Playback, fake_skin
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
+from edge.skin.bus_reader import STEPS_PER_FRAME
 from edge.skin.loop import Loop
+from edge.skin.slot import ChipState
 
 ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
 UNKNOWABLE = [name for name in ROWS if name.endswith("*")]
@@ -63,6 +65,17 @@ def test_a_bus_on_which_nothing_answers_rests_longer_each_time():
             reader._give_up(read_any=False)
             pauses.append(reader._resting_until - reader.bus.now())
     assert pauses == pytest.approx([0.05, 0.2, 0.8, 1.0])
+
+
+def test_a_frame_takes_so_many_steps_at_most_to_bring_chips_back():
+    file = skins()["cody"]
+    taken = []
+    with fake_skin(file, Pattern(file)) as skin:
+        reader = skin.readers[0]
+        reader.slots[0].state = ChipState.DOWN
+        reader._step = lambda slot: taken.append(slot) or True
+        reader._revive(math.inf)
+    assert taken == [reader.slots[0]] * STEPS_PER_FRAME
 
 
 SKINS = skins()

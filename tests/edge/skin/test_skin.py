@@ -12,6 +12,7 @@ from edge.fake.player import calibrated, fake_skin, frame_bits, still
 from edge.skin import file as skinfile
 from edge.skin.buffers import SEQUENCE_FRAMES
 from edge.skin.file import Reading
+from edge.skin.loop import Loop
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 
@@ -240,6 +241,16 @@ def test_the_baseline_follows_drift_until_something_touches():
     # Frozen: what drifts meanwhile adds to the contact, and nothing of the contact is lost.
     assert held[0] in range(2999, 3005)
     assert held[-1] - held[0] in range(28, 32)
+
+
+@pytest.mark.parametrize("above", [0, 1])
+def test_what_is_above_the_threshold_touches_and_is_not_followed(above):
+    level = np.full((16, 24), CODY.layout.threshold_counts + above, dtype=np.uint16)
+    with fake_skin(CODY, lambda t: level) as skin:
+        assert skin.touch_counts == CODY.layout.threshold_counts
+        frames = list(Loop(skin, lasts_s=3.0).frames())
+    lost = int(frames[0].counts.max()) - int(frames[-1].counts.max())
+    assert (lost == 0) == (above == 1)
 
 
 def test_drift_is_not_followed_beyond_its_limit():

@@ -77,6 +77,11 @@ def test_a_microcontroller_may_stand_on_a_serial_port():
     assert (bus.chips[0].kind, bus.chips[0].address) == ("block", 0)
 
 
+def test_a_microcontroller_may_serve_a_single_taxel():
+    (bus,) = skinfile.parse(SERIAL.replace("[2, 3] }", "[1, 1] }")).buses
+    assert bus.chips[0].taxels == (0,)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
