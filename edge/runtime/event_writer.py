@@ -11,7 +11,6 @@ import queue
 import socket
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import Any, TextIO
@@ -21,8 +20,10 @@ from edge.events import json_line
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
-CLOSE_S, STUCK_S = 1.0, 0.03
-"""How long the lines that still wait at the end are given to leave, and how long one of them."""
+STEP_S, CLOSE_STEPS, STUCK_STEPS = 0.01, 100, 3
+"""The lines that still wait at the end are given so many steps to leave, and each of them so many.
+Steps, not seconds: while the machine is busy or the program is paused, nothing is written either.
+"""
 PATIENCE_S = 0.05
 """How often someone who waits for a reader asks whether to go on waiting."""
 UNREAD = "nobody reads them"
@@ -58,7 +59,8 @@ class LineWriter:
         self._write = write
         self._lines: queue.Queue[bytes | None] = queue.Queue(MOST_LINES)
         self._closed = False
-        self._done = 0
+        self._taken, self._done = 0, 0
+        """Lines that came to wait, and of them those that were written or lost since."""
         self._thread = threading.Thread(target=self._work, name=f"lines to {name}", daemon=True)
         self._thread.start()
 
@@ -67,7 +69,9 @@ class LineWriter:
         data = line.encode(errors="backslashreplace") + b"\n"
         while not (self.gone or self._closed):
             try:
-                return self._lines.put(data, timeout=PATIENCE_S if patient() else 0.0)
+                self._lines.put(data, timeout=PATIENCE_S if patient() else 0.0)
+                self._taken += 1
+                return
             except queue.Full:
                 if not patient():
                     self.problem = self.problem or UNREAD
@@ -88,23 +92,24 @@ class LineWriter:
             self._done += 1
 
     def close(self, patient: Patience = impatient) -> None:
-        """Write what waits, as long as lines leave and for a second at most, or as long as
+        """Write what waits, as long as lines leave and for about a second at most, or as long as
         `patient`; twice is fine."""
         if self._closed:
             return
         self._closed = True
-        now = time.monotonic()
-        ends, moved, done = now + CLOSE_S, now, self._done
-        while self._thread.is_alive() and (patient() or now < min(ends, moved + STUCK_S)):
+        steps, stuck, done = 0, 0, self._done
+        while self._thread.is_alive() and (
+            patient() or (steps < CLOSE_STEPS and stuck < STUCK_STEPS)
+        ):
             with suppress(queue.Full):
                 self._lines.put_nowait(None)  # one is enough, but the queue may have been full
-            self._thread.join(STUCK_S / 3)
-            now = time.monotonic()
-            if self._done > done:
-                moved, done = now, self._done
+            self._thread.join(STEP_S)
+            steps += 1
+            stuck = stuck + 1 if self._done == done else 0
+            done = self._done
         if self._thread.is_alive():
             self.gone = True
-            self.lost += self._lines.qsize()
+            self.lost += self._taken - self._done
             self.problem = self.problem or UNREAD
 
 

@@ -33,11 +33,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "NEVER",
     ): "long ago is long ago",
     (
-        "edge/runtime/event_writer.py",
-        "0.03  ->  1.03",
-        "STUCK_S",
-    ): "a limit on waiting at the end for a reader that is stuck: no line is gained or lost",
-    (
         "edge/commands/fake.py",
         "5.0  ->  6.0",
         "STILL_S",

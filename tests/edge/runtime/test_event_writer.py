@@ -6,6 +6,7 @@ import os
 import socket
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -65,7 +66,6 @@ def test_a_host_that_is_none_is_one_sentence(address):
 
 def test_a_reader_that_reads_nothing_costs_lines_and_no_time(monkeypatch):
     monkeypatch.setattr(event_writer, "MOST_LINES", 100)
-    monkeypatch.setattr(event_writer, "CLOSE_S", 0.1)
     reading, writing = os.pipe()
     with os.fdopen(writing, "w") as out:
         lines = Lines(out)
@@ -79,6 +79,21 @@ def test_a_reader_that_reads_nothing_costs_lines_and_no_time(monkeypatch):
     assert lost >= 20_000 - len(arrived) - 1
     numbers = [json.loads(line)["n"] for line in arrived[:-1]]
     assert numbers == sorted(set(numbers))
+
+
+def test_each_line_that_nobody_reads_is_counted_once():
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writing, b"x")
+    os.set_blocking(writing, True)
+    with os.fdopen(writing, "w") as out:
+        lines = Lines(out)
+        lines.write([{"n": n} for n in range(5)])
+        lines.close()
+        assert lines.lost == {"stdout": 5}
+        os.close(reading)
 
 
 def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
