@@ -11,6 +11,7 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.model.info import Task
 from edge.model.model import Model
+from edge.model.verify import verify
 from edge.recording import save
 from edge.touch.features import FEATURES
 from export.__main__ import main as export
@@ -54,6 +55,14 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
             expected = np.sort(own, axis=1)[:, :count].mean(axis=1)
             given = model.run(queries, point)["t_label_distances"][:, label]
             assert given == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early):
+    model, folder = early
+    checks = {check.name: check for check in verify(model, folder / "out" / "golden.npz")}
+    assert all(check.passed for check in checks.values())
+    named = {name for name in checks if "decision_point" in name}
+    assert {f"{task}_decision_point_label" for task in model.info.tasks} <= named
 
 
 def test_the_board_stops_where_the_rule_does(early, make_touch):

@@ -69,6 +69,16 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "zip(*branches, strict=True)",
     ): "branches of unequal lengths give fewer shapes than outputs, which is refused further on",
     (
+        "edge/touch/grid.py",
+        "within & self._columns[0]  ->  within | self._columns[0]",
+        "seam = bool",
+    ): "a step across the seam that nothing can take saves work, no more",
+    (
+        "edge/touch/grid.py",
+        "(size + 7) // 8  ->  (size + 7) * 8",
+        "to_bytes",
+    ): "more zeros behind the bits that are taken",
+    (
         "edge/commands/terminal.py",
         "124  ->  125",
         "TOUCH",

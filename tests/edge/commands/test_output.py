@@ -35,6 +35,13 @@ def test_json_at_a_terminal_is_what_a_pipe_gets(terminal, capsys):
     assert all(round(e["onset_s"], 6) == e["onset_s"] for e in events[:-1])
 
 
+def test_a_recording_is_named_with_its_labels_before_what_was_decided(terminal, capsys):
+    assert main(["replay", "--model", str(demo.MODEL), TOUCH]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == (
+        f"{TOUCH}, category: soft-movable, mobility: movable, object: pillow, softness: soft"
+    )
+
+
 def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
     assert main(["demo"]) == 0
     out = capsys.readouterr().out

@@ -71,6 +71,13 @@ chips = [{ first = [0, 0], block = [2, 3] }]
 """
 
 
+@pytest.mark.parametrize("number", [0, 1, 1048575])
+def test_a_bus_is_named_by_its_number(number):
+    text = SERIAL.replace('serial = "/dev/ttyACM0"', f"device = {number}")
+    (bus,) = skinfile.parse(text.replace("{ first", "{ address = 8, first")).buses
+    assert (bus.device, bus.serial) == (f"/dev/i2c-{number}", False)
+
+
 def test_a_microcontroller_may_stand_on_a_serial_port():
     (bus,) = skinfile.parse(SERIAL).buses
     assert (bus.device, bus.serial, bus.clock_hz) == ("/dev/ttyACM0", True, 115_200)
