@@ -6,6 +6,8 @@ import shutil
 import pytest
 
 from edge.cli import main
+from edge.commands.output import Output
+from edge.recording import load
 from edge.skin import file as skinfile
 
 
@@ -32,6 +34,16 @@ def test_the_whole_loop_without_hardware(name, tmp_path, monkeypatch, capsys):
     said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
     assert status == 0
     assert said["category"] == "rigid-fixed"
+
+
+def test_what_to_rehearse_next_is_said_at_a_terminal(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(Output, "of", classmethod(lambda cls, arguments: cls(arguments.json)))
+    skin = str(skinfile.shipped("matrix"))
+    assert main(["fake", "--skin", skin, "--out", str(tmp_path), "--trials", "1"]) == 0
+    still = tmp_path / "still.npz"
+    asked = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
+    (frames,) = (s for s in capsys.readouterr().out.splitlines() if s.strip().startswith(asked))
+    assert int(frames.split()[-1]) == len(load(still).t)
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,13 @@ def verify(exported, golden, capsys):
     return status, lines(out.out), out.err
 
 
+@pytest.mark.parametrize("given", ["--model", "--golden"])
+def test_both_of_a_models_files_are_asked_for(given, exported, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["verify", given, str(exported / "model.onnx")])
+    assert "the following arguments are required: --" in capsys.readouterr().err
+
+
 def test_the_golden_file_is_met(exported, capsys):
     status, checks, err = verify(exported, exported / "golden.npz", capsys)
     assert status == 0
