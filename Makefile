@@ -61,7 +61,7 @@ test: lint types
 SCENE := train/scenes/cody18.toml
 SIMULATED := $(OUT)/$(basename $(notdir $(SCENE)))
 
-$(SIMULATED)/.made: $(READY) $(SCENE) $(wildcard train/simulate/*.py train/simulate/effects/*.py)
+$(SIMULATED)/.made: $(READY) $(SCENE) $(wildcard train/scenes/*.toml train/simulate/*.py train/simulate/effects/*.py)
 	rm -rf $(SIMULATED)
 	$(BIN)/python -m train simulate $(SCENE) --out $(SIMULATED)
 	@touch $@

@@ -3,7 +3,10 @@
 A face parallel to the forearm, rigid or soft, fixed or movable, with skin friction: means from 0.9
 to 1.2 s after the touch, and how far the thing has moved by then. Theory is quasi-static: a fixed
 face bears the arm's stiffness times its advance, a sliding one mu m g; a soft one's contact is as
-wide as on an elastic layer under that load, and its pressure a half ellipse.
+wide as on an elastic layer under that load, and its pressure a half ellipse. By then what moves
+has let the forearm swing on by some 17 degrees: its force is still what friction says, less what
+the arm's slowing takes, but peak and area on an end that the forearm lies over askew are no longer
+a layer's, and theory is silent.
 """
 
 from __future__ import annotations
@@ -17,7 +20,6 @@ from scipy.optimize import brentq
 
 from bench.mujoco_touch import (
     LEAD_S,
-    PLACE_M,
     RADIUS_M,
     RATE_HZ,
     START_DEG,
@@ -34,8 +36,12 @@ from train.simulate.scene import from_dict
 
 UPRIGHT_DEG = (0.0, -4.0, 0.0, -3.9, 0.0)
 """What lets the forearm hang straight as it touches: a standing face is then parallel to it."""
-BOX = Thing("box", floor=0.3, skin=0.4, height_m=0.1, below_m=0.05)
-FOAM = Thing("foam", floor=0.3, skin=0.4, height_m=0.16, breadth_m=0.16, modulus_pa=8e3)
+MIDDLE_M, PITCH_M, ROUND_M = 0.10332, 0.0108, 0.01205
+"""Of the skin's 16 rows, and from taxel to taxel along and around the forearm."""
+BOX = Thing("box", floor=0.3, skin=0.4, height_m=0.3, below_m=0.15)
+FOAM = Thing("foam", floor=0.3, skin=0.4, height_m=14 * PITCH_M, breadth_m=0.15, modulus_pa=8e3)
+"""The box is taller than the skin and the foam ends between two rows: on an end a pad is a ball
+and our taxel a square, which is no question of physics."""
 SCENES = {
     "rigid fixed": (BOX, True),
     "rigid movable": (BOX, False),
@@ -43,7 +49,6 @@ SCENES = {
     "soft movable": (FOAM, False),
 }
 ALLOWED = {"total force, N": 10, "peak taxel, N": 20, "area, taxels": 20, "motion, mm": 10}
-PITCH_M, ROUND_M = 0.0108, 0.01205
 FROM_S, TO_S = 0.9, 1.2
 ARM_N_M, SPEED_M_S = 115.0, 0.15
 STEP_S = 0.00125
@@ -51,7 +56,7 @@ STEP_S = 0.00125
 
 def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in MuJoCo."""
-    touched = simulate(Touch(thing, fixed, start_rad=tuple(np.radians(UPRIGHT_DEG))))
+    touched = simulate(Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M))
     return touched.recording.frames, touched.force, touched.moved_m
 
 
@@ -75,7 +80,7 @@ def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     scene = from_dict(
         {
             "trials": {"count": 1, "lead_s": LEAD_S, "after_s": 1.8},
-            "motion": {"start_deg": start, "place_m": PLACE_M},
+            "motion": {"start_deg": start, "place_m": MIDDLE_M},
             "effects": {"add": ["tilt", "inertia"]},
             "step_s": {"base": STEP_S},
             "object": [item],
@@ -117,9 +122,11 @@ def theory(thing: Thing, fixed: bool) -> dict[str, float]:
     )
     force = load(a)
     out["total force, N"] = force
+    out["motion, mm"] = 0.0 if fixed else 1e3 * (SPEED_M_S * TO_S - hold / ARM_N_M - pressed(a))
+    if not fixed:
+        return out
     out["peak taxel, N"] = 4.0 * force / (math.pi * 2 * a * length) * PITCH_M * ROUND_M
     out["area, taxels"] = 2 * a / ROUND_M * length / PITCH_M
-    out["motion, mm"] = 0.0 if fixed else 1e3 * (SPEED_M_S * TO_S - hold / ARM_N_M - pressed(a))
     return out
 
 

@@ -3,7 +3,7 @@
 The arm is Cody's chain with its masses on gravity-compensated links, driven as an impedance
 controller drives it. Each taxel that can meet anything is a pad on a spring along its normal, and
 reads what the spring bears. Things stand on a floor under gravity, or are clamped; what is soft is
-a wall of sprung blocks that pull their neighbours along, and a plant is a set of hinged stems.
+an elastic layer (`mujoco_layer`), and a plant is a set of hinged stems.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import mujoco_layer
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.touch.arm import Chain
@@ -29,8 +30,9 @@ RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
 """Taxels whose normal lies farther from the push than this can't meet anything."""
-PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
-BLOCK_KG = 0.003
+PAD_M, PAD_FLAT_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.0035, 0.02, 0.0015
+"""A pad's radius around the forearm and half its straight part along it (flat over a taxel's 9 mm,
+to 0.1 mm); its mass, and its loss as a part of its stiffness."""
 SOLIMP, RIGID = 0.95, "-1e6 -2e3"
 """MuJoCo's constraint: its stiffness is SOLIMP / (1 - SOLIMP) times solref's and the mass in it."""
 ABOVE_FLOOR_M = 0.30
@@ -112,16 +114,26 @@ class Touched:
     moved_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
+def is_layer(touch: Touch) -> bool:
+    """Whether what is touched is an elastic layer."""
+    return touch.thing.soft and touch.thing.kind != "plant"
+
+
+def pad_n_m(touch: Touch) -> float:
+    """Stiffness of a pad; where a layer is touched, with what that gives beneath it."""
+    if not is_layer(touch):
+        return touch.taxel_n_m
+    return 1.0 / (1.0 / touch.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(touch.thing.modulus_pa))
+
+
 def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
     """The arm's bodies, and the (row, column) of each pad."""
     masses = {1: (2.1, "0 0 -0.13"), 3: (1.5, "0 0 -0.12")}
     pads, where = "", []
-    k, skin = touch.taxel_n_m, touch.thing.skin
-    contact = RIGID
-    if touch.thing.soft and touch.thing.kind != "plant":
-        # A block's face is rigid, the layer's is not: beneath one taxel it gives as E times that.
-        stiffness = touch.thing.modulus_pa * 0.0108 / (SOLIMP / (1.0 - SOLIMP) * BLOCK_KG)
-        contact = f"-{stiffness} -{2.0 * math.sqrt(stiffness)}"
+    k, skin = pad_n_m(touch), touch.thing.skin
+    contact, dimensions, loss = RIGID, 3, PAD_LOSS_S * k
+    if is_layer(touch):
+        contact, dimensions, loss = mujoco_layer.CONTACT, 1, 2.0 * math.sqrt(k * PAD_KG)
     for row in range(ROWS):
         for column, angle in enumerate(COLUMN_ANGLES_DEG):
             if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
@@ -129,12 +141,13 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
             out = f"{math.cos(math.radians(angle))} {math.sin(math.radians(angle))} 0"
             x, y = ((RADIUS_M - PAD_M) * float(v) for v in out.split()[:2])
             pads += (
-                f'<body pos="{x} {y} {0.18432 - 0.0108 * row}"><joint name="p{len(where)}" '
-                f'type="slide" axis="{out}" stiffness="{k}" damping="{PAD_LOSS_S * k}" '
+                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}">'
+                f'<joint name="p{len(where)}" '
+                f'type="slide" axis="{out}" stiffness="{k}" damping="{loss}" '
                 f'armature="{PAD_KG}"/>'
-                f'<geom type="sphere" size="{PAD_M}" mass="0.0005" contype="1" '
+                f'<geom type="capsule" size="{PAD_M} {PAD_FLAT_M}" mass="0.0005" contype="1" '
                 f'conaffinity="2" solref="{contact}" solimp="{SOLIMP} {SOLIMP} 0.001" '
-                f'friction="{skin} 0.005 0.0001"/></body>'
+                f'friction="{skin} 0.005 0.0001" condim="{dimensions}"/></body>'
             )
             where.append((row, column))
     xml, end, at = "", "", "0 0 0"
@@ -169,35 +182,9 @@ def stems_xml(thing: Thing, skin: str) -> str:
     return xml
 
 
-def blocks_xml(thing: Thing, skin: str) -> tuple[str, str]:
-    """A wall of sprung blocks, and the springs between neighbours: a Pasternak foundation."""
-    dz, dy = 0.0216, 0.016
-    rows = round(min(thing.height_m, 0.22) / dz)
-    cols = round(min(thing.breadth_m, 0.17) / dy) | 1
-    k = thing.modulus_pa * dz * dy / thing.thick_m
-    shear = thing.sideways * thing.modulus_pa * thing.thick_m
-    xml, between = "", ""
-    for r in range(rows):
-        for c in range(cols):
-            y, z = (c - cols // 2) * dy, ABOVE_FLOOR_M + (r - (rows - 1) / 2) * dz
-            xml += (
-                f'<body pos="0.004 {y} {z}"><joint name="b{r}_{c}" type="slide" axis="1 0 0" '
-                f'stiffness="{k}" damping="{0.06 * k + 0.1}" range="0 {thing.thick_m * 0.9}" '
-                f'limited="true"/><geom type="box" size="0.004 {dy / 2} {dz / 2}" '
-                f'mass="{BLOCK_KG}" contype="2" conaffinity="1" {skin}/></body>'
-            )
-            for r2, c2, part in ((r + 1, c, dy / dz), (r, c + 1, dz / dy)):
-                if r2 < rows and c2 < cols:
-                    between += (
-                        f'<fixed stiffness="{shear * part}"><joint joint="b{r}_{c}" coef="1"/>'
-                        f'<joint joint="b{r2}_{c2}" coef="-1"/></fixed>'
-                    )
-    return xml, between
-
-
-def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str, str]:
-    """The thing, its face at `face` and turned by `push` radians about the vertical; and the
-    springs between its parts."""
+def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str, str, str]:
+    """The thing, its face at `face` and turned by `push` radians about the vertical; the
+    springs between its parts; and the face of a layer."""
     thing = touch.thing
     x, y, z = face
     base, width = z - ABOVE_FLOOR_M, thing.breadth_m
@@ -205,7 +192,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     middle = ABOVE_FLOOR_M + thing.height_m / 2 - half
     skin = f'friction="{thing.skin} 0.005 0.0001"'
     floor = f'friction="{thing.floor} 0.005 0.0001"'
-    between, back = "", FOOT_M / 2
+    between, layer, back = "", "", FOOT_M / 2
     if thing.kind in ("box", "drum"):
         shape = (
             f'type="box" size="{FOOT_M / 2} {width / 2} {half}" pos="{FOOT_M / 2} 0 {middle}"'
@@ -217,7 +204,9 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     elif thing.kind == "plant":
         parts = stems_xml(thing, skin)
     else:
-        parts, between = blocks_xml(thing, skin)
+        parts, between, layer = mujoco_layer.layer_xml(
+            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m, thing.sideways
+        )
         back = 0.2
     foot = f'<geom type="box" size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" '
     foot += f'pos="{back} 0 0.004" mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" '
@@ -228,6 +217,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
         f'</body><geom type="plane" size="4 4 0.1" pos="0 0 {base}" contype="8" conaffinity="4" '
         f"{floor}/>",
         between,
+        layer,
     )
 
 
@@ -241,10 +231,13 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
         import mujoco
     except ImportError:
         raise InputError("transfer needs MuJoCo: pip install --group bench") from None
+    # It warns, and writes a file, of each face that only a layer's knots hold.
+    mujoco.set_mju_user_warning(lambda text: None)
     chain = Chain.cody()
     start = np.radians(START_DEG) + np.array(touch.start_rad)
     rate = swing(chain)
-    pose, later = chain.pose(start + rate * LEAD_S), chain.pose(start + rate * (LEAD_S + 0.01))
+    first = start - lag(rate)
+    pose, later = chain.pose(first + rate * LEAD_S), chain.pose(first + rate * (LEAD_S + 0.01))
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
     point = (pose @ on)[:3]
     speed = (later @ on)[:3] - point
@@ -253,17 +246,18 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     across = pose[:3, :3].T @ ahead
     arm, where = arm_xml(chain, math.degrees(math.atan2(across[1], across[0])), touch)
     aside = np.array([-ahead[1], ahead[0], 0.0]) * touch.aside_m
-    thing, between = thing_xml(
+    thing, between, layer = thing_xml(
         touch, point + ahead * (RADIUS_M + 0.001) + aside, heading + touch.yaw_rad
     )
     gains = "".join(
         f'<position joint="j{i}" kp="{k}"/>' for i, k in enumerate(CODY_STIFFNESS[: chain.dof])
     )
-    fall = 9.81 * math.sin(touch.slope_rad), -9.81 * math.cos(touch.slope_rad)
+    slope, g = touch.slope_rad, 9.81
+    fall = (*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope))
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{STEP_S}" integrator="implicitfast" cone="elliptic" '
-        f'gravity="{fall[0] * ahead[0]} {fall[0] * ahead[1]} {fall[1]}"/><worldbody>{arm}{thing}'
-        f"</worldbody><tendon>{between}</tendon><actuator>{gains}</actuator></mujoco>"
+        f'jacobian="dense" gravity="{" ".join(map(str, fall))}"/><worldbody>{arm}{thing}'
+        f"</worldbody>{layer}<tendon>{between}</tendon><actuator>{gains}</actuator></mujoco>"
     )
     return model, start, where
 
@@ -273,6 +267,11 @@ def swing(chain: Chain) -> NDArray[np.float64]:
     rate = np.zeros(chain.dof)
     rate[0] = math.radians(RATE_DEG_S)
     return rate
+
+
+def lag(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(dof,) radians by which each joint trails its equilibrium point in free motion."""
+    return np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) * rate
 
 
 def simulate(touch: Touch) -> Touched:
@@ -287,16 +286,17 @@ def simulate(touch: Touch) -> Touched:
     chain, thing = Chain.cody(), touch.thing
     rate, dof = swing(chain), chain.dof
     data = mujoco.MjData(model)
-    data.qpos[:dof] = start - np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) * rate
+    data.qpos[:dof] = start - lag(rate)
     data.qvel[:dof] = rate
     springs = [model.joint(f"p{i}").qposadr[0] for i in range(len(where))]
     row, column = np.array(where).T
     body = model.body("thing").id
     mujoco.mj_forward(model, data)
+    rub = mujoco_layer.Rub(model, touch.thing.skin) if is_layer(touch) else None
     frames, joints, forces, places = [], [], [], []
     for _ in range(round(LASTS_S * RATE_HZ) + 1):
         loads = np.zeros((ROWS, len(COLUMN_ANGLES_DEG)))
-        loads[row, column] = np.maximum(-touch.taxel_n_m * data.qpos[springs], 0.0)
+        loads[row, column] = np.maximum(-pad_n_m(touch) * data.qpos[springs], 0.0)
         counts = loads * COUNTS_PER_NEWTON
         if touch.noise is not None:
             size, generator = touch.noise
@@ -308,6 +308,8 @@ def simulate(touch: Touch) -> Touched:
         places.append(data.xpos[body] + ABOVE_FLOOR_M * turned[:, 2])
         for _ in range(round(1.0 / (RATE_HZ * STEP_S))):
             data.ctrl[:] = start + rate * data.time
+            if rub is not None:
+                rub.hold(data, np.maximum(-pad_n_m(touch) * data.qpos[springs], 0.0))
             mujoco.mj_step(model, data)
     condition = "fixed" if touch.fixed else "movable"
     soft = "soft" if thing.soft else "rigid"

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from edge.config import REQUIRED, read_toml
+from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
@@ -61,12 +61,34 @@ def load(
         InputError: the file cannot be read, a key is unknown, a value makes no sense, or an
             effect is named that the scene cannot support.
     """
-    table = dict(read_toml(path).raw)
+    table = _as_another(path)
     if seed is not None:
         table["seed"] = seed
     if count is not None and isinstance(trials := table.get("trials", {}), dict):
         table["trials"] = {**trials, "count": count}
     return from_dict(table, where=os.fspath(path))
+
+
+def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """A scene's table; where it is `like` another scene of its folder, with what that one says
+    and this one does not."""
+    table = dict(read_toml(path).raw)
+    if "like" not in table:
+        return table
+    name = ConfigTable(table, os.fspath(path)).text("like")
+    del table["like"]
+    out = dict(read_toml(Path(path).parent / name).raw)
+    if "like" in out:
+        raise InputError(
+            f"{os.fspath(path)}: like names {name}, which is itself like another scene; name that "
+            "one, and say here what differs"
+        )
+    for key, value in table.items():
+        old = out.get(key)
+        out[key] = value
+        if isinstance(old, Mapping) and isinstance(value, Mapping):
+            out[key] = {**old, **value}
+    return out
 
 
 def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:

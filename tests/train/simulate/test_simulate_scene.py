@@ -188,6 +188,26 @@ def test_a_movable_object_needs_what_it_slides_on():
         from_dict(table)
 
 
+def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
+    (tmp_path / "one.toml").write_text(
+        'name = "one"\n[trials]\ncount = 3\nafter_s = 1.5\n[spread]\nyaw_deg = 2.0\n'
+        '[[object]]\nname = "wall"\nfamily = "rigid"\nconditions = ["fixed"]\n'
+    )
+    other = tmp_path / "other.toml"
+    other.write_text('like = "one.toml"\nname = "other"\n[trials]\ncount = 4\n')
+    one, two = scenes.load(tmp_path / "one.toml"), scenes.load(other)
+    assert (one.trials["count"], two.trials["count"]) == (3, 4)
+    assert two.name == "other"
+    assert two.trials["after_s"] == 1.5
+    assert (two.spread, two.objects) == (one.spread, one.objects)
+    (tmp_path / "third.toml").write_text('like = "other.toml"\n')
+    with pytest.raises(InputError, match="itself like another scene"):
+        scenes.load(tmp_path / "third.toml")
+    other.write_text("like = 3\n")
+    with pytest.raises(InputError, match="like must be"):
+        scenes.load(other)
+
+
 def test_two_objects_of_one_name():
     table = copy.deepcopy(GOOD)
     table["object"] = table["object"] * 2

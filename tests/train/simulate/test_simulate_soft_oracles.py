@@ -193,3 +193,33 @@ class TestBottoming:
         assert run(scene).traces["depth_m"][0].max() < 0.021
         endless = replace(scene, leave_out=("bottoming",))
         assert run(endless).traces["depth_m"][0].max() > 0.021
+
+
+class TestAskew:
+    """Over the end of a foam block of 8 kPa, 0.1 m thick, against an elastic block of that size by
+    finite elements (linear bricks of 8 mm, bonded behind, no friction, Poisson's ratio 0.1)."""
+
+    @pytest.mark.parametrize(
+        ("degrees", "force", "depth_mm", "peak", "rows"),
+        [
+            (10.0, 2.94, 14.4, 0.287, [0.894, 0.710, 0.546, 0.382, 0.250, 0.130]),
+            (17.0, 2.94, 18.1, 0.364, [1.288, 0.854, 0.524, 0.236, 0.034, 0.0]),
+            (17.0, 6.00, 25.5, 0.445, [1.828, 1.454, 1.086, 0.786, 0.522, 0.258]),
+        ],
+    )
+    def test_rows_bear_what_an_elastic_block_gives_them(self, degrees, force, depth_mm, peak, rows):
+        foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
+        state = run(make(foam)).state
+        slope, pitch = np.tan(np.radians(degrees)), state.skin.row_pitch_m
+        depth = 1e-3 * depth_mm - slope * (np.arange(14) + 0.5)[:, None] * pitch
+        state.bed.lines, state.bed.weight = slice(1, 15), np.ones((14, 1))
+        state.line_depth, state.force = depth, np.array([force])
+        # Half a column from the nearest on either side, as in the block's sum over taxels.
+        away = (np.arange(len(state.columns)) - len(state.columns) // 2 + 0.5) * 0.26166
+        state.column_gaps = state.skin.radius_m * (1.0 - np.cos(away))[:, None]
+        lateral.narrow(state)
+        lateral.image(state)
+        found = state.image.sum(axis=1)[:6, 0]
+        assert found.sum() == pytest.approx(sum(rows), rel=0.06)
+        assert found == pytest.approx(rows, abs=0.16 * max(rows))
+        assert state.image.max() == pytest.approx(peak, rel=0.1)

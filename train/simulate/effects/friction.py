@@ -5,6 +5,9 @@ carries a part of the arm's push and loads or lifts what it pushes. Coulomb's la
 shear spring: T = K u with abs(T) <= mu F. The normal force in the bound is that of the step
 before, and the pull of the spring is implicit, so that however stiff it is, each step takes less
 than it finds.
+
+What is soft fits itself to a forearm that lies askew, and presses on it along the forearm's
+normal: there the bound lies about that normal's part along the face.
 """
 
 from __future__ import annotations
@@ -45,6 +48,16 @@ class Shear:
 def add(build: Build) -> None:
     """Let the face hold the skin."""
     stiffness = build.settings("friction")["shear_n_m"]
+    fits = "tilt" in build.effects and "foundation" in build.effects
+
+    def bounds(state: State) -> tuple[Array, Array]:
+        """The least and the most pull that the load of now can hold."""
+        most = state.values["skin_friction"] * state.loads[0]
+        if not fits:
+            return -most, most
+        tilt = state.y_frame[1]
+        normal = -state.loads[0] * tilt / np.sqrt(1.0 - tilt * tilt)
+        return normal - most, normal + most
 
     def hold(state: State) -> None:
         """The pull with which the step begins, and what it does to arm and contact."""
@@ -54,8 +67,7 @@ def add(build: Build) -> None:
         for coupled, load in zip(own.coupled, state.loads, strict=True):
             drawn = drawn - coupled * load
         stuck = stiffness * (own.stretch + drawn) / (1.0 + stiffness * own.give)
-        most = state.values["skin_friction"] * state.loads[0]
-        own.pull = np.clip(stuck, -most, most)
+        own.pull = np.clip(stuck, *bounds(state))
         state.q_free = state.q_free - state.give * own.jacobian * own.pull
         state.y = tuple(
             y - coupled * own.pull for y, coupled in zip(state.y, own.coupled, strict=True)
@@ -64,12 +76,14 @@ def add(build: Build) -> None:
     def slip(state: State) -> None:
         """The stretch as the step has left it; more than friction holds has slipped."""
         own = state.of(Shear)
-        most = state.values["skin_friction"] * state.loads[0] / stiffness
+        least, most = bounds(state)
         moved = dot(own.jacobian, state.q - own.before)
-        own.stretch = np.clip(own.stretch + moved, -most, most)
+        own.stretch = np.clip(own.stretch + moved, least / stiffness, most / stiffness)
 
     if "sliding" in build.effects:
         build.put("step", base.PRESS + 15, weigh)
+    if "tilt" in build.effects:
+        build.put("sample", base.BEAR + 2, lean_on)
     build.put("setup", base.ORDER + 5, rest)
     build.put("frame", base.LOCATE + 5, touch)
     build.put("step", base.PREDICT + 5, hold)
@@ -80,6 +94,12 @@ def rest(state: State) -> None:
     """Nothing is held yet."""
     none = np.zeros(state.n)
     state.keep(Shear(none, none, state.q, none, (), state.q))
+
+
+def lean_on(state: State) -> None:
+    """Askew, the skin bears a part of the shear along its own normal."""
+    pressed = state.force - state.of(Shear).pull * state.depth[1]
+    state.force = np.where(state.force > 0.0, np.maximum(pressed, 0.0), 0.0)
 
 
 def weigh(state: State) -> None:

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import Array, share_out, touching
+from train.simulate.contact import Array, share_out, total, touching
 from train.simulate.plan import Build
 from train.simulate.state import State
 
@@ -65,8 +65,8 @@ def margin(state: State) -> None:
 
 
 def image(state: State) -> None:
-    """The force shared out among taxels as a half ellipse: as the root of each column's depth
-    past its touch."""
+    """The force shared out among the rows as each bears, and within a row as a half ellipse: as
+    the root of each column's depth past its touch."""
     bed = state.bed
     depth = np.broadcast_to(state.line_depth, bed.weight.shape)
     held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
@@ -75,6 +75,60 @@ def image(state: State) -> None:
     # A touch so slight that it falls between the columns is the nearest one's.
     some = touching(gaps - nearest, held)
     inside = np.maximum(depth[:, None] - (gaps - nearest)[some], 0.0)
-    loads = np.sqrt(inside) * (bed.weight[:, None] * state.reach[some])
+    loads = np.sqrt(inside) * state.reach[some]
+    if loads.shape[1]:
+        ellipse = along_columns(loads)
+        wide = along_columns((inside > 0.0) * state.reach[some])
+        borne = row_loads(state, depth, held, wide)
+        loads *= (borne / np.where(ellipse > 0.0, ellipse, 1.0))[:, None]
     state.image = share_out(state.force, loads)
     state.image_from = some.start
+
+
+def along_columns(values: Array) -> Array:
+    """(L, n) the sums over the columns of (L, C, n), one term after the other."""
+    return np.asarray(np.add.accumulate(values, axis=1)[:, -1])
+
+
+def row_loads(state: State, depth: Array, held: Array, wide: Array) -> Array:
+    """(L, n) what each row bears, up to a factor, at the depths (L, n) and `wide` columns (L, n).
+
+    Across the forearm a row bears as a layer does; along it the rows feel each other as a
+    stretched foundation does whose length is the margin (Pasternak's; Kerr, J. Applied Mechanics
+    31, 1964). Where the forearm lies askew over the end of a face, that end bears the margin
+    squared times the slope more, and rows pressed less deep than the margin times the slope are
+    hardly touched. Against an elastic block by finite elements, askew by 10 and 17 degrees, the
+    highest load of a taxel is within 10 %.
+    """
+    bed = state.bed
+    some = touching(bed.gaps, held)
+    inside = np.maximum(depth[:, None] - bed.gaps[some], 0.0)
+    borne = along_columns(inside * bed.stiffness[some]) * bed.weight
+    if len(state.line_depth) < 2:
+        return np.asarray(borne)
+    margin, pitch = MARGIN * state.values["depth_m"], state.skin.row_pitch_m
+    slope = np.diff(depth, axis=0) / pitch
+    ends = face_ends(bed.weight, bed.lines, state.skin.rows)
+    askew = np.zeros_like(depth)
+    askew[:-1] += ends[0][:-1] * np.maximum(-slope, 0.0)
+    askew[1:] += ends[1][1:] * np.maximum(slope, 0.0)
+    least = margin * total(askew)
+    touched = np.clip(depth / np.where(least > 0.0, least, np.inf) - 0.5, 0.0, 1.0)
+    edge = state.taxel_k * margin * margin / pitch * askew * wide
+    return np.asarray(borne * np.where(least > 0.0, touched, 1.0) + edge)
+
+
+def face_ends(weight: Array, lines: slice, rows: int) -> tuple[Array, Array]:
+    """(L, n) twice: which part of the face's first end lies in each row, and of its last.
+
+    Args:
+        weight: (L, n) which part of each row the face covers.
+        lines: which of the skin's `rows` they are; a face that covers the skin's last row whole
+            goes on beyond the skin.
+    """
+    none = np.zeros_like(weight[:1])
+    before = np.floor(weight[:1]) if lines.start == 0 else none
+    after = np.floor(weight[-1:]) if lines.stop == rows else none
+    first = np.diff(weight, axis=0, prepend=before)
+    last = -np.diff(weight, axis=0, append=after)
+    return np.maximum(first, 0.0), np.maximum(last, 0.0)

@@ -93,8 +93,10 @@ def line_depths(state: State) -> Array:
 
 
 def bear(state: State) -> None:
-    """The force that the skin bears, and each line's depth."""
-    state.force = state.loads[0]
+    """The force that the skin bears, which is what of the push goes along its own normal, and each
+    line's depth."""
+    tilt = state.depth[1]
+    state.force = state.loads[0] * np.sqrt(np.maximum(1.0 - tilt * tilt, 0.0))
     state.line_depth = line_depths(state)
 
 
