@@ -38,6 +38,11 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "STILL_S",
     ): "how long a recording of nothing lasts: any time will do",
     (
+        "edge/commands/bench.py",
+        "2.0  ->  3.0",
+        "force =",
+    ): "how hard the touch is that is timed: following it takes as long",
+    (
         "edge/commands/replay.py",
         "failed += 1  ->  failed -= 1",
         "",

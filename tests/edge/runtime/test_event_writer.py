@@ -12,7 +12,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.runtime import event_writer
-from edge.runtime.event_writer import Lines
+from edge.runtime.event_writer import Lines, LineWriter
 
 
 @pytest.fixture
@@ -94,6 +94,14 @@ def test_each_line_that_nobody_reads_is_counted_once():
         lines.close()
         assert lines.lost == {"stdout": 5}
         os.close(reading)
+
+
+def test_a_line_that_comes_after_the_end_is_lost_and_counted():
+    written = []
+    writer = LineWriter("a file", written.append)
+    writer.close()
+    writer.put("late")
+    assert (written, writer.lost) == ([], 1)
 
 
 def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):

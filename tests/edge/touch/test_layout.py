@@ -61,6 +61,8 @@ def test_metadata_round_trip():
     [
         ({"rows": None}, "rows is missing"),
         ({"rows": 0}, "1 to 1024"),
+        ({"rows": 1025}, "1 to 1024"),
+        ({"cols": 1025}, "1 to 1024"),
         ({"rows": True}, "whole number"),
         ({"cols": 2.5}, "whole number"),
         ({"wraps": 1}, "true or false"),
