@@ -26,7 +26,7 @@ OURS = (("paper", "pca"), ("paper", "lda"), ("contact", "lda"), ("moments", "lda
 SAMPLES = 20
 """Times at which a feature is sampled."""
 SCALING = "IV"
-TREES = 200
+TREES = 100
 TIMES = 10
 """Times at which every taxel is sampled, for the peers."""
 GROUP_TASK = "object"

@@ -97,15 +97,16 @@ def sentence(task: str, found: StoppingComparison, labels: Sequence[str]) -> str
     _, counts = np.unique(labels, return_counts=True)
     guess, most = 100 / len(counts), 100 * counts.max() / counts.sum()
     seconds, wrong, beside = gain(found)
-    error = float(np.sqrt(wrong * (1 - wrong) / found.trials))
-    if beside - wrong > error:
+    error = float(np.sqrt((wrong * (1 - wrong) + beside * (1 - beside)) / found.trials))
+    # The best of many thresholds is ahead by one standard error by luck alone.
+    if beside - wrong > 2 * error:
         early = (
             f"Deciding when sure: {100 * (1 - wrong):.0f} % at {seconds:.2f} s on average, where a "
             f"fixed window as long gives {100 * (1 - beside):.0f} %."
         )
     else:
         early = (
-            "Deciding when sure gains no more than a standard error over a fixed window here: take "
+            "Deciding when sure gains nothing that is beyond chance over a fixed window here: take "
             "the window."
         )
     return (

@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from edge.commands.summary import wilson
@@ -18,8 +19,10 @@ from train.tradeoff.early import StoppingComparison
 
 MOST_ACROSS = 3
 """Panels beside each other."""
-LEAST_SHARE = 0.01
+LEAST_SHARE = 0.02
 """Of the decisions that a point of the reliability diagram stands for."""
+ROOM = 0.15
+"""Share right below whose line there is room for words."""
 CLOSE = 0.06
 """Shares whose names would cover each other."""
 
@@ -236,12 +239,14 @@ def _accuracy(
     chance = {"guessing": 1 / len(counts), "most frequent label": float(counts.max() / n)}
     for share in chance.values():
         axis.axhline(100 * share, color="0.55", lw=1, ls="--")
-    if max(chance.values()) - min(chance.values()) < CLOSE:
+    lowest = min(chance.values())
+    if max(chance.values()) - lowest < CLOSE:
         chance = {" or ".join(chance): max(chance.values())}
     for name, share in chance.items():
+        below = len(chance) == 1 and lowest > ROOM
         axis.text(
-            0.02, 100 * share + 1, name, fontsize=8, color="0.35",
-            transform=axis.get_yaxis_transform(),
+            0.98, 100 * lowest - 1 if below else 100 * share + 1, name, fontsize=8, color="0.35",
+            ha="right", va="top" if below else "bottom", transform=axis.get_yaxis_transform(),
         )  # fmt: skip
     curve = sorted((s + after_s, 1.0 - w) for t, s, w in found.when_sure())
     fixed = [
@@ -263,9 +268,12 @@ def _accuracy(
             at = found.decision_points_s.index(window)
             share = 100 * float(1 - found.fixed[at])
             axis.plot([window + after_s], [share], "o", ms=5, color=COLOURS[0])
+            # The curves rise: there is room below an early point, and above the last one.
+            early = window < found.decision_points_s[-1]
             axis.annotate(
-                f"{share:.0f} %", (window + after_s, share), xytext=(-3, 7),
-                textcoords="offset points", fontsize=9, ha="right", color=COLOURS[0],
+                f"{share:.0f} %", (window + after_s, share), xytext=(-3, -14) if early else (-3, 7),
+                textcoords="offset points", fontsize=9, ha="right",
+                color=COLOURS[0], path_effects=[withStroke(linewidth=2.5, foreground="white")],
             )  # fmt: skip
     axis.set_title(f"{task} ({len(counts)} labels)")
     axis.set_xlim(0, found.decision_points_s[-1] + 0.08)
