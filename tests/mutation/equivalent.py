@@ -84,8 +84,18 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "to_bytes",
     ): "more zeros behind the bits that are taken",
     (
+        "edge/model/stopping.py",
+        "True  ->  False",
+        "zip(self.rates, self.limits[decision_point], strict=True)",
+    ): "a limit for each rate is asked for where the model's metadata are read",
+    (
         "edge/commands/terminal.py",
         "124  ->  125",
+        "TOUCH",
+    ): "a shade of red",
+    (
+        "edge/commands/terminal.py",
+        "196  ->  197",
         "TOUCH",
     ): "a shade of red",
 }
