@@ -169,12 +169,14 @@ def covered(offset: Array, state: State) -> Array:
     """(L, n) which part of each row, `offset` metres from the face's middle, the face covers."""
     pitch = state.skin.row_pitch_m
     half = 0.5 * np.maximum(state.values["width_m"], pitch)
-    return np.asarray(np.clip((half + 0.5 * pitch - np.abs(offset)) / pitch, 0.0, 1.0))
+    part: Array = np.clip((half + 0.5 * pitch - np.abs(offset)) / pitch, 0.0, 1.0)
+    return part
 
 
 def curve_gap(offset: Array, state: State) -> Array:
     """(L, n) how far a face curved along the forearm has drawn back: l^2 / (2 r)."""
-    return np.asarray(offset * offset / (2.0 * state.values["radius_m"]))
+    gap: Array = offset * offset / (2.0 * state.values["radius_m"])
+    return gap
 
 
 def order_bed(state: State) -> None:

@@ -111,8 +111,11 @@ def closed_form(slopes: Array, intercepts: Array, y: Coordinates, c: Coordinates
 def touching(gaps: Array, deepest: Array) -> slice:
     """The columns of `gaps` (C, n), as one run, that any trial touches at `deepest` (n,).
 
-    The others add exact zeros, so leaving them out changes no bit.
+    The others add exact zeros, so leaving them out changes no bit; on a tape, which cannot cut by
+    what it finds, they stay.
     """
+    if hasattr(gaps, "tape"):
+        return slice(0, len(gaps))
     touched = np.nonzero(np.any(gaps < deepest, axis=1))[0]
     return slice(int(touched[0]), int(touched[-1]) + 1) if touched.size else slice(0, 0)
 

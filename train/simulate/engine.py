@@ -210,10 +210,13 @@ def run_physics(
                 function(state)
         else:
             recorder.run(plan.frame, 1)
-            recorder.run(plan.step, substeps)
+            recorder.run(plan.step, substeps, changed=False)
         state.t = np.full(n, k / rate_hz)
-        for function in sample:
-            function(state)
+        if recorder is None:
+            for function in sample:
+                function(state)
+        else:
+            recorder.run(sample, 1)
         joints[k] = state.q
         force[k] = state.force
         for name, quantity in plan.traces.items():

@@ -28,7 +28,6 @@ class SensorFrames:
         self.kind = np.float32 if self.raw else np.uint16
         shape = (frames, len(state.columns), scene.skin.rows, state.n)
         self.window: NDArray[Any] = np.zeros(shape, dtype=self.kind)
-        self.used = [len(state.columns), 0]
 
     def take(self, k: int, state: State) -> None:
         """Keep the image of frame k."""
@@ -46,15 +45,15 @@ class SensorFrames:
             counts.transpose(1, 0, 2),
             casting="unsafe",
         )
-        self.used = [min(self.used[0], first), max(self.used[1], last)]
 
     def whole(self, state: State) -> NDArray[Any]:
         """(n, frames, rows, cols) counts, before any sensor's effect."""
         skin = state.skin
         frames, _, rows, n = self.window.shape
         counts: NDArray[Any] = np.zeros((n, frames, rows, skin.cols), dtype=self.kind)
-        first, last = self.used
-        if frames and last > first:
+        touched = np.flatnonzero(self.window.any(axis=(0, 2, 3)))
+        if touched.size:
+            first, last = touched[0], touched[-1] + 1
             strip = np.ascontiguousarray(self.window[:, first:last].transpose(3, 0, 2, 1))
             start = state.columns[first]
             for i in range(n):

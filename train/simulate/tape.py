@@ -69,6 +69,8 @@ class Taped(np.ndarray[Any, Any]):
         name = function.__name__
         if name == "where" and len(args) == 3:
             return self.tape.put("where", args)
+        if name == "broadcast_to":
+            return self.tape.view(np.broadcast_to(np.asarray(args[0]), *args[1:], **how))
         if name in VIEWS:
             return super().__array_function__(function, (Taped,), args, how)
         if name in ("zeros_like", "empty_like"):
@@ -82,6 +84,8 @@ class Taped(np.ndarray[Any, Any]):
             for place, part in zip(whole, parts, strict=True):
                 self.tape.put("copy", (part,), place)
             return np.moveaxis(whole, 0, axis)
+        if name == "copy":
+            return self.tape.put("copy", (self,))
         if name == "take_along_axis" and (args[2:] or (how.get("axis"),))[0] == 0:
             return self.tape.put("gather", args[:2])
         raise NotTaped(name)
@@ -139,6 +143,7 @@ class Tape:
         known: {id: array} of all other arrays with an address on the tape.
         used: ids of those that an operation reads.
         rows: see `replay`; the first `caught_up` of them have been carried out.
+        changed: what the tape leaves changed.
     """
 
     lasting: dict[int, Any]
@@ -148,6 +153,7 @@ class Tape:
     rows: list[list[int]] = field(default_factory=list)
     caught_up: int = 0
     code: NDArray[np.int64] = field(init=False)
+    changed: list[Slot] = field(default_factory=list)
 
     def view(self, array: Array) -> Taped:
         """The array, on this tape."""
@@ -286,14 +292,33 @@ class Slot:
 
     def make_room(self) -> None:
         """Of the same shapes; what is one number for all trials is repeated for each."""
-        self.buffers = []
-        for array in self.arrays:
-            shape = array.shape
-            if len(shape) > 1 and shape[-1] == 1:
-                shape = (*shape[:-1], self.n)
-            self.buffers.append(np.zeros(shape))
+        self.buffers = [np.zeros(self.room(array)) for array in self.arrays]
         self.own = self.pack(self.buffers)
         self.plain = all(array.dtype == np.float64 for array in self.arrays)
+
+    def room(self, array: Array) -> tuple[int, ...]:
+        """The shape of an array's room."""
+        shape = array.shape
+        return (*shape[:-1], self.n) if len(shape) > 1 and shape[-1] == 1 else shape
+
+    @property
+    def outgrown(self) -> bool:
+        """What is there now has no place in our room."""
+        pairs = zip(self.arrays, self.buffers, strict=True)
+        return self.table[self.name] is not self.own and any(
+            self.room(array) != buffer.shape for array, buffer in pairs
+        )
+
+    def grow(self, i: int, shape: tuple[int, ...]) -> None:
+        """Room of another shape, which no tape may know yet.
+
+        Raises:
+            NotTaped: one does.
+        """
+        if self.read:
+            raise NotTaped("an array that others read changes its shape")
+        self.buffers[i] = np.zeros(shape)
+        self.own = self.pack(self.buffers)
 
     def pack(self, arrays: list[Any]) -> Any:
         """Arrays in the form in which the state holds them."""
@@ -306,6 +331,10 @@ class Slot:
         for array, buffer in zip(arrays, self.buffers, strict=True):
             if array is not buffer:
                 buffer[...] = array
+        self.show()
+
+    def show(self) -> None:
+        """Let the state hold our room."""
         if self.plain:
             self.table[self.name] = self.own
         self.last = self.table[self.name]
@@ -326,6 +355,7 @@ class Recorder:
         self.springs: dict[int, Any] = {}
         self.tapes: dict[tuple[PhysicsFunction, ...], list[Tape]] = {}
         self.given_up: set[tuple[PhysicsFunction, ...]] = set()
+        self.away: set[Slot] = set()
         for table in tables(state):
             for name, value in table.items():
                 if isinstance(value, Springs):
@@ -342,9 +372,9 @@ class Recorder:
         buffers = [buffer for slot in self.slots for buffer in slot.buffers]
         self.lasting = {id(buffer): buffer for buffer in buffers}
 
-    def _load(self, slots: list[Slot]) -> None:
-        """Take what the functions between two tapes have put into the state. What looks at
-        another's room is copied first, as a tape would change it under its hands."""
+    def _load(self, slots: list[Slot], every: bool = False) -> None:
+        """Take what the functions between two tapes have put into the state, as far as a tape
+        reads it. What looks at another's room is copied first: a tape would change it."""
         given = []
         for slot in slots:
             arrays = slot.arrays
@@ -354,20 +384,43 @@ class Recorder:
                     arrays[i], shared = np.array(array), True
             given.append((slot, arrays, shared))
         for slot, arrays, shared in given:
-            if slot.read:
-                slot.load(arrays)
-            elif shared:
+            if shared:
                 slot.table[slot.name] = slot.pack(arrays)
+            if every or slot.read:
+                if slot.outgrown:
+                    self._give_up(slot)
+                slot.load(arrays)
+            else:
+                self.away.add(slot)
             slot.last = slot.table[slot.name]
 
-    def run(self, functions: tuple[PhysicsFunction, ...], times: int) -> None:
-        """Run the functions so many times."""
+    def _give_up(self, slot: Slot) -> None:
+        """Who reads an array that changes its shape runs as it is; the others are recorded anew."""
+        ids = {id(buffer) for buffer in slot.buffers}
+        for functions, known in self.tapes.items():
+            if any(ids & tape.used for tape in known):
+                self.given_up.add(functions)
+        self.tapes.clear()
+        slot.read = False
+        slot.make_room()
+        self._number()
+
+    def run(self, functions: tuple[PhysicsFunction, ...], times: int, changed: bool = True) -> None:
+        """Run the functions so many times; `changed` is False right after another run."""
+        if changed:
+            self._load([slot for slot in self.slots if slot.table[slot.name] is not slot.last])
+        if functions in self.given_up and times == 1 < len(functions):
+            for function in functions:
+                self.run((function,), 1)
+            return
         known = self.tapes.setdefault(functions, [])
-        self._load([slot for slot in self.slots if slot.table[slot.name] is not slot.last])
         while times:
             for tape in known:
                 done = replay(tape.code, times)
                 if done:
+                    for slot in self.away.intersection(tape.changed):
+                        self.away.discard(slot)
+                        slot.show()
                     known.remove(tape)
                     known.insert(0, tape)
                     times -= done
@@ -382,13 +435,10 @@ class Recorder:
     def _record(self, functions: tuple[PhysicsFunction, ...], known: list[Tape]) -> bool:
         """Record a tape; the state stays as it was."""
         for slot in self.slots:
-            if [array.shape for array in slot.arrays] != [array.shape for array in slot.buffers]:
-                slot.make_room()  # no tape reads it, or it has the shape
+            if slot.outgrown and not slot.read:
+                slot.make_room()
         self._number()
-        reads = [slot.read for slot in self.slots]
-        for slot in self.slots:
-            slot.read = True
-        self._load(self.slots)
+        self._load(self.slots, every=True)
         before = [dict(table) for table in tables(self.state)]
         tape = Tape(self.lasting | self.springs)
         begun = {}
@@ -396,18 +446,19 @@ class Recorder:
             begun[slot] = [tape.view(buffer) for buffer in slot.buffers]
             slot.table[slot.name] = slot.pack(begun[slot])
         try:
-            for function in functions:
-                function(self.state)
+            with np.errstate(all="ignore"):  # what is not wanted yet has no numbers
+                for function in functions:
+                    function(self.state)
             self._end(tape, before, begun)
-        except NotTaped:
+        except (NotTaped, IndexError):  # a taped array is no index
             self.given_up.add(functions)
             return False
         finally:
             for table, kept in zip(tables(self.state), before, strict=True):
                 table.clear()
                 table.update(kept)
-            for slot, read in zip(self.slots, reads, strict=True):
-                slot.read = read or any(id(buffer) in tape.used for buffer in slot.buffers)
+            for slot in self.slots:
+                slot.read = slot.read or any(id(buffer) in tape.used for buffer in slot.buffers)
         if len(known) == TAPES:
             known.pop()
         known.insert(0, tape)
@@ -417,20 +468,35 @@ class Recorder:
         """Let the tape end with what has changed put into the state's arrays, all at once."""
         for table, kept in zip(tables(self.state), before, strict=True):
             names = {slot.name for slot in self.slots if slot.table is table}
-            others = {name: value for name, value in table.items() if name not in names}
-            if others != {name: value for name, value in kept.items() if name not in names}:
-                raise NotTaped("something else than an array has changed")
-        ends: list[tuple[Array, Any]] = []
+            for name in table.keys() - names:
+                now, then = table[name], kept.get(name)
+                if now is not then and not (isinstance(now, int | slice) and now == then):
+                    raise NotTaped("something else than an array has changed")
+        ends: list[tuple[Slot, int, Any]] = []
         for slot, arrays in begun.items():
-            for end, array, buffer in zip(slot.arrays, arrays, slot.buffers, strict=True):
-                if end is not array:
-                    if not slot.plain:
-                        raise NotTaped("what is true or false has changed")
-                    ended = tape.read(end)
-                    if id(owner(ended)) in self.lasting:
-                        ended = tape.put("copy", (ended,))
-                    ends.append((buffer, ended))
-        for buffer, ended in ends:
-            tape.emit("copy", buffer.shape, [buffer, ended])
-            tape.used.add(id(buffer))
-        tape.code = np.array(tape.rows, dtype=np.int64)
+            ended = slot.arrays
+            if all(end is array for end, array in zip(ended, arrays, strict=True)):
+                continue
+            if not slot.plain:
+                raise NotTaped("what is true or false has changed")
+            tape.changed.append(slot)
+            for i, end in enumerate(ended):
+                if end is arrays[i]:
+                    continue
+                end = tape.read(end)
+                if id(owner(end)) in self.lasting:
+                    end = tape.put("copy", (end,))
+                ends.append((slot, i, end))
+        for slot, i, end in ends:
+            if end.size > slot.buffers[i].size:
+                slot.grow(i, end.shape)
+                self.away.add(slot)
+            if np.broadcast_shapes(end.shape, slot.buffers[i].shape) != slot.buffers[i].shape:
+                raise NotTaped("an array changes its shape")
+            tape.emit("copy", slot.buffers[i].shape, [slot.buffers[i], end])
+        for slot in tape.changed:
+            if slot.kind is not None:
+                # What the tape leaves alone of a few arrays is put back with the others.
+                tape.used |= {id(buffer) for buffer in slot.buffers}
+        self._number()
+        tape.code = np.array(tape.rows, dtype=np.int64).reshape(-1, ROW)

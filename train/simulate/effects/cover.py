@@ -26,13 +26,13 @@ def spread(state: State) -> None:
     if not seen.shape[1]:
         return
     rows = state.skin.rows
-    image = np.zeros((rows, *seen.shape[1:]))
+    image = np.zeros_like(seen, shape=(rows, *seen.shape[1:]))
     image[state.bed.lines] = seen
     state.bed.lines = slice(0, rows)
     first, last = state.image_from - 1, state.image_from + image.shape[1]
     window = len(state.columns)
     moved = image * part
-    wide = np.zeros((image.shape[0], image.shape[1] + 2, image.shape[2]))
+    wide = np.zeros_like(seen, shape=(rows, image.shape[1] + 2, image.shape[2]))
     wide[:, 1:-1] = image - 4.0 * moved
     wide[:, :-2] += moved
     wide[:, 2:] += moved

@@ -128,7 +128,7 @@ def burst(state: State) -> None:
     if bed.burst:
         some = slice(state.image_from, state.image_from + gone.shape[1])
         rows, _, n = bed.alive.shape
-        bed.alive = bed.alive.copy()
+        bed.alive = np.copy(bed.alive)
         alive = bed.alive.reshape(rows, SEGMENTS, -1, n)[bed.lines]
         alive[:, :-1, some] *= ~gone[:, None]
         alive[:, -1, some] = np.maximum(alive[:, -1, some], gone)

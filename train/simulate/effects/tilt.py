@@ -89,7 +89,8 @@ def pivot(state: State) -> None:
 def line_depths(state: State) -> Array:
     """(L, n) each line's depth."""
     depth, tilt = state.depth
-    return np.asarray(depth + state.of(Tilt).lever * tilt - state.bed.line_gap)
+    depths: Array = depth + state.of(Tilt).lever * tilt - state.bed.line_gap
+    return depths
 
 
 def bear(state: State) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -62,18 +63,19 @@ def follow(state: State) -> None:
     """The image moves around the forearm with the face; a load between two columns is theirs in
     parts, and one beyond the window is its last column's."""
     image, window = state.image, len(state.columns)
-    if not image.shape[1]:
-        return
     columns = turned(state) * (state.skin.cols / (2.0 * math.pi))
+    if not (image.shape[1] and columns.any()):
+        return
     whole = np.floor(columns)
     part, whole = columns - whole, whole.astype(np.int64)
-    trials = np.arange(state.n)
     first = int(np.clip(state.image_from + whole.min(), 0, window - 1))
     last = int(np.clip(state.image_from + image.shape[1] + whole.max(), 0, window - 1))
-    moved = np.zeros((len(image), last - first + 1, state.n))
-    for j in range(image.shape[1]):
-        here = np.clip(state.image_from + j + whole, 0, window - 1) - first
-        beside = np.clip(state.image_from + j + 1 + whole, 0, window - 1) - first
-        moved[:, here, trials] += image[:, j] * (1.0 - part)
-        moved[:, beside, trials] += image[:, j] * part
-    state.image, state.image_from = moved, first
+    shape = (len(image), last - first + 1, state.n)
+    rows, trials = np.arange(len(image))[:, None], np.arange(state.n)
+    # Columns of the image, each here and beside; rows; trials.
+    here = state.image_from + np.arange(image.shape[1])[:, None] + whole
+    to = np.clip(np.stack([here, here + 1], axis=1), 0, window - 1) - first
+    loads = image.transpose(1, 0, 2)[:, None] * np.stack([1.0 - part, part])[:, None]
+    cells = (rows * shape[1] + to[:, :, None]) * state.n + trials
+    moved: Any = np.bincount(cells.ravel(), loads.ravel(), minlength=math.prod(shape))
+    state.image, state.image_from = moved.reshape(shape), first
