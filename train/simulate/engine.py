@@ -224,7 +224,7 @@ def run_physics(
         if images:
             seen.take(k, state)
         if k == 1 and plan.taped:
-            from train.simulate.tape import Recorder
+            from train.simulate.recorder import Recorder
 
             recorder = Recorder(state)
     t = np.arange(frames) / rate_hz

@@ -4,6 +4,7 @@ number here), damp, and slip off the forearm once bent too far, for good."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,9 +119,8 @@ def draw(state: State) -> None:
     loads = (bent * bed.weight * bed.stiffness)[:, None]
     loads = share_out(state.force, loads)[:, 0]
     rows, window = state.skin.rows, state.columns.shape[0]
-    image = np.zeros(rows * window * state.n)
-    for taxel, after, part, load in zip(own.taxel, own.following, own.part, loads, strict=True):
-        image[taxel] += load * (1.0 - part)
-        image[after] += load * part
+    cells = np.stack([own.taxel, own.following], axis=1)
+    parts = np.stack([loads * (1.0 - own.part), loads * own.part], axis=1)
+    image: Any = np.bincount(cells.ravel(), parts.ravel(), minlength=rows * window * state.n)
     state.image = image.reshape(rows, window, state.n)[:, window // 2 - 1 : window // 2 + 2]
     state.image_from = window // 2 - 1
