@@ -249,11 +249,12 @@ def deepest(state: State) -> Array:
 
 def image(state: State) -> None:
     """The force shared out among taxels: (rows, columns, n) newtons, the skin's rows `lines`
-    and the window's columns from `image_from` on; those beside them bear nothing."""
+    and the window's columns from `image_from` on; those beside them bear nothing. Where a column
+    has more springs than one, its first says what it bears."""
     bed = state.bed
     depth = np.broadcast_to(state.line_depth, bed.weight.shape)
     held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
-    some = touching(bed.gaps, held)
+    some = touching(bed.gaps[: len(state.columns)], held)
     loads = spring_loads(depth, bed.gaps[some], bed.stiffness[some], bed.weight)
     state.image = share_out(state.force, loads)
     state.image_from = some.start
