@@ -115,6 +115,11 @@ class Recorder:
         self.free = [slot for slot in self.slots if slot.table is not state.values]
         self._number()
 
+    def _settings(self) -> list[Any]:
+        """Numbers and the like beside the arrays, of which a tape knows nothing."""
+        state = self.state
+        return [getattr(state, "image_from", 0), state.bed.lines]
+
     def _number(self) -> None:
         buffers = [buffer for slot in self.slots for buffer in slot.buffers]
         self.lasting = {id(buffer): buffer for buffer in buffers}
@@ -161,8 +166,11 @@ class Recorder:
                 self.run((function,), 1)
             return
         known = self.tapes.setdefault(functions, [])
+        settings = self._settings()
         while times:
             for tape in known:
+                if tape.settings != settings:
+                    continue
                 done = replay(tape.code, times)
                 if done:
                     for slot in self.away.intersection(tape.changed):
@@ -187,7 +195,7 @@ class Recorder:
         self._number()
         self._load(self.slots, every=True)
         before = [dict(table) for table in tables(self.state)]
-        tape = Tape(self.lasting | self.springs)
+        tape = Tape(self.lasting | self.springs, self._settings())
         begun = {}
         for slot in self.slots:
             begun[slot] = [tape.view(buffer) for buffer in slot.buffers]

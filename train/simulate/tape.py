@@ -142,6 +142,7 @@ class Tape:
 
     Attributes:
         lasting: {id: array} of the state's arrays; only the tape's end writes them.
+        settings: what it was recorded with beside arrays; with other ones it does not hold.
         known: {id: array} of all other arrays with an address on the tape.
         used: ids of those that an operation reads.
         rows: see `replay`; the first `caught_up` of them have been carried out.
@@ -149,6 +150,7 @@ class Tape:
     """
 
     lasting: dict[int, Any]
+    settings: list[Any] = field(default_factory=list)
     known: dict[int, Any] = field(default_factory=dict)
     used: set[int] = field(default_factory=set)
     numbers: dict[tuple[float, int], Array] = field(default_factory=dict)
