@@ -37,7 +37,7 @@ def confusion(context: Context) -> Section:
         [
             "The paper's three features over 1.2 s, unscaled; components and k, 1 to 20 each, by "
             "leave-one-out grid search, the smallest model where several are equal. This score "
-            "chooses the cell that it reports: see below for what that flatters.",
+            "chooses the numbers that it reports: see above by how much that flatters.",
         ],
         [table],
     )

@@ -55,7 +55,7 @@ BY_MEAN = PaperReading(
     "coarse taxels by the sum of their parts",
     'Section III-B represents a frame "as a gray-scale image", and an image is made smaller by '
     "averaging.",
-    "A larger taxel bears the sum of what presses on its parts; the paper does not say how its "
+    "a larger taxel bears the sum of what presses on its parts; the paper does not say how its "
     "coarse skins were made.",
 )
 READINGS = (EACH_TRIAL, BY_MEAN)
