@@ -153,8 +153,8 @@ def table() -> str:
         for quantity, allowed in ALLOWED.items():
             a, b = one[quantity], two[quantity]
             off = f"{100 * (b / a - 1):+.0f} %" if a > 1.0 or quantity != "motion, mm" else "-"
-            told = "-" if math.isnan(right[quantity]) else f"{right[quantity]:.3g}"
-            lines.append(f"{name:16}{quantity:16}{a:>9.3g}{b:>9.3g}{off:>7}{allowed:>7} %{told:>9}")
+            law = "-" if math.isnan(right[quantity]) else f"{right[quantity]:.3g}"
+            lines.append(f"{name:16}{quantity:16}{a:>9.3g}{b:>9.3g}{off:>7}{allowed:>7} %{law:>9}")
             name = ""
     return "\n".join(lines)
 

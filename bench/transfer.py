@@ -127,7 +127,7 @@ def interval(right: int, count: int) -> tuple[float, float]:
 
 def score(model: edge.Model, paths: list[Path]) -> dict[str, list[tuple[str, str]]]:
     """{task: (true, decided) of each trial}; a contact that was never decided counts as wrong."""
-    told: dict[str, list[tuple[str, str]]] = {
+    answers: dict[str, list[tuple[str, str]]] = {
         task: [] for task in TASKS if task in model.info.tasks
     }
     for path in paths:
@@ -136,9 +136,9 @@ def score(model: edge.Model, paths: list[Path]) -> dict[str, list[tuple[str, str
         for event in edge.Classifier(model).classify(recording):
             if isinstance(event, edge.Decided) and event.task not in decided:
                 decided[event.task] = str(event.label)
-        for task, pairs in told.items():
+        for task, pairs in answers.items():
             pairs.append((recording.labels[task], decided.get(task, "no decision")))
-    return told
+    return answers
 
 
 def unknown(model: edge.Model, paths: list[Path]) -> list[str]:
@@ -161,17 +161,17 @@ def unknown(model: edge.Model, paths: list[Path]) -> list[str]:
     return lines
 
 
-def report(told: dict[str, list[tuple[str, str]]]) -> str:
+def report(answers: dict[str, list[tuple[str, str]]]) -> str:
     """Accuracies with intervals, and the confusion of categories."""
     lines = []
-    for task, pairs in told.items():
+    for task, pairs in answers.items():
         right = sum(a == b for a, b in pairs)
         low, high = interval(right, len(pairs))
         lines.append(
             f"{task:<10}{100 * right / len(pairs):6.1f} %  ({100 * low:.0f} to {100 * high:.0f}, "
             f"{len(pairs)} trials)"
         )
-    for task, pairs in told.items():
+    for task, pairs in answers.items():
         seen = Counter(pairs)
         names = sorted({name for pair in pairs for name in pair})
         lines += ["", f"{task}: true in rows, decided in columns"]
@@ -224,19 +224,21 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--trials", type=int, default=120)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--ours", type=Path, help="folder of simulated trials to draw beside")
-    told = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     try:
-        paths, again = make_trials(told.out / f"seed{told.seed}", told.trials, told.seed)
-        model = edge.Model(told.model)
+        paths, again = make_trials(
+            options.out / f"seed{options.seed}", options.trials, options.seed
+        )
+        model = edge.Model(options.model)
         text = "\n".join([report(score(model, paths)), "", *unknown(model, paths)])
     except InputError as error:
         print(f"transfer: {error}", file=sys.stderr)
         return 2
     text += f"\n\n{again} objects were drawn again: called movable, and did not move"
     print(text)
-    (told.out / "transfer.txt").write_text(text + "\n")
-    if told.ours is not None:
-        draw_curves(sorted(told.ours.glob("*.npz")), paths, told.out / "curves.png")
+    (options.out / "transfer.txt").write_text(text + "\n")
+    if options.ours is not None:
+        draw_curves(sorted(options.ours.glob("*.npz")), paths, options.out / "curves.png")
     return 0
 
 
