@@ -16,11 +16,14 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from joblib import Parallel, delayed
+from tqdm import tqdm
 
 import edge
 from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Touched, simulate
 from edge.errors import InputError
 from edge.recording import load, save
+from train.crossval import jobs_here
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
@@ -84,37 +87,37 @@ def make_trials(folder: Path, count: int, seed: int) -> tuple[list[Path], int]:
     Raises:
         InputError: no object could be drawn that moves.
     """
-    from tqdm import tqdm
-
     folder.mkdir(parents=True, exist_ok=True)
-    paths, again = [], 0
-    progress = tqdm(total=count, unit="trial", file=sys.stderr, desc="MuJoCo")
-    for first in range(0, count, EACH):
-        index, numbers = first // EACH, range(first, min(first + EACH, count))
-        found = sorted(folder.glob(f"*-{index:02d}-*.npz"))
-        for attempt in range(DRAWS):
-            if len(found) == len(numbers):
+    objects = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
+    work = (delayed(_touch_object)(folder, i, numbers, seed) for i, numbers in enumerate(objects))
+    done = Parallel(n_jobs=jobs_here(), return_as="generator")(work)
+    bar = tqdm(done, total=len(objects), unit=" objects", desc="MuJoCo")
+    parts = list(bar)
+    return [path for paths, _ in parts for path in paths], sum(again for _, again in parts)
+
+
+def _touch_object(folder: Path, index: int, numbers: range, seed: int) -> tuple[list[Path], int]:
+    """The trials of one object, but for those that an earlier run has made."""
+    found = sorted(folder.glob(f"*-{index:02d}-*.npz"))
+    if len(found) == len(numbers):
+        return found, 0
+    for attempt in range(DRAWS):
+        thing = draw_object(streams.stream(seed, f"object.{attempt}", "transfer", index))
+        done: list[tuple[Path, Touched]] = []
+        for number in sorted(numbers, key=lambda n: n % 2 == 0):
+            rng = streams.stream(seed, f"trial.{attempt}", "transfer", number)
+            touched = simulate(draw_touch(thing, number % 2 == 0, rng))
+            if number % 2 == 1 and moved(touched) < SLIDES_M:
                 break
-            thing = draw_object(streams.stream(seed, f"object.{attempt}", "transfer", index))
-            done: list[tuple[str, Touched]] = []
-            for number in sorted(numbers, key=lambda n: n % 2 == 0):
-                rng = streams.stream(seed, f"trial.{attempt}", "transfer", number)
-                touched = simulate(draw_touch(thing, number % 2 == 0, rng))
-                if number % 2 == 1 and moved(touched) < SLIDES_M:
-                    break
-                condition = touched.recording.labels["mobility"]
-                done.append((f"{thing.kind}-{index:02d}-{condition}-{number:03d}.npz", touched))
-            else:
-                for name, touched in done:
-                    save(folder / name, touched.recording)
-                found = [folder / name for name, _ in done]
-                again += attempt
+            condition = touched.recording.labels["mobility"]
+            done.append(
+                (folder / f"{thing.kind}-{index:02d}-{condition}-{number:03d}.npz", touched)
+            )
         else:
-            raise InputError(f"transfer: object {index} was drawn {DRAWS} times and never moved")
-        paths += found
-        progress.update(len(found))
-    progress.close()
-    return paths, again
+            for path, touched in done:
+                save(path, touched.recording)
+            return [path for path, _ in done], attempt
+    raise InputError(f"transfer: object {index} was drawn {DRAWS} times and never moved")
 
 
 def interval(right: int, count: int) -> tuple[float, float]:
