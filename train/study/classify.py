@@ -29,7 +29,7 @@ def confusion(context: Context) -> Section:
     found = grid_search(context.vectors(), context.labels)
     table = Table(
         "classification",
-        "Best cell of the grid, a task a row",
+        "The best numbers of components and neighbours, a task a row",
         ("task", "classes", "trials", *SCORE),
     )
     section = Section(

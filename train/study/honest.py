@@ -76,15 +76,15 @@ def section(context: Context) -> Section:
     plain = grid_search(X, y)
     inside = nested(context, X, "none", FEATURES, "nested")
     table = Table("honest", "How the score is taken", ("task", "how", *SCORE))
-    bars: dict[str, dict[str, Result]] = {"leave-one-out, best cell": plain, "nested": inside}
+    bars: dict[str, dict[str, Result]] = {"leave-one-out, best of the grid": plain, "nested": inside}
     if GROUP_TASK in y and len(y) > 1:
         bars["objects not met before"] = unseen_objects(context, X, "none")
     bars["majority"] = {task: majority(labels) for task, labels in y.items()}
     for how, results in bars.items():
         table.rows += [(task, how, *score(r)) for task, r in results.items()]
     text = [
-        f"Nested: for each of {FOLDS} folds the cell is chosen on the others, by fits that see "
-        "neither the fold nor the trials that they are tested on. What the plain search flatters: "
+        f"Nested: for each of {FOLDS} folds components and k are chosen on the others, by fits "
+        "that see neither the fold nor what they are tested on. What the plain search flatters: "
         + ", ".join(
             f"{task} {100 * (plain[task].accuracy - inside[task].accuracy):+.1f} points"
             for task in y

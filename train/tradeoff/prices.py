@@ -104,7 +104,7 @@ def section(prices: Prices, dataset: DataSet, task: str) -> Section:
     columns = ("training rows", "components", "k", "operators", "decision us", "model kB")
     learning = Table(
         "trials",
-        f"More training trials, {task}: leave-one-out among so many, best cell",
+        f"More training trials, {task}: leave-one-out among so many, best of the grid",
         ("trials", "accuracy %", "from %", "to %", "components", "k"),
     )
     folds = stratified_folds(y, PARTS)
