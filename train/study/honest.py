@@ -76,7 +76,8 @@ def section(context: Context) -> Section:
     plain = grid_search(X, y)
     inside = nested(context, X, "none", FEATURES, "nested")
     table = Table("honest", "How the score is taken", ("task", "how", *SCORE))
-    bars: dict[str, dict[str, Result]] = {"leave-one-out, best of the grid": plain, "nested": inside}
+    best = "leave-one-out, best of the grid"
+    bars: dict[str, dict[str, Result]] = {best: plain, "nested": inside}
     if GROUP_TASK in y and len(y) > 1:
         bars["objects not met before"] = unseen_objects(context, X, "none")
     bars["majority"] = {task: majority(labels) for task, labels in y.items()}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, MAX_K, accuracies, neighbours, split_neighbours
 from train.evaluate import Labels, Result
 from train.pipeline import vote
@@ -28,9 +29,16 @@ def said_by(
     return np.asarray(classes[winners])
 
 
-def grid_search(X: NDArray[np.float64], y: Labels) -> dict[str, Result]:
+def grid_search(
+    X: NDArray[np.float64],
+    y: Labels,
+    scaling: str = "none",
+    features: Sequence[str] = FEATURES,
+) -> dict[str, Result]:
     """Each task's best leave-one-out accuracy over 1 to 20 components and k (section IV-A)."""
-    rows = neighbours(X, max_components=min(MAX_COMPONENTS, len(X) - 1))
+    rows = neighbours(
+        X, scaling=scaling, features=features, max_components=min(MAX_COMPONENTS, len(X) - 1)
+    )
     found: dict[str, Result] = {}
     for task, labels in y.items():
         c, j = best_cell(accuracies(rows, labels))
