@@ -232,6 +232,11 @@ def scenes() -> list[bytes]:
     return [path.read_bytes() for path in sorted((ROOT / "train" / "scenes").glob("*.toml"))]
 
 
+def beside_a_scene(path: Path) -> None:
+    """The scene that another is like."""
+    shutil.copy(ROOT / "train" / "scenes" / "cody18.toml", path.parent)
+
+
 def read_scene(path: Path) -> None:
     """Check it, and say what it calls for."""
     from train.simulate.scene import load
@@ -424,7 +429,7 @@ READERS = (
     Reader("arm", ".toml", arms, mutate.of_text, read_arm),
     Reader("urdf", ".urdf", lambda: [URDF], mutate.of_text, read_urdf),
     Reader("map", ".jsonl", maps, mutate.of_text, read_map),
-    Reader("scene", ".toml", scenes, mutate.of_text, read_scene),
+    Reader("scene", ".toml", scenes, mutate.of_text, read_scene, beside_a_scene),
     Reader("board", ".json", boards, mutate.of_text, read_board),
     Reader("prices", ".json", prices, mutate.of_text, read_prices),
     Reader("front", ".json", fronts, mutate.of_text, read_front),
