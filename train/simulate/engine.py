@@ -219,6 +219,8 @@ def run_physics(
             recorder.run(sample, 1)
         joints[k] = state.q
         force[k] = state.force
+        if k == 1:
+            check_start(scene, state, force[k])
         for name, quantity in plan.traces.items():
             traces[name][k] = quantity(state)
         if images:
@@ -228,7 +230,6 @@ def run_physics(
 
             recorder = Recorder(state)
     t = np.arange(frames) / rate_hz
-    check_start(scene, state, force[1])
     check_energy(scene, state, joints, t)
     return PhysicsRun(
         frames=seen,
