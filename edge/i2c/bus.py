@@ -119,7 +119,7 @@ RESPONSES: dict[int, Response] = {
     errno.EPERM: _DENIED,
     errno.ENODEV: _GONE,
 }
-"""errno to response (notes on real adapters). An errno that is not here is treated as EIO."""
+"""errno to response, as adapters of the kernel give it. One that is not here counts as EIO."""
 
 
 def response(code: int | None) -> Response:

@@ -99,7 +99,7 @@ def closed_form(slopes: Array, intercepts: Array, y: Coordinates, c: Coordinates
     """The force F = phi(y - c F) of a bed with this law: exact, without iteration, and never
     negative.
 
-    F = max(0, max_s (K_s y - B_s) / (1 + c K_s)), the closed form of the notes on physics:
+    F = max(0, max_s (K_s y - B_s) / (1 + c K_s)), in closed form:
     along each line of phi the equation is linear, and of the lines the largest answer holds.
     """
     force = slopes * y[0]

@@ -112,8 +112,8 @@ FAMILY_KEYS: dict[str, dict[str, float]] = {
         "stem_kg": 0.02,
     },
 }
-"""Keys that belong to one family alone, with what they are where the object is silent (the
-middle of the ranges in the notes on physics, derived there)."""
+"""Keys that belong to one family alone, with what they are where the object is silent: a
+middling thing of the family."""
 
 THICKNESS = {FOAM: "depth_m", PILLOW: "depth_m", BUBBLES: "bubble_m", FOLIAGE: "stem_slip_m"}
 """How far each soft family could yield."""

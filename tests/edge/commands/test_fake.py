@@ -1,6 +1,5 @@
 """`edge-classify fake`: a skin of any size is rehearsed without hardware."""
 
-import json
 import shutil
 
 import pytest
@@ -12,25 +11,25 @@ from edge.skin import file as skinfile
 
 
 @pytest.mark.parametrize("name", ["mpr121", "matrix"])
-def test_the_whole_loop_without_hardware(name, tmp_path, monkeypatch, capsys):
+def test_the_whole_loop_without_hardware(name, edge, tmp_path, monkeypatch, capsys):
     from export.__main__ import main as export
 
     monkeypatch.chdir(tmp_path)
     shutil.copy(skinfile.shipped(name), "my.toml")
 
-    def run(*words):
-        status = main(list(words))
-        return status, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-
-    status, (made,) = run("fake", "--skin", "my.toml", "--out", "f", "--trials", "4")
+    status, (made,), _ = edge("fake", "--skin", "my.toml", "--out", "f", "--trials", "4")
     assert (status, made["trials"]) == (0, 16)
-    assert run("calibrate", "--skin", "my.toml", "--fake", "f/still.npz", "--frames", "50")[0] == 0
+    assert edge("calibrate", "--skin", "my.toml", "--fake", "f/still.npz", "--frames", "50")[0] == 0
     first = "f/touches/cardboard-box-fixed-000.npz"
-    status, (saved,) = run("record", "--skin", "my.toml", "--fake", first, "--label", "object=box")
+    status, (saved,), _ = edge(
+        "record", "--skin", "my.toml", "--fake", first, "--label", "object=box"
+    )
     assert (status, saved["missing_taxels"]) == (0, False)
     assert export(["--data", "f/touches", "--out", "build", "--jobs", "1"]) == 0
     capsys.readouterr()
-    status, events = run("run", "--model", "build/model.onnx", "--skin", "my.toml", "--fake", first)
+    status, events, _ = edge(
+        "run", "--model", "build/model.onnx", "--skin", "my.toml", "--fake", first
+    )
     said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
     assert status == 0
     assert said["category"] == "rigid-fixed"

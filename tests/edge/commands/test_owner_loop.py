@@ -1,12 +1,10 @@
 """A robot owner's loop, over the fake: calibrate, record, export, run. No line of code."""
 
-import json
 import shutil
 
 import pytest
 
 from edge import recording
-from edge.cli import main
 from edge.recording import load
 from edge.skin import file as skinfile
 
@@ -22,27 +20,24 @@ def skin(tmp_path, forearm):
     return path
 
 
-def test_record_export_run(skin, recordings, tmp_path, capsys):
+def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     from export.__main__ import main as export
-
-    def run(*arguments):
-        status = main([str(a) for a in arguments])
-        out = capsys.readouterr().out
-        return status, [json.loads(line) for line in out.splitlines()]
 
     first = load(recordings / "hard_0.npz")
     rest = recording.Recording(first.t[:20], first.frames[:20], meta={})
     recording.save(tmp_path / "rest.npz", rest)
-    assert run("check", skin)[0] == 0
-    assert run("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
-    assert run("calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)[0] == 0
+    assert edge("check", skin)[0] == 0
+    assert edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
+    assert (
+        edge("calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)[0] == 0
+    )
 
     trials = tmp_path / "trials"
     shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(3)]
     for name in shown:
         labels = load(recordings / f"{name}.npz").labels
         given = [part for task in labels for part in ("--label", f"{task}={labels[task]}")]
-        status, (event,) = run("record", "--skin", skin, "--fake", recordings / f"{name}.npz",
+        status, (event,), _ = edge("record", "--skin", skin, "--fake", recordings / f"{name}.npz",
                                "--out", trials, "--length", 1.3, *given)  # fmt: skip
         assert (status, event["complete"]) == (0, True)
     assert len(list(trials.iterdir())) == len(shown)
@@ -55,7 +50,7 @@ def test_record_export_run(skin, recordings, tmp_path, capsys):
     board.mkdir()
     shutil.copy(tmp_path / "build" / "model.onnx", board)
     for name in ("hard_1", "soft_2"):
-        status, events = run("run", "--model", board / "model.onnx", "--skin", skin,
+        status, events, _ = edge("run", "--model", board / "model.onnx", "--skin", skin,
                              "--fake", recordings / f"{name}.npz")  # fmt: skip
         said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
         assert status == 0

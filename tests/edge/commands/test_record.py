@@ -1,15 +1,25 @@
 """Trials as `record` saves them: safe names, two recorders in one folder, angles where known."""
 
 import io
+import os
+import signal
+import subprocess
+import sys
 import threading
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 
-from edge.commands.record import Recorder, recording, trial_path
-from edge.recording import load, save
+from edge.commands.record import Recorder, Trials, recording, trial_path
+from edge.recording import Recording, load, save
 from edge.runtime.event_writer import Lines
 from edge.touch.frame import Frame
+
+ROOT = Path(__file__).parents[3]
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
@@ -76,3 +86,144 @@ def test_a_frame_without_a_pose_keeps_the_angles_of_the_others(tmp_path):
 
 def test_frames_of_which_none_has_a_pose_have_no_angles():
     assert recording(frames(None, None, None), {}).joints is None
+
+
+def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
+    source = load(recordings / "soft_1.npz")
+    out = tmp_path / "trials"
+    status, (event,), _ = edge("record", "--fake", recordings / "soft_1.npz", "--out", out,
+                               "--label", "object=foam", "--label", "category=soft-fixed",
+                               "--lead", 0.1, "--length", 1.3)  # fmt: skip
+    assert (status, event["complete"], event["joints"]) == (0, True, True)
+    trial = load(event["file"])
+    assert trial.labels == {"object": "foam", "category": "soft-fixed"}
+    assert Path(event["file"]).name == "foam-soft-fixed-001.npz"
+    # Onset is at frame 20: ten frames of lead-in, and 130 from onset on, the last included.
+    np.testing.assert_array_equal(trial.frames, source.frames[10:151])
+    np.testing.assert_array_equal(trial.joints, source.joints[10:151])
+    np.testing.assert_allclose(trial.t, np.arange(141) * 0.01, atol=1e-9)
+    assert trial.layout == source.layout
+    assert trial.valid is None
+
+
+def test_record_keeps_the_names_of_a_recordings_joints(edge, recordings, tmp_path):
+    source = load(recordings / "soft_1.npz")
+    names = [f"joint {i}" for i in range(source.joints.shape[1])]
+    path = tmp_path / "named.npz"
+    save(path, replace(source, meta={**source.meta, "joint_names": names}))
+    _, (event,), _ = edge("record", "--fake", path, "--label", "object=foam", "--out", tmp_path)
+    assert load(event["file"]).joint_names == tuple(names)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
+    edge, recordings, tmp_path, monkeypatch, number
+):
+    push, pushed = Trials.push, []
+
+    def interrupted(trials, frame):
+        pushed.append(frame)
+        if len(pushed) == 61:
+            signal.raise_signal(number)
+        return push(trials, frame)
+
+    monkeypatch.setattr(Trials, "push", interrupted)
+    status, (event,), _ = edge("record", "--fake", recordings / "soft_1.npz", "--label",
+                               "object=foam", "--out", tmp_path, "--lead", 0.1)  # fmt: skip
+    assert (status, event["complete"], len(pushed)) == (0, False, 61)
+    # Onset is at frame 20.
+    source = load(recordings / "soft_1.npz").frames
+    np.testing.assert_array_equal(load(event["file"]).frames, source[10:61])
+
+
+def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
+    out, (reading, writing) = tmp_path / "trials", os.pipe()
+    os.set_blocking(writing, False)
+    for size in (4096, 1):
+        with suppress(BlockingIOError):
+            while True:
+                os.write(writing, b"x" * size)
+    os.set_blocking(writing, True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "edge.cli", "record", "--fake", str(parted),
+         "--loop", "--label", "object=a", "--out", str(out)],
+        cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while len(list(out.glob("a-*.npz"))) < 3:
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    os.close(reading)
+    os.close(writing)
+    assert process.returncode == 0
+    assert "lines could not be sent to stdout: nobody reads them" in err
+
+
+def test_record_saves_one_trial_a_contact_and_never_overwrites(edge, parted, tmp_path):
+    arguments = ("record", "--fake", parted, "--loop", "--label", "object=a b/c",
+                 "--out", tmp_path / "t", "--length", 1.2, "--trials")  # fmt: skip
+    assert len(edge(*arguments, 2)[1]) == 2
+    assert len(edge(*arguments, 1)[1]) == 1
+    names = sorted(p.name for p in (tmp_path / "t").iterdir())
+    assert names == ["a_b_c-001.npz", "a_b_c-002.npz", "a_b_c-003.npz"]
+
+
+def test_record_refuses_a_file_that_exists_before_it_waits(edge, recordings, tmp_path):
+    path = tmp_path / "one.npz"
+    arguments = (
+        "record",
+        "--fake",
+        recordings / "hard_1.npz",
+        "--label",
+        "object=a",
+        "--out",
+        path,
+    )
+    assert edge(*arguments)[0] == 0
+    kept = path.read_bytes()
+    status, _, err = edge(*arguments)
+    assert status == 2
+    assert f"{path}: exists already" in err
+    assert path.read_bytes() == kept
+
+
+def test_record_without_contact_saves_nothing(edge, quiet, tmp_path):
+    status, events, err = edge("record", "--fake", quiet, "--label", "object=a", "--out",
+                               tmp_path / "t")  # fmt: skip
+    assert (status, events) == (1, [])
+    assert "there was no contact, so nothing was saved" in err
+    assert not list((tmp_path / "t").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ([], "give --label TASK=LABEL"),
+        (["--label", "a=b", "--label", "a=c"], "--label names a task twice"),
+        (["--label", "a=b", "--length", "0"], "--length 0.1 to 600"),
+        (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
+    ],
+)
+def test_record_says_what_it_needs(edge, quiet, options, said):
+    status, _, err = edge("record", "--fake", quiet, *options)
+    assert status == 2
+    assert said in err
+
+
+def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(edge, recordings, tmp_path):
+    status, (event,), _ = edge("record", "--fake", recordings / "hard_0.npz", "--label", "o=a",
+                               "--out", tmp_path, "--seconds", 1.0)  # fmt: skip
+    assert (status, event["complete"], event["seconds"]) == (0, False, 0.99)
+
+
+def test_two_contacts_are_two_trials(edge, make_touch, tmp_path):
+    one = make_touch(seconds=0.5, arm=False)
+    gap = np.zeros((50, 16, 24), dtype=np.uint16)
+    frames = np.concatenate([one.frames, gap, one.frames, gap])
+    both = Recording(np.arange(len(frames)) / 100.0, frames, meta=one.meta)
+    save(tmp_path / "two.npz", both)
+    events = edge("record", "--fake", tmp_path / "two.npz", "--label", "object=a", "--out",
+                  tmp_path / "t")[1]  # fmt: skip
+    # 20 frames of lead-in, 50 of contact, 30 that show its end.
+    assert [(e["frames"], e["complete"]) for e in events] == [(100, True)] * 2

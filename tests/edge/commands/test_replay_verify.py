@@ -1,6 +1,5 @@
 """`edge-classify replay` and `verify`, as a user runs them."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -15,18 +14,9 @@ from edge.commands.summary import Summary
 ROOT = Path(__file__).parents[3]
 
 
-def lines(text):
-    return [json.loads(line) for line in text.splitlines()]
-
-
 @pytest.fixture
-def replay(exported, capsys):
-    def run(*arguments):
-        status = main(["replay", "--model", str(exported / "model.onnx"), *map(str, arguments)])
-        out = capsys.readouterr()
-        return status, lines(out.out), out.err
-
-    return run
+def replay(exported, edge):
+    return lambda *arguments: edge("replay", "--model", exported / "model.onnx", *arguments)
 
 
 def test_a_folder_is_replayed_and_summed_up(replay, recordings):
@@ -78,10 +68,9 @@ def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, 
     assert err.count("\n") == 1
 
 
-def verify(exported, golden, capsys):
-    status = main(["verify", "--model", str(exported / "model.onnx"), "--golden", str(golden)])
-    out = capsys.readouterr()
-    return status, lines(out.out), out.err
+@pytest.fixture
+def verify(exported, edge):
+    return lambda golden: edge("verify", "--model", exported / "model.onnx", "--golden", golden)
 
 
 @pytest.mark.parametrize("given", ["--model", "--golden"])
@@ -91,8 +80,8 @@ def test_both_of_a_models_files_are_asked_for(given, exported, capsys):
     assert "the following arguments are required: --" in capsys.readouterr().err
 
 
-def test_the_golden_file_is_met(exported, capsys):
-    status, checks, err = verify(exported, exported / "golden.npz", capsys)
+def test_the_golden_file_is_met(verify, exported):
+    status, checks, err = verify(exported / "golden.npz")
     assert status == 0
     assert [c["name"] for c in checks] == [
         "series length",
@@ -118,37 +107,37 @@ def test_the_golden_file_is_met(exported, capsys):
         ("onset_s", 1, 1e-6, "onset differs, worst in row 1"),
     ],
 )
-def test_a_difference_names_the_worst_row(exported, capsys, tmp_path, key, row, change, said):
+def test_a_difference_names_the_worst_row(verify, exported, tmp_path, key, row, change, said):
     arrays = dict(np.load(exported / "golden.npz"))
     arrays[key] = arrays[key].copy()
     value = arrays[key][row]
     arrays[key][row] = value + np.array(change).astype(value.dtype)
     np.savez(tmp_path / "golden.npz", **arrays)
-    status, checks, err = verify(exported, tmp_path / "golden.npz", capsys)
+    status, checks, err = verify(tmp_path / "golden.npz")
     assert status == 1
     assert said in err
     assert not all(c["passed"] for c in checks)
 
 
-def test_a_difference_within_the_bound_passes(exported, capsys, tmp_path):
+def test_a_difference_within_the_bound_passes(verify, exported, tmp_path):
     arrays = dict(np.load(exported / "golden.npz"))
     arrays["object_distances"] = arrays["object_distances"] * (1 + 1e-13)
     np.savez(tmp_path / "golden.npz", **arrays)
-    assert verify(exported, tmp_path / "golden.npz", capsys)[0] == 0
+    assert verify(tmp_path / "golden.npz")[0] == 0
 
 
-def test_a_damaged_golden_file_is_one_sentence(exported, capsys, tmp_path):
+def test_a_damaged_golden_file_is_one_sentence(verify, exported, tmp_path):
     path = tmp_path / "golden.npz"
     arrays = dict(np.load(exported / "golden.npz"))
     for key in ("start", "vectors", "meta", "object_label", "series_counts"):
         np.savez(path, **{k: v for k, v in arrays.items() if k != key})
-        status, _, err = verify(exported, path, capsys)
+        status, _, err = verify(path)
         assert (status, err.count("\n")) == (2, 1), key
         assert str(path) in err
     np.savez(path, **{**arrays, "vectors": arrays["vectors"][:, :50]})
-    assert "50,) long" in verify(exported, path, capsys)[2]
+    assert "50,) long" in verify(path)[2]
     shutil.copy(exported / "model.onnx", path)
-    assert verify(exported, path, capsys)[0] == 2
+    assert verify(path)[0] == 2
 
 
 def test_the_command_line_itself(exported, recordings):

@@ -22,7 +22,7 @@ PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 
 
 def on_buses(n, *, kind="ad7147", verify=False, recheck=100_000):
-    """The 32 chips of Cody's skin shared out over n buses, as the notes count them."""
+    """The 32 chips of Cody's skin shared out over n buses."""
     base = 0x5A if kind == "mpr121" else 0x2C
     channels = [CODY.chips[4 * i : 4 * i + 4] for i in range(8)]
     share = [channels[i::n] for i in range(n)]
