@@ -179,8 +179,8 @@ def fit(
     sequential = None
     if points:
         without = without_folds(trials, measured, samples, chosen)
-        every = [choice for by_task in (choices, *without) for choice in by_task.values()]
-        seen = measured.of([name for choice in every for name in choice.features])
+        used = [choice for by_task in (choices, *without) for choice in by_task.values()]
+        seen = measured.of([name for choice in used for name in choice.features])
         at_points = np.stack([seen.features(s, samples) for s in points])
         sequential = SequentialClassifier(
             choices, points, seen.names, jobs=jobs, widths=seen.widths(samples)
