@@ -62,6 +62,12 @@ def _numbers(path: str | os.PathLike[str], text: str, what: str, count: int) -> 
 def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:
     name = str(element.get("name"))
     kind = str(element.get("type"))
+    mimic = element.find("mimic")
+    if mimic is not None and kind != "fixed":
+        raise InputError(
+            f"{path}: joint {name!r} follows joint {mimic.get('joint')!r} (<mimic>) and "
+            "has no angle of its own; choose another base or tip, or make it fixed"
+        )
     joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}
     for tag, keys in (
         ("axis", {"xyz": "axis"}),

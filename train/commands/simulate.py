@@ -73,4 +73,10 @@ def run(arguments: argparse.Namespace) -> int:
                 f"{written.redrawn} of them were drawn again until they did as their labels say",
                 file=sys.stderr,
             )
+        for key, error in written.rough.items():
+            print(
+                f"{key} and its like: no step is within trials.tolerance; the one taken errs by "
+                f"{100.0 * error:.2g} % of the peak force (--explain tells more)",
+                file=sys.stderr,
+            )
     return 0

@@ -43,7 +43,9 @@ class Kinematics:
         pending: tuple[Array | None, Array | None] = (None, None)
         for joint in chain.joints:
             if joint.kind == "prismatic":
-                raise InputError(f"joint {joint.name} slides; the simulator's arms only turn")
+                raise InputError(
+                    f"joint {joint.name!r} slides; the simulator's arms only turn: make it fixed"
+                )
             before = _joined(pending, _fixed(joint.origin_xyz, joint.origin_rpy))
             after = _fixed(joint.translate, (0.0, 0.0, 0.0))
             if joint.kind == "fixed":

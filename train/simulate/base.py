@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate.arm import cross, dot
 from train.simulate.contact import (
@@ -92,6 +93,10 @@ def swing(state: State) -> None:
     state.t = 0.0
 
 
+STILL_M_S = 1e-6
+"""What moves more slowly does not move."""
+
+
 def place(state: State) -> None:
     """Put the object where the sweep meets it after the lead."""
     p, skin = state.values, state.skin
@@ -106,6 +111,11 @@ def place(state: State) -> None:
     speed = dot(np.moveaxis(arms, 1, 0), rate)
     speed = speed - along * dot(speed, along)
     size = np.sqrt(dot(speed, speed))
+    if not (size > STILL_M_S).all():
+        raise InputError(
+            f"{state.scene.name}: motion.rate_deg_s does not move the forearm where it is to meet "
+            "an object (motion.place_m); let a joint turn that carries it"
+        )
     state.approach = size
     normal = speed / size
     yaw = np.radians(p["yaw_deg"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -69,7 +69,8 @@ def middle_values(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Arra
 def physics(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> Batch:
     """The middle trials' forces and joints at a step."""
     kind = kind_of(scene, trials[0].object, trials[0].condition)
-    plan = make_plan(scene, kind.effects)
+    # So many steps are worth a tape, whatever the effects.
+    plan = replace(make_plan(scene, kind.effects), taped=True)
     values = middle_values(scene, trials)
     return run_batch(scene, trials, step_s, plan=plan, values=values, images=False)
 
@@ -135,8 +136,3 @@ def _shows_swings(scene: Scene, trials: tuple[TrialSpec, ...]) -> float:
     state = begin(scene, plan, trials, 1.0, values)
     stiffest = state.bed.slopes.max(axis=0)
     return OF_A_SWING * float(np.sqrt(values["mass_kg"] / stiffest).min())
-
-
-def choose_step(scene: Scene, trials: tuple[TrialSpec, ...]) -> Convergence:
-    """The step of one kind of trials, from a measured convergence."""
-    return measure(scene, trials)

@@ -196,6 +196,7 @@ def run_physics(
     substeps = max(1, round(1.0 / (rate_hz * step_s)))
     step_s = 1.0 / (rate_hz * substeps)
     state = begin(scene, plan, trials, step_s, values)
+    check_start(state, plan)
     n, dof = len(trials), len(scene.stiffness)
     joints = np.empty((frames, dof, n))
     force = np.zeros((frames, n))
@@ -219,8 +220,6 @@ def run_physics(
             recorder.run(sample, 1)
         joints[k] = state.q
         force[k] = state.force
-        if k == 1:
-            check_start(scene, state, force[k])
         for name, quantity in plan.traces.items():
             traces[name][k] = quantity(state)
         if images:
@@ -245,17 +244,22 @@ ENERGY_MADE = 0.05
 """Share of the work put in that the arm may hold beyond it: what sampling at frames leaves open."""
 
 
-def check_start(scene: Scene, state: State, force: Array) -> None:
-    """Refuse a batch in which an object bears force (n,) before the arm has moved.
+def check_start(state: State, plan: Plan) -> None:
+    """Refuse a batch in which an object bears force before the arm has moved.
 
     Raises:
-        InputError: names the first such object.
+        InputError: names the first such trial, and by how much its face is turned.
     """
-    if (force > 0.0).any():
-        item = state.trials[int(np.argmax(force > 0.0))].object
+    for function in plan.frame:
+        function(state)
+    held = state.solve(state, state.y_frame, tuple(np.zeros_like(c) for c in state.compliance))
+    if (held[0] > 0.0).any():
+        i = int(np.argmax(held[0] > 0.0))
+        trial, yaw = state.trials[i], abs(state.values["yaw_deg"][i])
         raise InputError(
-            f"{scene.name}: object {item.name!r} touches the arm before it moves; give "
-            "trials.lead_s more time, or spread.yaw_deg or the object's width_m less"
+            f"{state.scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
+            f"trial {trial.number} of {trial.key}, where the face is turned by {yaw:.0f} degrees; "
+            "give spread.yaw_deg or the object's width_m less, or trials.lead_s more time"
         )
 
 

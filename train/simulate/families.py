@@ -12,7 +12,15 @@ from edge.touch.layout import SkinLayout
 from train.simulate import streams
 from train.simulate.motion import GRAVITY
 from train.simulate.reader import SceneTable
-from train.simulate.schema import CONDITIONS, LABELS, OBJECT, Field
+from train.simulate.schema import (
+    CONDITIONS,
+    FAMILIES,
+    FAMILY_KEYS,
+    LABELS,
+    OBJECT,
+    Field,
+    keys_of,
+)
 
 PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
 WHOLE = ("stem_count",)
@@ -33,14 +41,18 @@ def draw_family(
         InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
     """
     name = table.text("name")
+    family = table.choice("family", FAMILIES)
+    conditions = table.names("conditions", CONDITIONS)
     count = table.whole("count", allowed=range(1, 1001))
-    # In the file's order: the draws follow it.
-    ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in OBJECT}
     part = table.value("kinetic_part", PART, [0.8, 0.95])
     push_n = table.field("push_n", LABELS["push_n"], push_n)
-    movable = "movable" in table.names("conditions", CONDITIONS)
-    own = (*OBJECT, "count", "kinetic_part", "push_n", "name")
-    others = {key: value for key, value in table.raw.items() if key not in own}
+    given = [key for key in keys_of(family) if key != "friction_kinetic" and table.has(key)]
+    table.done()
+    # In the file's order: the draws follow it.
+    ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in given}
+    movable = "movable" in conditions
+    shared = {"family": family, "conditions": list(conditions)}
+    usual = FAMILY_KEYS[family]
     generator = streams.stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
@@ -52,13 +64,13 @@ def draw_family(
             hold = floor * drawn.get("mass_kg", 0.0) * GRAVITY
             # The skin may press down what it pushes, as far as it holds on to it.
             level = 1.0 - floor * drawn.get("skin_friction", 0.0)
-            if not movable or hold <= level * min(push_n, passed_on(drawn, skin)):
+            if not movable or hold <= level * min(push_n, passed_on({**usual, **drawn}, skin)):
                 break
         else:
             wanted = f"such that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", wanted)
         whole = {k: round(drawn[k]) for k in WHOLE if k in drawn}
-        yield {**others, "name": f"{name} {number + 1:02d}", **drawn, **whole}
+        yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **whole}
 
 
 PRESSED_M = 0.06

@@ -15,8 +15,8 @@ from edge.errors import InputError
 from edge.recording import Recording
 from train.cluster import on_cluster
 from train.simulate.assemble import make_plan
-from train.simulate.convergence import choose_step
-from train.simulate.engine import Batch, Kind, kind_of, read_out
+from train.simulate.convergence import Convergence, measure
+from train.simulate.engine import Batch, Kind, begin, check_start, kind_of, read_out, values_of
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SOFT_FAMILIES
 from train.simulate.truth import true_runs
@@ -37,10 +37,18 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Written:
-    """What `write` has done: the files, and how many of the trials were drawn again."""
+    """What `write` has done.
+
+    Attributes:
+        paths: the files.
+        redrawn: how many of the trials were drawn again.
+        rough: {a kind's first trials: what its step costs, as a part of the peak force} where
+            that is measured and no step is within the scene's tolerance.
+    """
 
     paths: list[Path]
     redrawn: int
+    rough: dict[str, float]
 
 
 def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
@@ -53,11 +61,28 @@ def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
     return out
 
 
-def steps(scene: Scene) -> dict[Kind, float]:
+def measured(scene: Scene) -> dict[Kind, Convergence]:
+    """What halving the step does to each kind of trials; empty where the scene gives its steps.
+
+    Raises:
+        InputError: an object touches the arm from the start: told before anything takes long.
+    """
+    if scene.step_s:
+        return {}
+    for kind, trials in kinds(scene).items():
+        plan = make_plan(scene, kind.effects)
+        for i in range(0, len(trials), BATCH):
+            some = tuple(trials[i : i + BATCH])
+            check_start(begin(scene, plan, some, 1.0, values_of(scene, some)), plan)
+    return {kind: measure(scene, tuple(trials)) for kind, trials in kinds(scene).items()}
+
+
+def steps(scene: Scene, found: dict[Kind, Convergence] | None = None) -> dict[Kind, float]:
     """The physics' step of each kind of trials: the smallest that the scene's `step_s` gives
-    its effects, or the measured one where the scene gives none."""
+    its effects, or the measured one where the scene gives none (`found`, if it is at hand)."""
     if not scene.step_s:
-        return {k: choose_step(scene, tuple(t)).step_s for k, t in kinds(scene).items()}
+        found = measured(scene) if found is None else found
+        return {kind: convergence.step_s for kind, convergence in found.items()}
     return {
         kind: min(scene.step_s[name] for name in ("base", *kind.effects) if name in scene.step_s)
         for kind in kinds(scene)
@@ -138,11 +163,13 @@ def simulate_part(
     return out
 
 
-def parts(scene: Scene, batch: int = BATCH) -> list[tuple[tuple[TrialSpec, ...], float]]:
-    """The scene cut into batches: (trials, step) each."""
+def parts(
+    scene: Scene, batch: int = BATCH, found: dict[Kind, Convergence] | None = None
+) -> list[tuple[tuple[TrialSpec, ...], float]]:
+    """The scene cut into batches: (trials, step) each; `found` as for `steps`."""
     if batch < 1:
         raise InputError(f"--batch must be at least 1, not {batch}")
-    step = steps(scene)
+    step = steps(scene, found)
     return [
         (tuple(trials[i : i + batch]), step[kind])
         for kind, trials in kinds(scene).items()
@@ -185,7 +212,8 @@ def write(
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{target}: cannot be made: {error.strerror or error}") from None
-    work = parts(scene, batch)
+    found = measured(scene)
+    work = parts(scene, batch, found)
     done: Iterable[list[Simulated]]
     if backend == "dask":
         done = _on_dask(scene, work, address)
@@ -193,15 +221,21 @@ def write(
         done = _on_cores(scene, work, str(target), jobs)
     else:
         raise InputError(f"--backend must be local or dask, not {backend!r}")
-    found: list[Simulated] = []
+    made: list[Simulated] = []
     for part in done:
         for trial in part:
             if trial.recording is not None:
                 recording.save(target / trial.name, trial.recording, lasting=False)
-            found.append(replace(trial, recording=None))
+            made.append(replace(trial, recording=None))
         progress(len(part))
     return Written(
-        sorted(target / trial.name for trial in found), sum(1 for trial in found if trial.redrawn)
+        paths=sorted(target / trial.name for trial in made),
+        redrawn=sum(1 for trial in made if trial.redrawn),
+        rough={
+            trials[0].key: found[kind].error
+            for kind, trials in kinds(scene).items()
+            if found and not found[kind].within
+        },
     )
 
 

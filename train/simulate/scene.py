@@ -13,6 +13,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
 from train.simulate import schema
+from train.simulate.arm import Kinematics
 from train.simulate.families import draw_family
 from train.simulate.reader import SceneTable, Value
 from train.simulate.required_effects import check_supported
@@ -29,6 +30,8 @@ CODY_START_DEG = (-44.0, 5.0, 0.0, 42.0, 0.0)
 CODY_RATE_DEG_S = (20.0, 0.0, 0.0, 0.0, 0.0)
 """A swing of the shoulder at the lab's 20 deg/s with the elbow bent to 42 degrees: there the
 gains above give the 115 N/m at mid-forearm that the lab's arm has."""
+PLACE_M = 0.103
+"""The middle of Cody's 16 rows, to the millimetre."""
 
 COLUMN_ANGLES_DEG = (
     *(-82.05, -67.25, -52.44, -37.22, -22.42, -7.61, 7.61, 22.42, 37.22, 52.44, 67.25, 82.05),
@@ -104,7 +107,14 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     each = trials.fields(schema.TRIALS)
     chain, *gains = _arm(top.table("arm", {}))
     skin, taxel = _skin(top.table("skin", {}))
-    start, rate, travel_s, place_m = _motion(top.table("motion", {}), chain, skin)
+    motion = top.table("motion", {})
+    start, rate, travel_s, place_m = _motion(motion, chain, skin)
+    stroke_s = _stroke(chain, start, rate, travel_s)
+    if lead.high >= stroke_s:
+        raise InputError(
+            f"{where}: the arm's stroke ends after {stroke_s:g} s (motion.travel_s, or a joint's "
+            f"limit), before it meets an object at {lead.high:g} s (trials.lead_s)"
+        )
     labels = top.table("labels", {}).fields(schema.LABELS)
     add, leave_out, settings = _effects(top.table("effects", {}))
     scene = Scene(
@@ -159,6 +169,10 @@ def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
         chain = Chain.from_urdf(path, table.text("base"), table.text("tip"))
     else:
         chain = Chain.from_toml(path)
+    try:
+        Kinematics(chain)
+    except InputError as error:
+        raise InputError(f"{table.called('chain')}: {error}") from None
     gains = []
     for key, cody, absent in (
         ("stiffness_nm_rad", CODY_STIFFNESS, REQUIRED),
@@ -176,6 +190,7 @@ def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
 def _motion(
     table: SceneTable, chain: Chain, skin: SkinLayout
 ) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
+    """Start and rate of each joint, in radians, the stroke's time, and where the skin is met."""
     start, rate = (
         table.numbers(key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0)
         for key, cody in (("start_deg", CODY_START_DEG), ("rate_deg_s", CODY_RATE_DEG_S))
@@ -189,14 +204,30 @@ def _motion(
                 raise table.fail(f"start_deg of {joint}", f"{low:g} to {high:g}", angle)
     travel_s = table.number("travel_s", 1e6, 0.0, 1e6, open_low=True)
     last_m = skin.row0_z_m - skin.pitch[0] * (skin.rows - 1)
-    place_m = table.number("place_m", 0.103, last_m, skin.row0_z_m)
+    middle_m = 0.5 * (last_m + skin.row0_z_m)
+    usual_m = PLACE_M if last_m <= PLACE_M <= skin.row0_z_m else middle_m
+    place_m = table.number("place_m", usual_m, last_m, skin.row0_z_m)
     table.done()
     return tuple(map(math.radians, start)), tuple(map(math.radians, rate)), travel_s, place_m
 
 
+def _stroke(
+    chain: Chain, start: tuple[float, ...], rate: tuple[float, ...], travel_s: float
+) -> float:
+    """Seconds for which a joint's equilibrium point moves: until the last has reached its limit."""
+    ends = []
+    for limits, angle, speed in zip(chain.limits, start, rate, strict=True):
+        if speed and limits is not None:
+            ends.append((limits[speed > 0.0] - angle) / speed)
+        elif speed:
+            ends.append(math.inf)
+    return min(travel_s, max(ends))
+
+
 def _skin(table: SceneTable) -> tuple[SkinLayout, Value]:
     given = {key: table.get(key, default) for key, default in (CODY_SKIN | SCALE).items()}
-    cols = table.whole("cols", CODY_SKIN["cols"], range(1, 1001))
+    # Fewer than three columns around the forearm may all look away from what it meets.
+    cols = table.whole("cols", CODY_SKIN["cols"], range(3, 1001))
     if not table.has("column_angles_deg") and cols != CODY_SKIN["cols"]:
         # Evenly around the forearm, where the file gives their number alone.
         angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
@@ -219,7 +250,8 @@ def _objects(
     tables = list(_named(top, "object"))
     for family in _named(top, "family"):
         for drawn in draw_family(family, seed, push_n, skin):
-            tables.append(SceneTable(drawn, top.where, f"object {drawn['name']!r}: "))
+            called = f"{family.prefix}object {drawn['name']!r}: "
+            tables.append(SceneTable(drawn, top.where, called))
     if not tables:
         raise InputError(f"{top.where}: give at least one [[object]] or [[family]]")
     objects = tuple(map(_object, tables))
@@ -245,16 +277,13 @@ def _object(table: SceneTable) -> SceneObject:
     if not conditions:
         raise table.fail("conditions", "fixed, movable or both")
     own = schema.FAMILY_KEYS[family]
-    others = {key for keys in schema.FAMILY_KEYS.values() for key in keys} - set(own)
     values: dict[str, Value] = {}
-    for key in schema.OBJECT:
-        if key in others:
-            continue
+    for key in schema.keys_of(family):
         limits = schema.OBJECT[key]
         default = own.get(key, limits.default)
         if table.has(key) or default is not None:
             values[key] = table.value(key, limits, default)
-    if table.has("stem_count"):  # a family's range is drawn by now
+    if "stem_count" in own and table.has("stem_count"):  # a family's range is drawn by now
         table.field("stem_count", schema.OBJECT["stem_count"])
     if "movable" in conditions:
         for key in ("mass_kg", "friction_static", "friction_kinetic"):

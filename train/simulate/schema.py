@@ -49,7 +49,8 @@ TRIALS = {
     "tolerance": Field(1e-5, 0.5, 0.01, "what the step may cost, as a part of the peak force"),
 }
 LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
-TAXEL = Field(0.0, 1e18, 10_000.0, "stiffness of a taxel in N/m", open_low=True)
+TAXEL = Field(0.0, 1e15, 10_000.0, "stiffness of a taxel in N/m", open_low=True)
+"""Of 1e16 N/m the depths that bear a touch are below the rounding of a metre."""
 LABELS = {
     "window_s": Field(0.01, 60.0, 1.2, "time after the first touch within which a label shows"),
     "push_n": Field(0.1, 1e6, 6.0, "moves each movable object that a [[family]] gives"),
@@ -74,7 +75,7 @@ OBJECT = {
     "skin_friction": Field(0.0, 5.0, None, "mu between the skin and the object's face"),
     "width_m": Field(0.0, 10.0, 1.0, "the face along the forearm", open_low=True),
     "breadth_m": Field(0.0, 10.0, 10.0, "the face across the forearm", open_low=True),
-    "radius_m": Field(0.0, 1e6, 1e6, "how the face curves along the forearm", open_low=True),
+    "radius_m": Field(1e-3, 1e6, 1e6, "how the face curves along the forearm"),
     "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
     "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
     "foot_m": Field(0.0, 10.0, None, "diameter of the object's foot", open_low=True),
@@ -114,6 +115,13 @@ FAMILY_KEYS: dict[str, dict[str, float]] = {
 }
 """Keys that belong to one family alone, with what they are where the object is silent: a
 middling thing of the family."""
+
+
+def keys_of(family: str) -> tuple[str, ...]:
+    """The keys of `OBJECT` that an object of this family may have."""
+    others = {key for name, keys in FAMILY_KEYS.items() if name != family for key in keys}
+    return tuple(key for key in OBJECT if key not in others - set(FAMILY_KEYS[family]))
+
 
 THICKNESS = {FOAM: "depth_m", PILLOW: "depth_m", BUBBLES: "bubble_m", FOLIAGE: "stem_slip_m"}
 """How far each soft family could yield."""

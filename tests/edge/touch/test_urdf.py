@@ -54,6 +54,11 @@ def test_what_a_file_leaves_out_is_urdf_s_default(joints):
         ('<parent link="base"/>', '<parent link="lower"/>', "no chain of joints leads from"),
         ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
         ("0.3 0 -1e-3", "0.3 0", "origin of joint 'elbow' must be 3 numbers, not '0.3 0'"),
+        (
+            '<axis xyz="0 1 0"/>',
+            '<mimic joint="shoulder"/>',
+            "joint 'elbow' follows joint 'shoulder' (<mimic>)",
+        ),
         ('lower="-2.5"', 'lower="low"', "limit of joint 'elbow' must be 2 numbers"),
     ],
 )

@@ -206,3 +206,16 @@ class TestCommand:
         assert (tmp_path / "bare.png").exists()
         assert main(["show", str(tmp_path / "bare.npz"), "--scene"]) == 2
         assert "no joint angles" in capsys.readouterr().err
+
+
+def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):
+    path = tmp_path / "light.toml"
+    path.write_text(
+        "[trials]\ncount = 1\nlead_s = 0.05\nafter_s = 0.15\n[labels]\nslides_m = 0.0\n[[object]]\n"
+        'name = "feather"\nfamily = "rigid"\nconditions = ["fixed", "movable"]\nmass_kg = 1e-4\n'
+        "friction_static = 0.5\nfriction_kinetic = 0.4\n"
+    )
+    assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().err
+    assert "feather-movable and its like: no step is within trials.tolerance" in told
+    assert "feather-fixed" not in told

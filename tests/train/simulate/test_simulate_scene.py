@@ -91,6 +91,14 @@ def test_values_ranges_and_defaults():
         (("step_s", "sliding"), 0.003, "step_s.sliding must be an even part of a frame's 0.01 s"),
         (("step_s", "soup"), 0.01, "unknown key step_s.soup"),
         (("skin", "taxel_n_m"), 0.0, "skin.taxel_n_m must be a number above 0"),
+        (("skin", "taxel_n_m"), 1e18, "skin.taxel_n_m must be a number above 0, at most 1e+15"),
+        (("skin", "cols"), 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
+        (("motion",), {"travel_s": 0.1}, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
+        (
+            ("motion",),
+            {"start_deg": [119.0, 5.0, 0.0, 42.0, 0.0]},
+            "the arm's stroke ends after 0.05 s",
+        ),
         (("skin", "threshold_counts"), 1.5, "skin.threshold_counts must be a whole number"),
         (("spread", "yaw_deg"), 50, "spread.yaw_deg must be a number from 0 to 30, not 50"),
         (
@@ -169,6 +177,8 @@ def test_values_ranges_and_defaults():
         ),
         (("object", 0, "conditions"), [], "conditions must be fixed, movable or both"),
         (("object", 0, "modulus_pa"), 1e4, "object 'box': unknown key modulus_pa; allowed: name"),
+        (("object", 0, "stem_count"), 3, "object 'box': unknown key stem_count"),
+        (("object", 0, "radius_m"), 1e-9, "radius_m must be a number from 0.001 to 1e+06"),
         (("object", 0, "base_m"), 0.2, "object 'box': height_m is missing"),
         (("object", 0, "name"), "", "object 0: name must be text"),
     ],
@@ -275,6 +285,32 @@ def test_a_skin_of_other_columns_has_them_evenly_around():
     assert trial.frames.shape[1:] == (16, 12)
     assert trial.frames.max() > 0
     assert trial.meta["skin"]["release_s"] == 0.7
+
+
+@pytest.mark.parametrize("family", ["rigid", "foam", "bubbles", "foliage"])
+def test_a_skin_of_one_row_meets_things_there(family):
+    thing = {"name": "thing", "family": family, "conditions": ["fixed"]}
+    one = from_dict({**GOOD, "skin": {"rows": 1}, "effects": {}, "object": [thing]})
+    assert one.place_m == one.skin.row0_z_m
+    _, trial = next(simulate(one))
+    assert trial.frames.shape[1:] == (1, 24)
+    assert trial.frames.max() > 0
+
+
+def test_a_motion_about_the_forearm_itself_is_refused():
+    one = from_dict({**GOOD, "motion": {"rate_deg_s": [0.0, 0.0, 0.0, 0.0, 20.0]}})
+    with pytest.raises(InputError, match=r"motion\.rate_deg_s does not move the forearm"):
+        next(simulate(one))
+
+
+def test_an_arm_that_slides_is_refused(tmp_path):
+    (tmp_path / "arm.urdf").write_text(
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="lift" type="prismatic">'
+        '<parent link="a"/><child link="b"/><limit lower="0" upper="1"/></joint></robot>'
+    )
+    arm = {"chain": "arm.urdf", "base": "a", "tip": "b"}
+    with pytest.raises(InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"):
+        from_dict({**GOOD, "arm": arm}, str(tmp_path / "scene.toml"))
 
 
 def test_an_arm_may_come_from_a_urdf(tmp_path):

@@ -257,7 +257,7 @@ class TestTraps:
         springs, free, c = tilt_cases(600, seed=1)
         monkeypatch.setattr(tilt, "GUARDED_ROUNDS", 0)
         nothing = np.zeros(600)
-        with pytest.raises(EdgeError, match=r"tilt of \d+ contacts was not found"):
+        with pytest.raises(EdgeError, match=r"forearm tilts was not found for \d+ contacts"):
             tilt.search(springs, (nothing, nothing), free, c)
 
     def test_backward_euler_at_10_ms_loses_stick_slip_and_1_ms_keeps_it(self, tools):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from edge.errors import EdgeError, InputError
+from train.simulate import run as running
 from train.simulate import viscous
 from train.simulate.engine import check_energy, run_batch
 from train.simulate.run import kinds, simulate, write
@@ -80,14 +81,43 @@ class TestLabels:
             list(simulate(scene(stone)))
 
     def test_a_motion_that_never_touches_is_refused(self):
-        one = scene({**BOX, "conditions": ["fixed"]}, motion={"travel_s": 1e-6})
-        with pytest.raises(InputError, match="was never touched.*motion"):
-            list(simulate(replace(one, damping=(0.0,) * 5)))
+        one = scene({**BOX, "conditions": ["fixed"]})
+        with pytest.raises(InputError, match="was never touched, as the arm's stroke.*motion"):
+            list(simulate(replace(one, damping=(0.0,) * 5, travel_s=1e-6)))
 
-    def test_an_object_inside_the_arm_is_refused(self):
-        wide = {**BOX, "conditions": ["fixed"], "width_m": 1.0}
-        one = scene(wide, spread={"yaw_deg": 30.0}, effects={"add": ["tilt"]})
-        with pytest.raises(InputError, match="touches the arm before it moves"):
+    @pytest.mark.parametrize(
+        ("change", "says"),
+        [
+            (
+                {"motion": {"travel_s": 0.2}},
+                r"as the arm's stroke ended 0\.\d\d s.*motion.travel_s",
+            ),
+            (
+                {"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}},
+                r"as the arm's stroke ended 0\.\d\d s.*motion.start_deg more room",
+            ),
+            ({"trials": {"count": 1, "after_s": 0.1}}, r"and the trial ended 0\.\d\d s.*after_s"),
+        ],
+    )
+    def test_what_cut_a_trial_short_is_told(self, change, says):
+        with pytest.raises(InputError, match=r"the last moved \d+ mm, less than 20, " + says):
+            list(simulate(scene({**BOX, "mass_kg": 1.0}, **change)))
+
+    @pytest.mark.parametrize("family", ["rigid", "foam", "bubbles"])
+    @pytest.mark.parametrize("step_s", [{}, {"base": 0.01}])
+    def test_an_object_inside_the_arm_is_refused_at_once(self, monkeypatch, family, step_s):
+        monkeypatch.setattr(
+            running, "measure", lambda *_: pytest.fail("it measured the step first")
+        )
+        wide = {"name": "wall", "family": family, "conditions": ["fixed"], "width_m": 1.0}
+        one = scene(
+            wide,
+            spread={"yaw_deg": 30.0},
+            effects={"add": ["tilt", "inertia"]},
+            step_s=step_s,
+        )
+        says = r"'wall' touches the arm before it moves, in trial \d .* by \d\d degrees; .*yaw_deg"
+        with pytest.raises(InputError, match=says):
             list(simulate(one))
 
     def test_softness_times_mobility_is_the_category(self):
@@ -123,6 +153,12 @@ class TestFamilies:
             assert mu * mass * 9.80665 <= min(6.0, stems * stiffness * 0.06)
         assert len({o.values["stem_count"].low for o in objects}) > 5
 
+    def test_what_a_family_leaves_out_is_what_its_objects_have(self):
+        plant = {**FAMILY, "family": "foliage", "stem_count": 3, "count": 40}
+        for o in scene(families=[plant]).objects:
+            mu, mass = o.values["friction_static"].low, o.values["mass_kg"].low
+            assert mu * mass * 9.80665 <= 3 * o.values["stem_n_m"].low * 0.06
+
     def test_a_plant_is_as_it_would_be_among_plants_of_as_many_stems(self):
         plants = [
             {"name": f"p{n}", "family": "foliage", "conditions": ["fixed"], "stem_count": n}
@@ -145,7 +181,11 @@ class TestFamilies:
             ({"count": 0}, "count must be a whole number from 1 to 1000, not 0"),
             ({"mass_kg": [50.0, 60.0]}, r"such that 6 N \(labels.push_n\) move it"),
             ({"friction_static": [0.9, 0.3]}, "lower limit first"),
-            ({"colour": 3}, "unknown key colour; allowed: name"),
+            ({"colour": 3}, "family 'crate': unknown key colour; allowed: name.*, count"),
+            ({"stem_count": 3}, "family 'crate': unknown key stem_count"),
+            ({"friction_kinetic": 0.2}, "unknown key friction_kinetic; .*kinetic_part"),
+            ({"family": "brick"}, "family 'crate': family must be one of rigid"),
+            ({"base_m": 0.2}, "family 'crate': object 'crate 01': height_m is missing"),
         ],
     )
     def test_a_family_that_makes_no_sense_is_refused(self, change, says):

@@ -69,12 +69,13 @@ def plant(state: State) -> None:
     half = 0.5 * np.minimum(values["width_m"], rows * state.skin.row_pitch_m)
     middle = (state.row_z[0] - state.z) / state.skin.row_pitch_m
     reach = half / state.skin.row_pitch_m
-    row = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, rows - 1.001)
+    row = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(rows - 1.001, 0.0))
     window = state.columns.shape[0]
     column = (window // 2 + around).astype(np.int64)
     low = np.floor(row).astype(np.int64)
     taxel = (low * window + column) * n + np.arange(n)
-    state.keep(Stems(taxel=taxel, following=taxel + window * n, part=row - low))
+    beside = window * n if rows > 1 else 0
+    state.keep(Stems(taxel=taxel, following=taxel + beside, part=row - low))
 
 
 def stand(state: State) -> None:

@@ -111,11 +111,15 @@ def remember(state: State) -> None:
 def solve(state: State, free: Coordinates, c: Coordinates) -> Coordinates:
     """The loads (F, M) at which arm and bed agree."""
     own = state.of(Tilt)
-    return search(state.bed.lines_of(own.springs, own.lever), own.guess, free, c)
+    springs = state.bed.lines_of(own.springs, own.lever)
+    return search(springs, own.guess, free, c, where=state.scene.name)
 
 
-def search(springs: Springs, guess: Coordinates, free: Coordinates, c: Coordinates) -> Coordinates:
-    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them.
+def search(
+    springs: Springs, guess: Coordinates, free: Coordinates, c: Coordinates, where: str = "tilt"
+) -> Coordinates:
+    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them; `where` names
+    the scene in errors.
 
     Raises:
         EdgeError: they were not found.
@@ -129,8 +133,8 @@ def search(springs: Springs, guess: Coordinates, free: Coordinates, c: Coordinat
         force, moment, lost = tape.call(pivot_solver.taped_search, given, sizes)
     if lost.any():
         raise EdgeError(
-            f"the tilt of {int(lost.sum())} contacts was not found in {GUARDED_ROUNDS} rounds; "
-            "make the skin, the object or the step less extreme"
+            f"{where}: how far the forearm tilts was not found for {int(lost.sum())} contacts; "
+            "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
         )
     return force, moment
 
