@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from edge.skin.skin import Skin
 
 AS_TRAINED = "as_trained"
-"""Flag of a decision at distance 0 from a training trial: the two are the same, to the last bit,
-in all that the model takes into account. Nearly always it is that trial, replayed; a feature that
-was constant in training is not taken into account."""
+"""Flag of a decision at distance 0 from a training trial: the coordinates of the two, which are all
+that the model compares, are the same to the last bit. Nearly always it is that trial, replayed;
+what was constant in training, or has no weight in the projection, may differ."""
 
 
 @dataclass

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.model import Model
-from edge.model.verify import first_series, outputs, parts
+from edge.model.verify import SINGLE_BITS, first_series, outputs, parts
 from edge.recording import Recording, save_arrays
 from edge.touch.features import feature_vector
 from train.dataset import DataSet
@@ -18,6 +18,10 @@ TRIALS = 24
 """Trials whose frames a golden file holds."""
 VECTORS = 256
 """Feature vectors beyond the trials' own."""
+TWINS = 8
+"""Pairs of vectors that float32 takes for one."""
+APART = 2.0**-34
+"""By what part of itself the second one of a pair is larger."""
 
 BOUNDS = {
     "scores": 1e-15,
@@ -61,6 +65,16 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     )
 
 
+def paired(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2 n, width) vectors rounded to float32's bits, each followed by one a little larger.
+
+    An engine that computes in float32 cannot tell the two apart; see `edge.model.verify.twins`.
+    """
+    mantissas, exponents = np.frexp(vectors)
+    rounded = np.ldexp(np.rint(np.ldexp(mantissas, SINGLE_BITS)), exponents - SINGLE_BITS)
+    return np.stack([rounded, rounded * (1.0 + APART)], axis=1).reshape(-1, vectors.shape[1])
+
+
 def wanted(model: Model) -> list[tuple[str, str]]:
     """(task, part) of all that the model says."""
     return [(task, part) for task in model.info.tasks for part in parts(model)]
@@ -70,7 +84,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     """Run the exported model on trials and vectors, and store what it gave.
 
     Vectors are the trials' own, training vectors (distance exactly 0), others between and
-    beyond them, and two that are not finite (label -1).
+    beyond them, pairs that float32 takes for one, and two that are not finite (label -1).
     """
     info = model.info
     pieces: list[Recording] = []
@@ -93,7 +107,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     mixed = X[pairs[:, 0]] + weight * (X[pairs[:, 1]] - X[pairs[:, 0]])
     wrong = np.repeat(own[:1], 2, axis=0)
     wrong[0, 5], wrong[1, -1] = np.nan, np.inf
-    vectors = np.concatenate([own, rows, mixed, wrong])
+    vectors = np.concatenate([own, rows, mixed, paired(mixed[:TWINS]), wrong])
     arrays: dict[str, NDArray[Any]] = {
         "start": np.cumsum([0, *(len(p.t) for p in pieces)]),
         "t": np.concatenate([p.t for p in pieces]),

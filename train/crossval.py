@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.distance import running_squares
-from train.projection import RoundingGrid, Spectrum, gains_of, on_grid
+from train.projection import RoundingGrid, Spectrum, centred_and_scaled, on_grid
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -53,12 +53,11 @@ def split_neighbours(
         (t, max_components, max_k) rows of X, nearest first, equal distances in the order of the
         rows. Beyond the numerical rank a further component adds nothing, so its row repeats.
     """
-    known = X[train]
-    scaled = (X - known.mean(axis=0)) * gains_of(known, scaling, features)
-    axes = Spectrum(scaled[train]).leading(max_components)
-    exact = RoundingGrid(np.abs(scaled[train]).max(initial=0.0))
-    z = exact.project(scaled, on_grid(axes.T))
-    references, queries = z[train], z[test]
+    mean, gain, known = centred_and_scaled(X[train], scaling, features)
+    axes = Spectrum(known).leading(max_components)
+    exact, weights = RoundingGrid(np.abs(known).max(initial=0.0)), on_grid(axes.T)
+    references = exact.project(known, weights)
+    queries = exact.project((X[test] - mean) * gain, weights)
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
     used = len(axes)
     for near, query in zip(rows, queries, strict=True):

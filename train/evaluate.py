@@ -26,7 +26,7 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of
-from train.projection import Spectrum, gains_of, widths_of
+from train.projection import Spectrum, centred_and_scaled, widths_of
 
 FOLDS = 10
 SEED = 2012
@@ -205,16 +205,14 @@ def _answers(
             key = grid.scaling, grid.features
             if key not in spectra:
                 part = X[:, columns_of(grid.features, features, widths)]
-                known = part[train]
                 taken = [i for i, f in enumerate(features) if f in (grid.features or features)]
-                gains = gains_of(
-                    known,
+                mean, gain, known = centred_and_scaled(
+                    part[train],
                     grid.scaling,
                     [features[i] for i in taken],
                     [widths[i] for i in taken],
                 )
-                mean = known.mean(axis=0)
-                spectra = {key: (Spectrum((known - mean) * gains), (part[test] - mean) * gains)}
+                spectra = {key: (Spectrum(known), (part[test] - mean) * gain)}
             spectrum, new = spectra[key]
             shared = _neighbours(spectrum, new, None, grid) if grid.projection == "pca" else None
             for task, labels in classes.items():

@@ -114,7 +114,7 @@ def scale_of(
 
     def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
         gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
-        with np.errstate(over="ignore"):  # what is then infinite, `Projection` refuses
+        with np.errstate(over="ignore"):  # what is then infinite is refused
             return np.asarray(np.ldexp(gain, -powers))
 
     if method == "I":
@@ -145,15 +145,34 @@ def scale_of(
     raise InputError(f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}")
 
 
-def gains_of(
+def centred_and_scaled(
     X: NDArray[np.float64],
     method: str,
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,
-) -> NDArray[np.float64]:
-    """(p,) the gain of each column of X (n, p); see `scale_of`."""
-    _, gain = scale_of(X, method, features, widths)
-    return np.repeat(gain, widths_of(X.shape[1], features, widths))
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean (p,) and gain (p,) of each column of X (n, p), and (X - mean) * gain (n, p).
+
+    A scaling shifts each type by a constant, which centring takes away again: the mean is
+    subtracted from the features themselves, where it loses nothing. See `scale_of`.
+
+    Raises:
+        InputError: the scale is beyond what distances hold.
+    """
+    # The order in memory decides the order of sums, and so which of equal axes is found.
+    X = np.ascontiguousarray(X, dtype=np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = _mean(X)
+        _, gains = scale_of(X, method, features, widths)
+        gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
+        d = (X - mean) * gain
+    largest = float(np.abs(d).max(initial=0.0))
+    if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
+        raise InputError(
+            f"the features spread over {largest:g} once scaled; distances need "
+            f"{SMALLEST_SCALE:g} to {LARGEST_SCALE:g}: store them in other units"
+        )
+    return mean, gain, d
 
 
 def _centred(
@@ -243,15 +262,18 @@ class Spectrum:
     def leading(self, count: int) -> NDArray[np.float64]:
         """(c, p) the first principal axes up to sign, quicker than `principal_axes`.
 
-        As long as the last of them has more than `WELL_CONDITIONED` of the first one's variance:
-        an axis is then right to 1e-16 / `WELL_CONDITIONED` over the relative gap of its
-        eigenvalue. Where it has not, where small singular values would drown, by
-        `principal_axes`.
+        As long as the last of them has more than `WELL_CONDITIONED` of the first one's variance,
+        and no two eigenvalues are within `CLOSE_EIGENVALUES`: an axis is then right to
+        1e-16 / `WELL_CONDITIONED` over the relative gap of its eigenvalue. Where small singular
+        values would drown, and where any axes of equal variance would do, by `principal_axes`, so
+        that they are those of a `Projection`.
         """
+        top = self.values[: count + 1]
         if (
             count < min(self.rows.shape)
             and count <= len(self.values)
-            and self.values[count - 1] > WELL_CONDITIONED * self.values[0]
+            and top[count - 1] > WELL_CONDITIONED * top[0]
+            and (top[1:] < (1.0 - CLOSE_EIGENVALUES) * top[:-1]).all()
         ):
             return np.ascontiguousarray(self._lift(np.eye(len(self.values), count)).T)
         return principal_axes(self._given)[1][:count]
@@ -399,22 +421,11 @@ class Projection(TransformerMixin, BaseEstimator):
         X = np.asarray(X, dtype=np.float64)
         check_columns(X.shape[1])
         self.n_features_in_ = X.shape[1]
-        with np.errstate(over="ignore", invalid="ignore"):
-            # Scaling shifts each type by a constant, which centring takes away again: the mean is
-            # subtracted from the features themselves, where it loses nothing.
-            self.mean_ = _mean(X)
-            self.gain_ = gains_of(X, self.scaling, self.features, self.widths)
-            d = (X - self.mean_) * self.gain_
-        largest = float(np.abs(d).max(initial=0.0))
-        if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
-            raise InputError(
-                f"the features spread over {largest:g} once scaled; distances need "
-                f"{SMALLEST_SCALE:g} to {LARGEST_SCALE:g}: store them in other units"
-            )
+        self.mean_, self.gain_, d = centred_and_scaled(X, self.scaling, self.features, self.widths)
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
-        self.grid_ = RoundingGrid(largest)
+        self.grid_ = RoundingGrid(float(np.abs(d).max(initial=0.0)))
         return self
 
     def _axes(

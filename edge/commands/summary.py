@@ -49,9 +49,9 @@ class Summary:
         parts = [f"{self.recordings} recordings"]
         if self.as_trained:
             parts.append(
-                f"{self.as_trained} of them equal a training trial to the last bit and are most "
-                "likely the same recordings, so this accuracy does not apply to new touches; the "
-                "nested accuracy that `make export` printed does"
+                f"{self.as_trained} of them have the coordinates of a training trial to the last "
+                "bit and are most likely the same recordings, so this accuracy does not apply to "
+                "new touches; the nested accuracy that `make export` printed does"
             )
         for task in self._tasks:
             right, total = self.accuracy(task)

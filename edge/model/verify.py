@@ -8,7 +8,7 @@
 | `onset_s` | float64 (m,) | |
 | `series_t` | float64 (s,) | |
 | `series_counts` | int64 (s, c) | `FeatureSeries.integers`: exact |
-| `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
+| `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order; `twins` |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours`, `_next` | | the graph's, for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, of a model with decision points |
 | `decision_point_vectors` | float64 (points, w, width) | likewise, for each decision point |
@@ -21,7 +21,7 @@ A bound b allows abs(seen - expected) <= b * max(1, abs(expected)).
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,19 +65,19 @@ class Check:
         return self.worst <= 1.0
 
 
-SINGLE = (2.0**-36, 2.0**-9)
-"""Parts by which a distance differs that was computed in float32: its rounding is 2^-24, which
-cancellation makes larger and luck smaller; another float64 stays below 2^-39."""
+FLOAT64 = "float64"
+"""The check that fails where an engine computes in float32: the operators are the standard's and
+the tensors float64, yet an engine may compute in less without a word."""
+SINGLE_BITS = 24
+"""Of a mantissa in float32."""
 
 
-def in_float32(checks: Sequence[Check], bound: float = 1e-12) -> bool:
-    """Whether distances differ as those of an engine do that computes in float32.
-
-    The operators are the standard's and the tensors float64, yet an engine may compute in less
-    without a word.
-    """
-    parts = [bound * check.worst for check in checks if check.name.endswith("_distances")]
-    return any(SINGLE[0] < part < SINGLE[1] for part in parts)
+def twins(vectors: NDArray[np.float64]) -> NDArray[np.intp]:
+    """(m,) the rows of vectors (n, width) that float64 tells from the next one, not float32."""
+    mantissas, exponents = np.frexp(vectors)
+    single = np.rint(np.ldexp(mantissas, SINGLE_BITS))
+    alike = (single[1:] == single[:-1]) & (exponents[1:] == exponents[:-1])
+    return np.flatnonzero(alike.all(axis=1) & (vectors[1:] != vectors[:-1]).any(axis=1))
 
 
 def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeries] | None:
@@ -197,7 +197,9 @@ def _verify_graph(
             f"{name}: is for the tasks {', '.join(tasks) or 'none'}, {model.path} answers "
             f"{', '.join(sorted(model.info.tasks))}; export both together"
         )
-    checks = _compare(model, outputs(model, vectors), arrays, bounds, "")
+    answers = outputs(model, vectors)
+    checks = [*_told_apart(model, vectors, answers, arrays)]
+    checks += _compare(model, answers, arrays, bounds, "")
     if model.info.decision_points_s:
         at_decision_points = np.ascontiguousarray(
             arrays["decision_point_vectors"], dtype=np.float64
@@ -226,6 +228,28 @@ def outputs(
     """The graph's outputs for vectors (n, width), asked one by one as the board does."""
     single = [model.run(vectors[i : i + 1], decision_point) for i in range(len(vectors))]
     return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
+
+
+def _told_apart(
+    model: Model,
+    vectors: NDArray[np.float64],
+    seen: dict[str, NDArray[Any]],
+    arrays: dict[str, NDArray[Any]],
+) -> Iterator[Check]:
+    """Whether most twins whose distances differ have other distances here too."""
+    first = twins(vectors)
+    for task in model.info.tasks:
+        key = f"{task}_distances"
+        expected, found = arrays[key], seen[key]
+        rows = first[(expected[first] != expected[first + 1]).any(axis=1)]
+        same = (found[rows] == found[rows + 1]) | ~np.isfinite(found[rows])
+        lost = rows[same.all(axis=1)]
+        if 2 * len(lost) > len(rows):
+            row = int(lost[0]) + 1
+            yield Check(FLOAT64, len(rows), np.inf, row, str(found[row]), str(expected[row]))
+            return
+    if len(first):
+        yield Check(FLOAT64, len(first), 0.0, None)
 
 
 def _compare(

@@ -209,6 +209,9 @@ class Contact:
                 f"a frame has {len(frame.joints)} joint angles, "
                 f"the features were measured with {self._measurer.joints}"
             )
+        if not np.isfinite(frame.joints).all():
+            bad = int(np.argmin(np.isfinite(frame.joints)))
+            raise InputError(f"angle {bad} of a frame's joints is not finite")
         return frame.joints
 
     def _forget_last(self) -> None:

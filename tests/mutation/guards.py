@@ -112,9 +112,36 @@ GUARDS = (
     ),
     Guard(
         "scales that cannot be held are refused",
-        f"{PROJECTION}:fit",
+        f"{PROJECTION}:centred_and_scaled",
         "if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE): ...",
         "if False: ...",
+    ),
+    Guard(
+        "of axes of equal variance leave-one-out takes those of the pipeline",
+        f"{PROJECTION}:leading",
+        "(top[1:] < (1.0 - CLOSE_EIGENVALUES) * top[:-1]).all()",
+        "True",
+        beside="train/distance.py",
+    ),
+    Guard(
+        "sums do not hang on the order in memory",
+        f"{PROJECTION}:centred_and_scaled",
+        "X = np.ascontiguousarray(X, dtype=np.float64)",
+        "X = np.asarray(X, dtype=np.float64)",
+        beside="train/distance.py",
+    ),
+    Guard(
+        "an engine that computes in float32 is found out",
+        "edge/model/verify.py:_told_apart",
+        "if 2 * len(lost) > len(rows): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "joint angles that features are made of are finite",
+        f"{CONTACT}:_joints_of",
+        "if not np.isfinite(frame.joints).all(): ...",
+        "if False: ...",
+        beside="edge/touch/feature_sets.py",
     ),
     Guard(
         "a training vector that is not finite is refused",
@@ -216,8 +243,8 @@ GUARDS = (
     Guard(
         "leave-one-out: equal trials are equally far",
         f"{CROSSVAL}:split_neighbours",
-        "z = exact.project(scaled, on_grid(axes.T))",
-        "z = scaled @ axes.T",
+        "references = exact.project(known, weights)",
+        "references = known @ axes.T",
     ),
     Guard(
         "leave-one-out refuses what is not finite",

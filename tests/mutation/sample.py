@@ -5,7 +5,7 @@ conditions. A change is made on a copy of the tree, and the tests that run throu
 asked, the fastest first. What survives is printed with its line; `EQUIVALENT` says of those that
 change nothing why they do not: they are not tried, and count as neither. `--part 1/4` tries a
 quarter of them, `--reach FILE` keeps which tests run through which line for the next part, and
-`--done FILE` leaves out those that an earlier run printed there.
+`--done FILE` leaves out those that an earlier run printed there, if there was one.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     part, parts = map(int, arguments.part.split("/"))
     chosen = [c for c in drawn(arguments.count, arguments.seed) if arguments.only in c.name]
-    done = arguments.done.read_text() if arguments.done else ""
+    done = arguments.done.read_text() if arguments.done and arguments.done.exists() else ""
     chosen = [c for c in chosen[part - 1 :: parts] if f" {c.name}\n" not in done]
     alive, tried = 0, [change for change in chosen if not change.same]
     for change in chosen:

@@ -133,6 +133,20 @@ def test_too_few_trials_and_values_that_are_not_finite_are_named():
         leave_one_out(X, y)
 
 
+@pytest.mark.parametrize("scaling", ["I", "II", "IV"])
+def test_features_near_the_ends_of_float64_have_the_neighbours_of_others(scaling):
+    X, _ = overlapping(20)
+    near = neighbours(X, scaling=scaling, max_components=6)
+    for power in (-990, 1010):  # the sum of a column would overflow
+        far = np.ldexp(X, power - int(np.frexp(np.abs(X).max())[1]))
+        assert (neighbours(far, scaling=scaling, max_components=6) == near).all()
+
+
+def test_features_that_spread_beyond_any_distance_are_refused():
+    with pytest.raises(InputError, match="store them in other units"):
+        leave_one_out(*(overlapping()[0] * 1e200, overlapping()[1]))
+
+
 def subspace_gap(ours: np.ndarray, exact: np.ndarray) -> float:
     """Largest sine between the spans of the first 1, 2, ... axes."""
     worst = 0.0

@@ -1,5 +1,6 @@
 """One definition of distance: pipeline, cross-validation, ONNX Runtime and ONNX's own reference."""
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -53,10 +54,21 @@ def test_ties_are_settled_alike_everywhere(seed):
         assert [f"c{i}" for i in seen[2]] == fitted.predict(queries)["t"].tolist()
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_leave_one_out_finds_the_neighbours_of_the_pipeline_refitted(seed):
-    X = lattice(seed, 30)
-    y = np.array(["a", "b", "c"] * 10)
+CUBE = np.array(list(itertools.product([-1.0, 1.0], repeat=3)))
+TIED = [
+    *(lattice(seed, 30) for seed in range(6)),
+    # Variance that is the same in three directions, or in all: any axes would do.
+    np.pad(
+        np.concatenate([CUBE, np.eye(3), -np.eye(3), 2.0 * CUBE[:1], np.eye(3)]), [(0, 0), (0, 9)]
+    ),
+    3.0 * np.eye(12)[np.arange(30) * 7 % 11],
+]
+
+
+@pytest.mark.parametrize("case", range(len(TIED)))
+def test_leave_one_out_finds_the_neighbours_of_the_pipeline_refitted(case):
+    X = TIED[case]
+    y = np.array(["a", "b", "c"] * 10)[: len(X)]
     for left_out in range(0, len(X), 7):
         train = np.delete(np.arange(len(X)), left_out)
         found = split_neighbours(X, train, np.array([left_out]), "none", COMPONENTS, K)[0]

@@ -223,7 +223,7 @@ def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
 
 
 def test_angles_that_lack_are_interpolated_and_flagged():
-    angles = [np.array([1.0]), None, np.array([2.0]), np.array([np.nan]), np.array([3.0])]
+    angles = [np.array([1.0]), None, np.array([2.0]), None, np.array([3.0])]
     tracker = ContactTracker(SKIN, features=["joint_angle"], joints=1)
     for frame, known in zip(touch(PEAKS), angles, strict=True):
         (contact,) = tracker.push(replace(frame, joints=known)) or [None]
@@ -237,6 +237,14 @@ def test_angles_that_lack_are_interpolated_and_flagged():
 def test_another_number_of_angles_is_one_sentence():
     with pytest.raises(InputError, match="has 2 joint angles, the features were measured with 3"):
         series_of(touch(PEAKS, joints=np.zeros((5, 2))), ["joint_change"], joints=3)
+
+
+@pytest.mark.parametrize("angle", [np.inf, -np.inf, np.nan])
+def test_an_angle_that_is_not_finite_is_one_sentence(angle):
+    angles = np.zeros((5, 2))
+    angles[3, 1] = angle
+    with pytest.raises(InputError, match="angle 1 of a frame's joints is not finite"):
+        series_of(touch(PEAKS, joints=angles), ["joint_change"], joints=2)
 
 
 def test_every_nth_frame_of_a_series_has_all_that_was_measured():
