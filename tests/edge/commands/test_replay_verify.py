@@ -184,6 +184,14 @@ def test_a_label_cannot_send_escape_sequences_to_the_terminal():
     assert "\\x1b]0;a\\x07" in summary.text()
 
 
+def test_the_columns_of_a_narrow_matrix_stand_under_their_names():
+    summary = Summary({"object": None})
+    for label in ("box", "cushion"):
+        event = {"event": "decision", "task": "object", "label": label, "flags": []}
+        summary.add({"object": "box"}, [event])
+    assert summary.text().splitlines()[-2:] == ["     box  cushion", "box    1        1"]
+
+
 def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
     summary = Summary({"object": None})
     labels = [f"a thing with a long name {i:02d}" for i in range(12)]

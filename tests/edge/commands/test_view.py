@@ -1,5 +1,6 @@
 """`view`, as a user runs it over the fake: a picture at a bounded rate."""
 
+import io
 import os
 
 from edge.commands import view
@@ -33,3 +34,23 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
     assert pictures[-1].count("▀") == 8 * 24 * 2
     assert max(map(len, pictures)) < 4000
     assert text.endswith("\x1b[0m\x1b[?25h")
+
+
+def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
+    """Half a frame early or late, so that a clock that shifts by less does not skip one."""
+    drawn = []
+    monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ["."])
+    assert edge("view", "--fake", recordings / "hard_0.npz", "--rate", 5, text=True)[0] == 0
+    assert [round(t - drawn[0], 2) for t in drawn] == [round(0.2 * i, 2) for i in range(9)]
+
+
+def test_view_sends_each_picture_at_once_where_no_file_is_behind_its_output():
+    class Shown(io.StringIO):
+        shown = ""
+
+        def flush(self):
+            self.shown = self.getvalue()
+
+    out = Shown()
+    view.sender(out, Stop())("a picture")
+    assert out.shown == "a picture"

@@ -116,6 +116,7 @@ def test_faults_by_position_hit_those_transactions_and_no_others():
         except OSError as error:
             hit.append((i, error.errno))
     assert hit == [(1, errno.EIO), (3, errno.EIO)]
+    assert fake.transactions == 5
 
 
 def test_random_faults_repeat_by_seed_and_keep_their_rate():

@@ -306,3 +306,11 @@ def test_a_model_that_is_no_file_is_refused_at_once(what, tmp_path):
             file.truncate(1 << 40)
     with pytest.raises(InputError, match=r"cannot be read|at most \d+ are read"):
         Model(path)
+
+
+def test_a_model_that_wants_more_than_the_features_is_refused(altered):
+    def greedy(proto):
+        proto.graph.input.append(helper.make_tensor_value_info("more", TensorProto.DOUBLE, [1]))
+
+    with pytest.raises(InputError, match="its inputs and its decision points disagree"):
+        Model(altered(greedy))

@@ -114,7 +114,15 @@ def node(operator, *inputs, **attributes):
     return helper.make_node(operator, ["x", *inputs], ["y"], **attributes)
 
 
-WHOLE = {"one": [1], "both": [0, 1], "margins": [0, 2, 0, 3], "margin": [2, 3], "k": [2]}
+WHOLE = {
+    "one": [1],
+    "both": [0, 1],
+    "margins": [0, 2, 0, 3],
+    "margin": [2, 3],
+    "k": [2],
+    "cells": [[0, 1], [2, 3], [1, 1], [0, 0]],
+    "rows": [[0], [2], [1], [0]],
+}
 
 
 @pytest.mark.parametrize(
@@ -126,6 +134,8 @@ WHOLE = {"one": [1], "both": [0, 1], "margins": [0, 2, 0, 3], "margin": [2, 3], 
         (node("ArgMax", axis=1, keepdims=0), (3,)),
         (node("Unsqueeze", "both"), (1, 1, 3, 5)),
         (node("Gather", "both", axis=1), (3, 2)),
+        (node("GatherND", "cells"), (4,)),
+        (node("GatherND", "rows"), (4, 5)),
         (node("Concat", "x", axis=-1), (3, 10)),
         (node("Pad", "margins"), (3, 10)),
         (node("Pad", "margin", "", "one"), (3, 10)),

@@ -75,6 +75,11 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
     assert 0.0025 < tail <= 0.05
 
 
+def test_a_refusal_asks_for_more_trials_than_there_were():
+    """However many there were: a rule may have failed that so many could have certified."""
+    assert stopping(trials=10_000, wrong=0).refusal(0.09).endswith("0.09 needs about 10001 trials")
+
+
 def test_where_the_full_window_errs_more_often_trials_do_not_help():
     assert "more trials alone will not do" in stopping(wrong=28).refusal(0.15)
     assert "needs about" in stopping(wrong=0).refusal(0.01)

@@ -125,6 +125,18 @@ def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
     assert lines.lost == {}
 
 
+def test_lines_that_no_longer_leave_are_given_a_few_steps_at_the_end():
+    held, steps = threading.Event(), []
+    writer = LineWriter("held", lambda line: held.wait())
+    writer.put("{}")
+    writer._thread.join, join = steps.append, writer._thread.join
+    writer.close()
+    assert (len(steps), writer.lost) == (event_writer.STUCK_STEPS, 1)
+    assert writer.problem == "nobody reads them"
+    held.set()
+    join()
+
+
 def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
     reading, writing = os.pipe()
     os.close(reading)

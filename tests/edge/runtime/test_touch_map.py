@@ -206,6 +206,7 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     assert first.position == (0.1, 0.2, 0.3)
     assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
     assert first.flags == ("tie", "short")
+    assert "\n\n" not in path.read_text()
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,11 @@ from edge.classifier import Classifier
 from edge.commands.run import chip_event
 from edge.events import Decided
 from edge.fake.player import Playback, fake_skin
+from edge.i2c.bus import BusArbitration, bus_error
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
-from edge.skin.bus_reader import STEPS_PER_FRAME
+from edge.skin.bus_reader import STEPS_PER_FRAME, Persistent
 from edge.skin.loop import Loop
 from edge.skin.slot import ChipState
 
@@ -231,3 +232,22 @@ def test_a_chip_that_never_comes_back_stays_out_and_costs_nothing():
     outcome = run("", cody, [forever], seconds=1.5)
     assert (outcome.missing, outcome.missed, outcome.escaped) == (12, 0, "")
     assert math.isnan(outcome.recovery_s)
+
+
+def test_a_transaction_is_sent_again_as_often_as_its_error_allows():
+    file = skins()["cody"]
+    with fake_skin(file, Pattern(file)) as skin:
+        reader = skin.readers[0]
+        sent = []
+
+        def lost(prepared):
+            sent.append(prepared)
+            raise bus_error(errno.EAGAIN, "a bus")
+
+        held = SimpleNamespace(
+            name="", now=None, sleep=None, prepare=None, reopen=None, close=None, transfer=lost
+        )
+        reader.retries = 12
+        with pytest.raises(BusArbitration):
+            Persistent(held, reader).transfer(None)
+    assert (len(sent), reader.retries) == (1 + 3, 12 - 3)

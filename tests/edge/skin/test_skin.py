@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.errors import EdgeError
+from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
 from edge.skin.buffers import SEQUENCE_FRAMES
 from edge.skin.file import Reading
@@ -295,3 +296,15 @@ def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
     with fake_skin(file, lambda t: quiet) as skin:
         valid = [bool(skin.read().valid.all()) for _ in range(150)]
     assert valid.index(False) == file.reading.stuck_frames
+
+
+def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
+    def absent(*spec):
+        raise BusMissing("no such bus")
+
+    monkeypatch.setattr("edge.skin.skin._open", absent)
+    with pytest.raises(InputError, match="has no calibration; run `edge-classify calibrate"):
+        Skin.open(CODY)
+    for file, wanted in ((CODY, False), (calibrated(CODY), True)):
+        with pytest.raises(BusMissing):
+            Skin.open(file, calibrated=wanted)

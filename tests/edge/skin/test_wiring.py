@@ -1,5 +1,7 @@
 """The wiring of a skin: which stage is which taxel, and what two chips may not share."""
 
+from dataclasses import replace
+
 import pytest
 
 from edge.errors import InputError
@@ -119,3 +121,8 @@ def test_a_kind_that_is_unknown_is_named_before_chips_that_are_missing():
     text = SERIAL.replace('"block"', '"microcontroller"').split("chips")[0]
     with pytest.raises(InputError, match="kind must be one of"):
         skinfile.parse(text)
+
+
+def test_the_largest_value_of_a_microcontroller_is_that_of_its_bits():
+    chip = skinfile.load(skinfile.shipped("matrix")).chips[0]
+    assert replace(chip, bits=12).highest == 4095

@@ -278,3 +278,12 @@ def test_transforms_are_within_four_roundings_of_exact_arithmetic(peaks, transfo
     assert seen == pytest.approx(
         exact, rel=4 * 2.0**-53, abs=4 * 2.0**-53 if transform == "log" else 0
     )
+
+
+def test_the_pressure_of_one_taxel_is_its_force():
+    frames = touch(PEAKS)
+    for frame in frames:
+        frame.counts[1, 2] = 0
+    pressure, force = (vector_of(frames, f"contact_{name}") for name in ("pressure", "force"))
+    assert pressure.tolist() == force.tolist()
+    assert pressure.all()

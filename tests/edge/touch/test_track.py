@@ -246,3 +246,7 @@ def test_a_region_s_time_loses_nothing_to_a_large_clock():
         Frame(start, counts, times=times)
     )
     assert contact.onset_s == start - 0.25
+
+
+def test_the_last_frame_that_is_kept_is_the_first_at_the_horizon():
+    assert follow([30] * 6, dt=0.25, horizon_s=0.5) == [(0.0, [30, 30, 30], False)]
