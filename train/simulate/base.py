@@ -19,7 +19,6 @@ from train.simulate.contact import (
     sort_bed,
     spring_loads,
     total,
-    touching,
 )
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
@@ -28,7 +27,7 @@ from train.simulate.state import Bed, State
 SWING, PLACE, SPRINGS, WINDOW, BED, ORDER = 0, 5, 10, 30, 40, 60
 LOCATE, LAYOUT = 10, 20
 PREDICT, PRESS, SETTLE = 10, 30, 60
-BEAR, IMAGE = 10, 30
+TICK, BEAR, IMAGE = 0, 10, 30
 
 
 def add(build: Build) -> None:
@@ -44,6 +43,7 @@ def add(build: Build) -> None:
     build.put("step", PREDICT, predict)
     build.put("step", PRESS, press)
     build.put("step", SETTLE, settle)
+    build.put("sample", TICK, tick)
     build.put("sample", BEAR, bear)
     build.put("sample", IMAGE, image)
     build.trace("depth_m", deepest)
@@ -90,7 +90,7 @@ def swing(state: State) -> None:
     state.joint_k = k
     state.lag = d / k * state.rate
     state.q = equilibrium(state, 0.0) - state.lag
-    state.t = 0.0
+    state.frame = np.zeros(state.n)
 
 
 STILL_M_S = 1e-6
@@ -171,7 +171,6 @@ def lay_bed(state: State) -> None:
         stiffness=state.reach * state.taxel_k,
         weight=covered(offset, state),
         line_gap=curve_gap(offset, state) if curved else np.zeros((1, 1)),
-        lines=slice(0, len(offset)),
     )
 
 
@@ -245,6 +244,12 @@ def settle(state: State) -> None:
     state.depth = relieve(state.y, state.compliance, loads)
 
 
+def tick(state: State) -> None:
+    """The frame ends at its own time: sums of steps would drift from it."""
+    state.frame = state.frame + 1.0
+    state.t = state.frame / state.scene.trials["rate_hz"]
+
+
 def bear(state: State) -> None:
     """The force that the skin bears, and each line's depth."""
     state.force = state.loads[0]
@@ -258,13 +263,9 @@ def deepest(state: State) -> Array:
 
 
 def image(state: State) -> None:
-    """The force shared out among taxels: (rows, columns, n) newtons, the skin's rows `lines`
-    and the window's columns from `image_from` on; those beside them bear nothing. Where a column
-    has more springs than one, its first says what it bears."""
-    bed = state.bed
+    """The force shared out among taxels: (rows, columns, n) newtons. Where a column has more
+    springs than one, its first says what it bears."""
+    bed, columns = state.bed, len(state.columns)
     depth = np.broadcast_to(state.line_depth, bed.weight.shape)
-    held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
-    some = touching(bed.gaps[: len(state.columns)], held)
-    loads = spring_loads(depth, bed.gaps[some], bed.stiffness[some], bed.weight)
+    loads = spring_loads(depth, bed.gaps[:columns], bed.stiffness[:columns], bed.weight)
     state.image = share_out(state.force, loads)
-    state.image_from = some.start

@@ -89,9 +89,13 @@ def total(values: Array) -> Array:
 
 def sort_bed(gaps: Array, stiffness: Array) -> tuple[Array, Array]:
     """Slopes K and intercepts B, (E, n) each, of phi(a) = max(0, max_s(K_s a - B_s))."""
-    order = np.argsort(gaps, axis=0, kind="stable")
-    gaps = np.take_along_axis(gaps, order, axis=0)
-    stiffness = np.take_along_axis(stiffness, order, axis=0)
+    return bed_law(gaps, stiffness, np.argsort(gaps, axis=0, kind="stable"))
+
+
+def bed_law(gaps: Array, stiffness: Array, order: NDArray[np.intp]) -> tuple[Array, Array]:
+    """`sort_bed`, where the springs' order (E, n) by their gaps is known."""
+    gaps = np.take_along_axis(gaps, order, 0)
+    stiffness = np.take_along_axis(stiffness, order, 0)
     return running_sum(stiffness), running_sum(stiffness * gaps)
 
 
@@ -108,18 +112,6 @@ def closed_form(slopes: Array, intercepts: Array, y: Coordinates, c: Coordinates
     return (np.maximum(force.max(axis=0), 0.0),)
 
 
-def touching(gaps: Array, deepest: Array) -> slice:
-    """The columns of `gaps` (C, n), as one run, that any trial touches at `deepest` (n,).
-
-    The others add exact zeros, so leaving them out changes no bit; on a tape, which cannot cut by
-    what it finds, they stay.
-    """
-    if hasattr(gaps, "tape"):
-        return slice(0, len(gaps))
-    touched = np.nonzero(np.any(gaps < deepest, axis=1))[0]
-    return slice(int(touched[0]), int(touched[-1]) + 1) if touched.size else slice(0, 0)
-
-
 def spring_loads(depths: Array, gaps: Array, stiffness: Array, weight: Array) -> Array:
     """(L, C, n) load of each spring at the lines' depths (L, n), before sharing out."""
     inside = depths[:, None] - gaps
@@ -134,8 +126,6 @@ def share_out(force: Array, loads: Array) -> Array:
 
     Not the loads themselves: at a stiffness of 1e15 N/m they lose digits that the force has.
     """
-    if not loads.shape[1]:
-        return loads
     whole = total(total(loads))
     loads *= force / np.where(whole > 0.0, whole, 1.0)
     return loads

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -69,8 +69,7 @@ def middle_values(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Arra
 def physics(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> Batch:
     """The middle trials' forces and joints at a step."""
     kind = kind_of(scene, trials[0].object, trials[0].condition)
-    # So many steps are worth a tape, whatever the effects.
-    plan = replace(make_plan(scene, kind.effects), taped=True)
+    plan = make_plan(scene, kind.effects)
     values = middle_values(scene, trials)
     return run_batch(scene, trials, step_s, plan=plan, values=values, images=False)
 

@@ -20,7 +20,7 @@ from train.simulate.required_effects import required_effects
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
 from train.simulate.schema import SPREAD, STIFFNESSES
 from train.simulate.sensor_frames import SensorFrames
-from train.simulate.state import Readings, State
+from train.simulate.state import Kept, Readings, State
 
 
 @dataclass(frozen=True)
@@ -202,32 +202,24 @@ def run_physics(
     force = np.zeros((frames, n))
     traces = {name: np.zeros((frames, n)) for name in plan.traces}
     seen = SensorFrames(scene, plan, state, frames if images else 0)
+    kept: list[Kept] = [(joints, lambda state: state.q), (force, lambda state: state.force)]
+    kept += [(traces[name], quantity) for name, quantity in plan.traces.items()]
+    if images:
+        kept.append((seen.window.transpose(1, 2, 3, 0), seen.of))
+    # The clock and the force alone, where no images are asked for.
+    sample = plan.sample if images else plan.sample[:2]
     joints[0] = state.q
-    sample = plan.sample if images else plan.sample[:1]
-    recorder: Recorder | None = None
     for k in range(1, frames):
-        if recorder is None:
-            for function in (*plan.frame, *substeps * plan.step):
-                function(state)
-        else:
-            recorder.run(plan.frame, 1)
-            recorder.run(plan.step, substeps, changed=False)
-        state.t = np.full(n, k / rate_hz)
-        if recorder is None:
-            for function in sample:
-                function(state)
-        else:
-            recorder.run(sample, 1)
-        joints[k] = state.q
-        force[k] = state.force
-        for name, quantity in plan.traces.items():
-            traces[name][k] = quantity(state)
-        if images:
-            seen.take(k, state)
+        for function in (*plan.frame, *substeps * plan.step, *sample):
+            function(state)
+        for room, quantity in kept:
+            room[k] = quantity(state)
         if k == 1 and plan.taped:
             from train.simulate.recorder import Recorder
 
-            recorder = Recorder(state)
+            stages = ((plan.frame, 1), (plan.step, substeps), (sample, 1))
+            Recorder(state, kept).run(stages, k + 1, frames)
+            break
     t = np.arange(frames) / rate_hz
     check_energy(scene, state, joints, t)
     return PhysicsRun(

@@ -39,8 +39,8 @@ class Plan:
     """{name: what it is in a state (n,)}, kept for every frame."""
     owners: dict[Any, str]
     """{function: the effect it belongs to, or `base`}."""
-    taped: bool
-    """Its steps are worth a tape (`tape`)."""
+    taped: bool = True
+    """Frames are run by tape (`recorder`), not function by function."""
 
     def __len__(self) -> int:
         """How many functions there are in all stages."""
@@ -60,7 +60,6 @@ class Build:
     solve: Solver = field(init=False)
     traces: dict[str, Callable[[State], Array]] = field(default_factory=dict)
     owners: dict[Any, str] = field(default_factory=dict)
-    taped: bool = False
 
     def put(self, stage: str, rank: int, function: PhysicsFunction) -> None:
         """Add a function to a stage of the physics; the lower rank runs first."""
@@ -112,5 +111,4 @@ class Build:
             solve=self.solve,
             traces=self.traces,
             owners=self.owners,
-            taped=self.taped,
         )

@@ -9,25 +9,30 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 OPERATIONS = (
-    *("copy", "negative", "absolute", "sqrt", "exp", "sin", "cos", "floor", "logical_not"),
+    *("copy", "negative", "absolute", "sqrt", "exp", "sin", "cos", "floor", "rint"),
+    "logical_not",
     *("add", "subtract", "multiply", "divide", "maximum", "minimum"),
     *("greater", "greater_equal", "less", "less_equal", "logical_and", "logical_or"),
-    *("where", "clip", "gather", "any", "call"),
+    *("where", "clip", "gather", "at", "any", "call", "keep"),
 )
 CODE = {name: i for i, name in enumerate(OPERATIONS)}
-COPY, NEGATIVE, ABSOLUTE, SQRT, EXP, SIN, COS, FLOOR, NOT = range(9)
-ADD, SUBTRACT, MULTIPLY, DIVIDE, MAXIMUM, MINIMUM = range(9, 15)
-GREATER, GREATER_EQUAL, LESS, LESS_EQUAL, AND, OR, WHERE, CLIP, GATHER, ANY, CALL = range(15, 26)
+COPY, NEGATIVE, ABSOLUTE, SQRT, EXP, SIN, COS, FLOOR, RINT, NOT = range(10)
+ADD, SUBTRACT, MULTIPLY, DIVIDE, MAXIMUM, MINIMUM = range(10, 16)
+GREATER, GREATER_EQUAL, LESS, LESS_EQUAL, AND, OR = range(16, 22)
+WHERE, CLIP, GATHER, AT, ANY, CALL, KEEP = range(22, 29)
 ROW = 19
 """Numbers of a row: the operation; the addresses of the result and of three operands; three
 lengths; the strides in bytes of the outer two dimensions of each; the inner strides, in numbers,
-of a copy's result and operand; what `any` has to find."""
+of a copy's result and operand; what `any` has to find. See `keep` for its own."""
+KINDS = ("float64", "float32", "uint16")
+"""Of numbers that are kept."""
 
 
 def _at(typingctx: Any, address: Any, kind: Any) -> Any:
@@ -89,6 +94,9 @@ def one(op: int, o: Any, a: Any, n: int) -> None:
     elif op == FLOOR:
         for k in range(n):
             o[k] = math.floor(a[k])
+    elif op == RINT:
+        for k in range(n):
+            o[k] = np.rint(a[k])
     else:
         for k in range(n):
             o[k] = 1.0 if a[k] == 0.0 else 0.0
@@ -149,19 +157,22 @@ def three(op: int, o: Any, a: Any, b: Any, c: Any, n: int) -> None:
 
 @njit(error_model="numpy")
 def rare(row: NDArray[Any]) -> bool:
-    """Copies of what is scattered, and picks by number (`np.take_along_axis`, first axis)."""
+    """Copies of what is scattered; picks by number (`np.take_along_axis`, first axis); sums by
+    number (`np.add.at`, of a flat array)."""
+    op = row[0]
     for i in range(row[5]):
         for j in range(row[6]):
-            o, a = (
-                floats(row[1] + i * row[8] + j * row[9]),
-                floats(row[2] + i * row[10] + j * row[11]),
-            )
-            if row[0] == COPY:
+            o = floats(row[1] + (0 if op == AT else i * row[8] + j * row[9]))
+            a = floats(row[2] + i * row[10] + j * row[11])
+            if op == COPY:
                 for k in range(row[7]):
                     o[k * row[16]] = a[k * row[17]]
-            else:
-                index = floats(row[3] + i * row[12] + j * row[13])
-                for k in range(row[7]):
+                continue
+            index = floats(row[3] + i * row[12] + j * row[13])
+            for k in range(row[7]):
+                if op == AT:
+                    o[int(index[k])] += a[k]
+                else:
                     o[k] = floats(row[2] + i * row[10] + int(index[k]) * row[11])[k]
     return True
 
@@ -178,39 +189,108 @@ def found(row: NDArray[Any]) -> bool:
     return False
 
 
-@njit(cache=True, error_model="numpy")
-def replay(code: NDArray[Any], times: int) -> int:
-    """Run a tape (rows, ROW) so many times, or until an `any` finds what it did not when the
-    tape was recorded.
+@njit(error_model="numpy")
+def keep(row: NDArray[Any], frame: int) -> None:
+    """Put an array where a frame's is kept. Of the row: the operation; the addresses of the first
+    frame's and of the array; bytes from frame to frame; the kind; three lengths; the strides in
+    bytes of the result and of the array."""
+    for i in range(row[5]):
+        for j in range(row[6]):
+            o = row[1] + frame * row[3] + i * row[8] + j * row[9]
+            a = floats(row[2] + i * row[11] + j * row[12])
+            step = row[13] // 8
+            if row[4] == 0:
+                for k in range(row[7]):
+                    floats(o + k * row[10])[0] = a[k * step]
+            elif row[4] == 1:
+                for k in range(row[7]):
+                    at(o + k * row[10], types.float32)[0] = a[k * step]
+            else:
+                for k in range(row[7]):
+                    at(o + k * row[10], types.uint16)[0] = a[k * step]
+
+
+@njit(error_model="numpy")
+def play(code: NDArray[Any], first: int, last: int, frame: int) -> bool:
+    """Run the rows from `first` to `last` - 1 of a code (rows, ROW).
 
     Returns:
-        How many times it ran to its end; of the next, no lasting array has been written.
+        False where an `any` finds what it did not when the tape was recorded; no lasting array
+        has then been written.
     """
-    for done in range(times):
-        for r in range(len(code)):
-            row = code[r]
-            op = row[0]
-            if op == ANY:
-                if found(row) != (row[18] != 0):
-                    return done
-            elif op == CALL:
-                call(row[1], row[2])
-            elif op == GATHER or row[16] != 1 or row[17] != 1:
-                rare(row)
-            else:
-                o, a, b, c, n = row[1], row[2], row[3], row[4], row[7]
-                for i in range(row[5]):
-                    for j in range(row[6]):
-                        o_, a_ = (
-                            floats(o + i * row[8] + j * row[9]),
-                            floats(a + i * row[10] + j * row[11]),
-                        )
-                        if op < ADD:
-                            one(op, o_, a_, n)
-                            continue
-                        b_ = floats(b + i * row[12] + j * row[13])
-                        if op < WHERE:
-                            two(op, o_, a_, b_, n)
-                        else:
-                            three(op, o_, a_, b_, floats(c + i * row[14] + j * row[15]), n)
-    return times
+    for r in range(first, last):
+        row = code[r]
+        op = row[0]
+        if op == ANY:
+            if found(row) != (row[18] != 0):
+                return False
+        elif op == CALL:
+            call(row[1], row[2])
+        elif op == KEEP:
+            keep(row, frame)
+        elif op in (GATHER, AT) or row[16] != 1 or row[17] != 1:
+            rare(row)
+        else:
+            o, a, b, c, n = row[1], row[2], row[3], row[4], row[7]
+            for i in range(row[5]):
+                for j in range(row[6]):
+                    o_, a_ = (
+                        floats(o + i * row[8] + j * row[9]),
+                        floats(a + i * row[10] + j * row[11]),
+                    )
+                    if op < ADD:
+                        one(op, o_, a_, n)
+                        continue
+                    b_ = floats(b + i * row[12] + j * row[13])
+                    if op < WHERE:
+                        two(op, o_, a_, b_, n)
+                    else:
+                        three(op, o_, a_, b_, floats(c + i * row[14] + j * row[15]), n)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def replay(code: NDArray[Any]) -> bool:
+    """Run a tape (rows, ROW) once; see `play`."""
+    return play(code, 0, len(code), 0)
+
+
+@njit(cache=True, error_model="numpy")
+def run_frames(
+    code: NDArray[Any], ways: NDArray[Any], times: NDArray[Any], clock: NDArray[Any], frames: int
+) -> bool:
+    """Run frames by tape until all have run, or none of a stage's tapes runs to its end.
+
+    Args:
+        code: (rows, ROW) of all tapes.
+        ways: (tapes, 3) the stage of each, its first row and its last + 1; of a stage's, the one
+            that ran last is put first.
+        times: (stages,) how often each runs in a frame.
+        clock: (3,) the frame, the stage, and how often that has run; moves on.
+        frames: the frame to stop at.
+
+    Returns:
+        Whether all frames have run.
+    """
+    while clock[0] < frames:
+        while clock[1] < len(times):
+            while clock[2] < times[clock[1]]:
+                ran = False
+                front = -1
+                for i in range(len(ways)):
+                    if ways[i, 0] != clock[1]:
+                        continue
+                    front = i if front < 0 else front
+                    if play(code, ways[i, 1], ways[i, 2], clock[0]):
+                        for j in range(3):
+                            ways[front, j], ways[i, j] = ways[i, j], ways[front, j]
+                        ran = True
+                        break
+                if not ran:
+                    return False
+                clock[2] += 1
+            clock[1] += 1
+            clock[2] = 0
+        clock[0] += 1
+        clock[1] = 0
+    return True

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from train.simulate.contact import Array
 from train.simulate.plan import Plan
 from train.simulate.scene_model import Scene
 from train.simulate.state import State
@@ -26,41 +27,25 @@ class SensorFrames:
         self.scale = scene.skin.counts_per_newton or 1.0
         self.raw = bool(plan.sensor or plan.clock)
         self.kind = np.float32 if self.raw else np.uint16
-        shape = (frames, len(state.columns), scene.skin.rows, state.n)
+        shape = (state.n, frames, scene.skin.rows, len(state.columns))
         self.window: NDArray[Any] = np.zeros(shape, dtype=self.kind)
 
-    def take(self, k: int, state: State) -> None:
-        """Keep the image of frame k."""
-        image = state.image
-        if not image.shape[1]:
-            return
-        first = state.image_from
-        counts = image * self.scale
+    def of(self, state: State) -> Array:
+        """(rows, columns, n) what is kept of a frame."""
+        counts = state.image * self.scale
         if not self.raw:
             np.rint(counts, out=counts)
-        np.minimum(counts, FULL, out=counts)
-        last = first + counts.shape[1]
-        np.copyto(
-            self.window[k, first:last, state.bed.lines],
-            counts.transpose(1, 0, 2),
-            casting="unsafe",
-        )
+        return np.minimum(counts, FULL, out=counts)
 
     def whole(self, state: State) -> NDArray[Any]:
         """(n, frames, rows, cols) counts, before any sensor's effect."""
-        skin = state.skin
-        frames, _, rows, n = self.window.shape
-        counts: NDArray[Any] = np.zeros((n, frames, rows, skin.cols), dtype=self.kind)
-        touched = np.flatnonzero(self.window.any(axis=(0, 2, 3)))
-        if touched.size:
-            first, last = touched[0], touched[-1] + 1
-            strip = np.ascontiguousarray(self.window[:, first:last].transpose(3, 0, 2, 1))
-            start = state.columns[first]
-            for i in range(n):
-                column = int(start[i])
-                fits = min(last - first, skin.cols - column)
-                counts[i, :, :, column : column + fits] = strip[i, :, :, :fits]
-                counts[i, :, :, : last - first - fits] = strip[i, :, :, fits:]
+        cols = state.skin.cols
+        n, frames, rows, window = self.window.shape
+        counts: NDArray[Any] = np.zeros((n, frames, rows, cols), dtype=self.kind)
+        for i, column in enumerate(state.columns[0]):
+            fits = min(window, cols - column)
+            counts[i, :, :, column : column + fits] = self.window[i, :, :, :fits]
+            counts[i, :, :, : window - fits] = self.window[i, :, :, fits:]
         return counts
 
     def in_counts(self, counts: NDArray[Any]) -> NDArray[np.uint16]:

@@ -25,7 +25,6 @@ class Bed:
         stiffness: (C, n) newtons a metre.
         weight: (L, n) the part of each line that the object covers.
         line_gap: (L, n) metres by which the object's face draws back; (1, n) where it is flat.
-        lines: rows of the skin that the lines stand for.
         slopes, intercepts: (E, n) the law of the whole bed, phi(a) = max_s (K_s a - B_s).
     """
 
@@ -33,7 +32,6 @@ class Bed:
     stiffness: Array
     weight: Array
     line_gap: Array
-    lines: slice
     slopes: Array = field(init=False)
     intercepts: Array = field(init=False)
 
@@ -51,6 +49,8 @@ class State:
 
     Attributes:
         h: seconds, the step.
+        frame: (n,) the number of the frame that has ended last.
+        t: seconds; (n,) once a frame has ended.
         values: {name: (n,)} of what was drawn for each trial.
         solve: (state, y, C) -> the loads at which arm and bed agree.
         own: {class: instance}, the called effects' own state.
@@ -67,7 +67,7 @@ class State:
         y, y_frame, loads, compliance, jacobian, depth: of the contact's coordinates
             (`contact`).
         force: (n,) newtons that the skin bears.
-        image: (rows, columns, n) newtons a taxel, from column `image_from` of `columns` on.
+        image: (rows, columns, n) newtons a taxel, of the skin's rows and of `columns`.
     """
 
     scene: Scene
@@ -80,6 +80,7 @@ class State:
     solve: Solver
     own: dict[type, Any] = field(default_factory=dict)
 
+    frame: Array = field(init=False)
     t: float | Array = 0.0
     travel_s: Array = field(init=False)
     start: Array = field(init=False)
@@ -117,7 +118,6 @@ class State:
     force: Array = field(init=False)
     line_depth: Array = field(init=False)
     image: Array = field(init=False)
-    image_from: int = field(init=False)
 
     def of(self, kind: type[Own]) -> Own:
         """An effect's own state."""
@@ -128,6 +128,8 @@ class State:
         self.own[type(own)] = own
 
 
+Kept = tuple[NDArray[Any], Callable[[State], Array]]
+"""Room (frames, ...) for a quantity of every frame, and what it is in a state."""
 Solver = Callable[[State, Coordinates, Coordinates], Coordinates]
 
 

@@ -68,7 +68,7 @@ class ViscousBed(Bed):
     def lines_of(self, springs: Springs, lever: Array) -> Springs:
         """The bed's springs, with what answers to speed."""
         lines = super().lines_of(springs, lever)
-        return lines._replace(gain=self.gain, load=self.load[self.lines])
+        return lines._replace(gain=self.gain, load=self.load)
 
 
 RANK = base.ORDER + 30
@@ -86,9 +86,7 @@ def add(build: Build) -> None:
             """Each row's branches move on; a row that the face does not cover bears nothing."""
             own, bed = state.of(Branches), state.bed
             assert isinstance(bed, ViscousBed)
-            force = np.zeros_like(own.load)
-            force[bed.lines] = line_forces(state)
-            own.move_on(force)
+            own.move_on(line_forces(state))
             bed.load = own.load
 
         build.put("setup", RANK, begin_lines)

@@ -81,7 +81,7 @@ class Rig:
         state.compliance = (np.broadcast_to(state.give, (1, n))[0],)
         state.loads = (np.zeros(n),)
         none = np.zeros((1, n))
-        state.bed = Bed(none, none, none, none, slice(0, 1))
+        state.bed = Bed(none, none, none, none)
         state.bed.slopes = np.broadcast_to(slopes, (len(slopes), n))
         state.bed.intercepts = np.broadcast_to(intercepts, (len(intercepts), n))
         self.state = state

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from train.simulate.replay import CODE, replay
+from train.simulate.replay import CODE, replay, run_frames
 from train.simulate.tape import NotTaped, Tape
 
-ONE = ("negative", "absolute", "sqrt", "sin", "cos", "floor", "logical_not")
+ONE = ("negative", "absolute", "sqrt", "sin", "cos", "floor", "rint", "logical_not")
 TWO = ("add", "subtract", "multiply", "divide", "maximum", "minimum")
 ASKED = ("greater", "greater_equal", "less", "less_equal", "logical_and", "logical_or")
 SHAPES = [
@@ -31,8 +31,12 @@ def run(name, *inputs):
     lasting = {id(array): array for array in inputs if isinstance(array, np.ndarray)}
     tape = Tape(lasting)
     out = tape.put(name, inputs)
-    assert replay(np.array(tape.rows, dtype=np.int64), 3) == 3
+    assert replay(coded(tape))
     return np.asarray(out)
+
+
+def coded(tape):
+    return np.array(tape.rows, dtype=np.int64)
 
 
 @pytest.mark.parametrize("shapes", SHAPES, ids=str)
@@ -79,7 +83,7 @@ def test_what_goes_along_an_axis_goes_one_after_the_other(name, n):
     for running, method in ((False, "reduce"), (True, "accumulate")):
         tape = Tape({id(values): values})
         out = tape.along(name, tape.view(values), running)
-        replay(np.array(tape.rows, dtype=np.int64), 2)
+        replay(coded(tape))
         want = getattr(getattr(np, name), method)(values, axis=0)
         np.testing.assert_array_equal(np.asarray(out), want)
 
@@ -88,20 +92,58 @@ def test_what_does_not_lie_side_by_side_is_copied_first():
     wide = numbers((5, 14))
     tape = Tape({id(wide): wide})
     out = tape.put("add", (wide[:, ::2], wide.T[:7].T))
-    replay(np.array(tape.rows, dtype=np.int64), 1)
+    replay(coded(tape))
     np.testing.assert_array_equal(np.asarray(out), wide[:, ::2] + wide[:, :7])
 
 
-def test_a_replay_ends_where_a_branch_would_go_another_way():
-    left, none = np.array([2.0, 0.0]), np.zeros(2)
+@pytest.mark.parametrize("axis", [0, 1])
+def test_sums_run_along_any_axis(axis):
+    values = numbers((6, 5, 7))
+    tape = Tape({id(values): values})
+    out = np.add.accumulate(tape.view(values), axis=axis)
+    replay(coded(tape))
+    np.testing.assert_array_equal(np.asarray(out), np.add.accumulate(values, axis=axis))
+
+
+def test_sums_by_number_are_added_one_after_the_other():
+    values, places = numbers((6, 7)), np.random.default_rng(1).integers(0, 5, (6, 7))
+    want = np.zeros(5)
+    np.add.at(want, places, values)
+    index = places.astype(float)
+    tape = Tape({id(values): values, id(index): index})
+    out = tape.put("copy", (0.0,), tape.new((5,)))
+    np.add.at(out, tape.view(index).astype(np.int64), tape.view(values))
+    replay(coded(tape))
+    np.testing.assert_array_equal(np.asarray(out), want)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.uint16])
+def test_a_frame_is_kept_in_its_place_and_kind(kind):
+    values = np.rint(numbers((5, 4, 3)) ** 2 * 100.0)
+    room = np.zeros((3, 6, 5, 4), dtype=kind).transpose(1, 2, 3, 0)
+    tape = Tape({id(values): values})
+    tape.keep(room, tape.view(values))
+    clock = np.array([2, 0, 0])
+    assert run_frames(coded(tape), np.array([[0, 0, 1]]), np.array([1]), clock, 4)
+    np.testing.assert_array_equal(room[2], values.astype(kind))
+    np.testing.assert_array_equal(room[3], values.astype(kind))
+    assert not room[[0, 1, 4, 5]].any()
+
+
+def test_frames_end_where_a_branch_would_go_another_way():
+    left, none = np.array([3.0, 0.0]), np.zeros(2)
     tape = Tape({id(left): left, id(none): none})
     fewer = tape.put("subtract", (left, 1.0))
     some = tape.put("greater", (fewer, 0.0))
     tape.emit("any", some.shape, [some, some], expected=True)
     tape.emit("copy", left.shape, [left, fewer])
-    # 2 becomes 1 and is found above 0; 1 becomes 0, and is not: the second run changes nothing.
-    assert replay(np.array(tape.rows, dtype=np.int64), 5) == 1
-    np.testing.assert_array_equal(left, [1.0, -1.0])
+    # 2 is found above 0 and so is 1, but 0 is not: the third run changes nothing.
+    clock = np.array([0, 0, 0])
+    ways = np.array([[0, 0, len(tape.rows)]])
+    assert not run_frames(coded(tape), ways, np.array([2]), clock, 5)
+    np.testing.assert_array_equal(left, [1.0, -2.0])
+    np.testing.assert_array_equal(clock, [1, 0, 0])
+    assert not replay(coded(tape))
 
 
 def test_four_dimensions_that_cannot_become_three_are_refused():

@@ -174,7 +174,7 @@ def test_5_the_number_of_functions_is_exact():
         "setup": 6,
         "frame": 1,
         "step": 3,
-        "sample": 2,
+        "sample": 3,
         "clock": 0,
         "sensor": 0,
     }
@@ -187,8 +187,6 @@ def test_5_the_number_of_functions_is_exact():
     for kind in kinds(one):
         plan = make_plan(one, kind.effects)
         extra = sum(EFFECTS[name].functions for name in kind.effects)
-        if "pop" in kind.effects and "tilt" not in kind.effects:
-            extra += 1  # the bed's law without the burst bubbles
         if {"relaxation", "inertia"} & set(kind.effects):
             extra += 3 if "tilt" in kind.effects else 2  # what the two share
         if {"friction", "sliding"} <= set(kind.effects):

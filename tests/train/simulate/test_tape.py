@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from train.simulate.replay import ROW, replay
-from train.simulate.tape import NotTaped, Tape
+from train.simulate.replay import replay
+from train.simulate.tape import NotTaped, Tape, address
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def test_work_on_a_taped_array_is_replayed(values):
     assert len(tape.rows) > 10
     for scale in (1.0, -2.0):
         values *= scale
-        assert replay(np.array(tape.rows, dtype=np.int64).reshape(-1, ROW), 1) == 1
+        assert replay(np.array(tape.rows, dtype=np.int64))
         for out, want in zip(outs, work(values), strict=True):
             np.testing.assert_array_equal(np.asarray(out), want)
 
@@ -46,3 +46,17 @@ def test_only_any_can_be_asked_of_a_taped_array():
     for ask in (bool, float, int, lambda x: x[0], np.median, lambda x: x.max()):
         with pytest.raises(NotTaped):
             ask(taped if ask is not float else taped[:1])
+
+
+def test_what_is_added_in_place_is_put_once(values):
+    tape, x = taped(values)
+    wide = np.copy(x)
+    rows = len(tape.rows)
+    wide[1:] += x[:-1]
+    assert len(tape.rows) == rows + 1
+
+
+def test_an_address_is_that_of_the_first_number(values):
+    _, x = taped(values)
+    for array in (values, values[1:, ::2], x, x[2:], np.broadcast_to(values[3], values.shape)):
+        assert address(array) == array.__array_interface__["data"][0]

@@ -32,7 +32,6 @@ class Momentum:
 def add(build: Build) -> None:
     """Give the arm its inertia, and the skin its loss."""
     loss_s = build.settings("inertia")["loss_s"]
-    build.taped = True
 
     def damp(state: State) -> None:
         """The dashpot beside the skin's springs is a branch that forgets at once."""

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.contact import Array, share_out, total, touching
+from train.simulate.contact import Array, share_out, total
 from train.simulate.plan import Build
 from train.simulate.state import State
 
@@ -69,28 +69,22 @@ def image(state: State) -> None:
     the root of each column's depth past its touch."""
     bed = state.bed
     depth = np.broadcast_to(state.line_depth, bed.weight.shape)
-    held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
-    gaps = state.column_gaps
-    nearest = gaps.min(axis=0)
     # A touch so slight that it falls between the columns is the nearest one's.
-    some = touching(gaps - nearest, held)
-    inside = np.maximum(depth[:, None] - (gaps - nearest)[some], 0.0)
-    loads = np.sqrt(inside) * state.reach[some]
-    if loads.shape[1]:
-        ellipse = along_columns(loads)
-        wide = along_columns((inside > 0.0) * state.reach[some])
-        borne = row_loads(state, depth, held, wide)
-        loads *= (borne / np.where(ellipse > 0.0, ellipse, 1.0))[:, None]
+    inside = np.maximum(depth[:, None] - (state.column_gaps - state.column_gaps.min(axis=0)), 0.0)
+    loads = np.sqrt(inside) * state.reach
+    ellipse = along_columns(loads)
+    borne = row_loads(state, depth, along_columns((inside > 0.0) * state.reach))
+    loads *= (borne / np.where(ellipse > 0.0, ellipse, 1.0))[:, None]
     state.image = share_out(state.force, loads)
-    state.image_from = some.start
 
 
 def along_columns(values: Array) -> Array:
     """(L, n) the sums over the columns of (L, C, n), one term after the other."""
-    return np.asarray(np.add.accumulate(values, axis=1)[:, -1])
+    sums: Array = np.add.accumulate(values, axis=1)[:, -1]
+    return sums
 
 
-def row_loads(state: State, depth: Array, held: Array, wide: Array) -> Array:
+def row_loads(state: State, depth: Array, wide: Array) -> Array:
     """(L, n) what each row bears, up to a factor, at the depths (L, n) and `wide` columns (L, n).
 
     Across the forearm a row bears as a layer does; along it the rows feel each other as a
@@ -101,34 +95,33 @@ def row_loads(state: State, depth: Array, held: Array, wide: Array) -> Array:
     highest load of a taxel is within 10 %.
     """
     bed = state.bed
-    some = touching(bed.gaps, held)
-    inside = np.maximum(depth[:, None] - bed.gaps[some], 0.0)
-    borne = along_columns(inside * bed.stiffness[some]) * bed.weight
+    inside = np.maximum(depth[:, None] - bed.gaps, 0.0)
+    borne = along_columns(inside * bed.stiffness) * bed.weight
     if len(state.line_depth) < 2:
-        return np.asarray(borne)
+        return borne
     margin, pitch = MARGIN * state.values["depth_m"], state.skin.row_pitch_m
-    slope = np.diff(depth, axis=0) / pitch
-    ends = face_ends(bed.weight, bed.lines, state.skin.rows)
+    slope = (depth[1:] - depth[:-1]) / pitch
+    ends = face_ends(bed.weight)
     askew = np.zeros_like(depth)
     askew[:-1] += ends[0][:-1] * np.maximum(-slope, 0.0)
     askew[1:] += ends[1][1:] * np.maximum(slope, 0.0)
     least = margin * total(askew)
     touched = np.clip(depth / np.where(least > 0.0, least, np.inf) - 0.5, 0.0, 1.0)
     edge = state.taxel_k * margin * margin / pitch * askew * wide
-    return np.asarray(borne * np.where(least > 0.0, touched, 1.0) + edge)
+    loads: Array = borne * np.where(least > 0.0, touched, 1.0) + edge
+    return loads
 
 
-def face_ends(weight: Array, lines: slice, rows: int) -> tuple[Array, Array]:
+def face_ends(weight: Array) -> tuple[Array, Array]:
     """(L, n) twice: which part of the face's first end lies in each row, and of its last.
 
     Args:
-        weight: (L, n) which part of each row the face covers.
-        lines: which of the skin's `rows` they are; a face that covers the skin's last row whole
-            goes on beyond the skin.
+        weight: (L, n) which part of each row the face covers; one that covers the skin's first or
+            last row whole goes on beyond the skin.
     """
-    none = np.zeros_like(weight[:1])
-    before = np.floor(weight[:1]) if lines.start == 0 else none
-    after = np.floor(weight[-1:]) if lines.stop == rows else none
-    first = np.diff(weight, axis=0, prepend=before)
-    last = -np.diff(weight, axis=0, append=after)
+    first, last = np.copy(weight), np.copy(weight)
+    first[1:] -= weight[:-1]
+    last[:-1] -= weight[1:]
+    first[0] -= np.floor(weight[0])
+    last[-1] -= np.floor(weight[-1])
     return np.maximum(first, 0.0), np.maximum(last, 0.0)

@@ -7,19 +7,19 @@ A burst bubble leaves the hard backing, b further on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from train.simulate import base
 from train.simulate.contact import (
     Array,
     Springs,
+    bed_law,
     share_out,
-    sort_bed,
     spring_loads,
     total,
-    touching,
 )
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
@@ -37,15 +37,15 @@ class BubbleBed(Bed):
 
     Attributes:
         alive: (rows, SEGMENTS * C, n) 1 where a spring bears, 0 where it is gone or still to come.
-        burst: a bubble has burst in the frame before.
+        order: of all rows' springs by their gaps, where the law asks for it.
     """
 
     alive: Array
-    burst: bool
+    order: NDArray[np.intp] = field(init=False)
 
     def lines_of(self, springs: Springs, lever: Array) -> Springs:
         """The bed's springs, without those that are gone."""
-        return super().lines_of(springs, lever)._replace(alive=self.alive[self.lines])
+        return super().lines_of(springs, lever)._replace(alive=self.alive)
 
 
 def bubbles(state: State) -> BubbleBed:
@@ -59,9 +59,8 @@ def add(build: Build) -> None:
     build.put("setup", base.BED + 5, inflate)
     build.replace(base.order_bed, order)
     build.replace(base.image, image)
-    build.put("sample", base.IMAGE + 20, burst)
-    if "tilt" not in build.effects:  # whose solver asks the lines themselves
-        build.put("sample", base.IMAGE + 21, reorder)
+    # A pivoting forearm's solver asks the lines themselves.
+    build.put("sample", base.IMAGE + 20, burst if "tilt" in build.effects else burst_in_order)
 
 
 def inflate(state: State) -> None:
@@ -87,18 +86,28 @@ def inflate(state: State) -> None:
         ),
         weight=state.bed.weight,
         line_gap=state.bed.line_gap,
-        lines=state.bed.lines,
         alive=alive.reshape(rows, SEGMENTS * columns, n),
-        burst=False,
     )
 
 
 def order(state: State) -> None:
     """The bed's law as lines K a - B, over the bubbles that are whole."""
-    bed, n = bubbles(state), state.n
+    bed = bubbles(state)
+    bed.order = np.argsort(all_gaps(bed), axis=0, kind="stable")
+    law(state)
+
+
+def all_gaps(bed: BubbleBed) -> Array:
+    """(E, n) of every row's springs."""
+    gaps = bed.line_gap[:, None] + np.broadcast_to(bed.gaps, bed.alive.shape)
+    return gaps.reshape(-1, gaps.shape[-1])
+
+
+def law(state: State) -> None:
+    """The law of the springs that are there."""
+    bed = bubbles(state)
     stiffness = bed.weight[:, None] * (bed.stiffness[None] * bed.alive)
-    gaps = bed.line_gap[:, None] + np.broadcast_to(bed.gaps, stiffness.shape)
-    bed.slopes, bed.intercepts = sort_bed(gaps.reshape(-1, n), stiffness.reshape(-1, n))
+    bed.slopes, bed.intercepts = bed_law(all_gaps(bed), stiffness.reshape(-1, state.n), bed.order)
 
 
 def image(state: State) -> None:
@@ -106,35 +115,31 @@ def image(state: State) -> None:
     bed = bubbles(state)
     rows, n = bed.weight.shape
     depth = np.broadcast_to(state.line_depth, (rows, n))
-    held = np.where(state.force > 0.0, depth.max(axis=0), -np.inf)
-    columns = len(state.reach)
-    some = touching(bed.gaps[:columns], held)
-    kinds = (SEGMENTS, columns, n)
-    gaps = bed.gaps.reshape(kinds)[:, some].reshape(-1, n)
-    stiffness = bed.stiffness.reshape(kinds)[:, some].reshape(-1, n)
-    loads = spring_loads(depth, gaps, stiffness, bed.weight)
-    alive = bed.alive[bed.lines].reshape(rows, *kinds)
-    loads *= alive[:, :, some].reshape(loads.shape)
+    loads = spring_loads(depth, bed.gaps, bed.stiffness, bed.weight)
+    loads *= bed.alive
     shared = share_out(state.force, loads).reshape(rows, SEGMENTS, -1, n)
     state.image = total(np.moveaxis(shared, 1, 0))
-    state.image_from = some.start
 
 
 def burst(state: State) -> None:
     """Bubbles under more than they hold are gone from the next frame on."""
-    bed = bubbles(state)
     gone = state.image > state.values["pop_n"]
-    bed.burst = bool(gone.any())
-    if bed.burst:
-        some = slice(state.image_from, state.image_from + gone.shape[1])
-        rows, _, n = bed.alive.shape
-        bed.alive = np.copy(bed.alive)
-        alive = bed.alive.reshape(rows, SEGMENTS, -1, n)[bed.lines]
-        alive[:, :-1, some] *= ~gone[:, None]
-        alive[:, -1, some] = np.maximum(alive[:, -1, some], gone)
+    if gone.any():
+        take_away(bubbles(state), gone)
 
 
-def reorder(state: State) -> None:
-    """The law without them."""
-    if bubbles(state).burst:
-        order(state)
+def burst_in_order(state: State) -> None:
+    """The same, and the law without them."""
+    gone = state.image > state.values["pop_n"]
+    if gone.any():
+        take_away(bubbles(state), gone)
+        law(state)
+
+
+def take_away(bed: BubbleBed, gone: NDArray[np.bool_]) -> None:
+    """Leave the backing where bubbles (rows, columns, n) are gone."""
+    rows, _, n = bed.alive.shape
+    bed.alive = np.copy(bed.alive)
+    alive = bed.alive.reshape(rows, SEGMENTS, -1, n)
+    alive[:, :-1] *= ~gone[:, None]
+    alive[:, -1] = np.maximum(alive[:, -1], gone)

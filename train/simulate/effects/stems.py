@@ -4,13 +4,12 @@ number here), damp, and slip off the forearm once bent too far, for good."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from train.simulate import base, streams
-from train.simulate.contact import Array, share_out
+from train.simulate.contact import Array, bed_law, share_out
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 
@@ -64,7 +63,6 @@ def plant(state: State) -> None:
         stiffness=values["stem_n_m"][None],
         weight=stiffness,
         line_gap=depth * values["stem_spread_m"],
-        lines=slice(0, rows),
     )
     half = 0.5 * np.minimum(values["width_m"], rows * state.skin.row_pitch_m)
     middle = (state.row_z[0] - state.z) / state.skin.row_pitch_m
@@ -92,10 +90,8 @@ def stand(state: State) -> None:
 
 def law(bed: Bed, own: Stems) -> None:
     """Slopes and intercepts of the stems that are still held."""
-    stiffness = np.take_along_axis(bed.weight * bed.stiffness, own.order, 0)
-    gaps = np.take_along_axis(bed.line_gap, own.order, 0)
-    own.slopes = np.add.accumulate(stiffness, axis=0)
-    own.intercepts = np.add.accumulate(stiffness * gaps, axis=0)
+    stiffness = bed.weight * bed.stiffness
+    own.slopes, own.intercepts = bed_law(bed.line_gap, stiffness, own.order)
 
 
 def bend(state: State) -> None:
@@ -122,6 +118,6 @@ def draw(state: State) -> None:
     rows, window = state.skin.rows, state.columns.shape[0]
     cells = np.stack([own.taxel, own.following], axis=1)
     parts = np.stack([loads * (1.0 - own.part), loads * own.part], axis=1)
-    image: Any = np.bincount(cells.ravel(), parts.ravel(), minlength=rows * window * state.n)
-    state.image = image.reshape(rows, window, state.n)[:, window // 2 - 1 : window // 2 + 2]
-    state.image_from = window // 2 - 1
+    image = np.zeros_like(parts, shape=rows * window * state.n)
+    np.add.at(image, cells, parts)
+    state.image = image.reshape(rows, window, state.n)

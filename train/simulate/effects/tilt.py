@@ -43,7 +43,6 @@ def add(build: Build) -> None:
     build.put("setup", base.ORDER + 2, upright)
     build.put("step", base.SETTLE + 20, remember)
     build.wrap(solve)
-    build.taped = True
 
 
 def upright(state: State) -> None:
@@ -132,8 +131,9 @@ def search(
         sizes = (free[0].shape,) * 3
         force, moment, lost = tape.call(pivot_solver.taped_search, given, sizes)
     if lost.any():
+        count = np.count_nonzero(np.asarray(lost))
         raise EdgeError(
-            f"{where}: how far the forearm tilts was not found for {int(lost.sum())} contacts; "
+            f"{where}: how far the forearm tilts was not found for {count} contacts; "
             "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
         )
     return force, moment
@@ -147,5 +147,5 @@ def line_forces(state: State) -> Array:
     if tape is None:
         return np.asarray(pivot_solver.line_forces(springs, state.depth))
     given = (*springs, *state.depth)
-    (forces,) = tape.call(pivot_solver.taped_line_forces, given, (springs.weight.shape,))
-    return np.asarray(forces)
+    forces: Array = tape.call(pivot_solver.taped_line_forces, given, (springs.weight.shape,))[0]
+    return forces

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from train.simulate import base
 from train.simulate.contact import Array
@@ -28,9 +28,17 @@ LEVER = 2.0 / 3.0
 
 @dataclass
 class Turning:
-    """Radians (n,) that a thing turns by for each metre that it moves at the contact."""
+    """How a thing turns, and where its image goes.
+
+    Attributes:
+        per_metre: (n,) radians for each metre that it moves at the contact.
+        first: (rows, 1, n) places in a flat image of each row's first column.
+        column: (columns, 1) which of the window's each is.
+    """
 
     per_metre: Array
+    first: NDArray[np.int64]
+    column: NDArray[np.int64]
 
 
 def add(build: Build) -> None:
@@ -51,7 +59,9 @@ def balance(state: State) -> None:
     mover.kinetic = mover.kinetic * easier
     # A disc's own moment of inertia is m R^2 / 2.
     mover.inertia = mover.inertia / (1.0 + 2.0 * aside * aside / (radius * radius))
-    state.keep(Turning(aside / (lever * lever + aside * aside)))
+    window, n = state.columns.shape
+    first = np.arange(state.skin.rows)[:, None, None] * window * n + np.arange(n)
+    state.keep(Turning(aside / (lever * lever + aside * aside), first, np.arange(window)[:, None]))
 
 
 def turned(state: State) -> Array:
@@ -62,20 +72,15 @@ def turned(state: State) -> Array:
 def follow(state: State) -> None:
     """The image moves around the forearm with the face; a load between two columns is theirs in
     parts, and one beyond the window is its last column's."""
-    image, window = state.image, len(state.columns)
-    columns = turned(state) * (state.skin.cols / (2.0 * math.pi))
-    if not (image.shape[1] and columns.any()):
+    own, image = state.of(Turning), state.image
+    turned_columns = turned(state) * (state.skin.cols / (2.0 * math.pi))
+    if not turned_columns.any():
         return
-    whole = np.floor(columns)
-    part, whole = columns - whole, whole.astype(np.int64)
-    first = int(np.clip(state.image_from + whole.min(), 0, window - 1))
-    last = int(np.clip(state.image_from + image.shape[1] + whole.max(), 0, window - 1))
-    shape = (len(image), last - first + 1, state.n)
-    rows, trials = np.arange(len(image))[:, None], np.arange(state.n)
-    # Columns of the image, each here and beside; rows; trials.
-    here = state.image_from + np.arange(image.shape[1])[:, None] + whole
-    to = np.clip(np.stack([here, here + 1], axis=1), 0, window - 1) - first
-    loads = image.transpose(1, 0, 2)[:, None] * np.stack([1.0 - part, part])[:, None]
-    cells = (rows * shape[1] + to[:, :, None]) * state.n + trials
-    moved: Any = np.bincount(cells.ravel(), loads.ravel(), minlength=math.prod(shape))
-    state.image, state.image_from = moved.reshape(shape), first
+    whole = np.floor(turned_columns)
+    part = turned_columns - whole
+    here = own.column + whole.astype(np.int64)
+    moved = np.zeros_like(image)
+    for column, share in ((here, 1.0 - part), (here + 1, part)):
+        to = np.clip(column, 0, len(state.columns) - 1)
+        np.add.at(moved.reshape(-1), own.first + to * state.n, image * share)
+    state.image = moved
