@@ -69,11 +69,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "",
     ): "from which width on columns are numbered is a matter of looks",
     (
-        "edge/model/onnx_file.py",
-        "True  ->  False",
-        "zip(*branches, strict=True)",
-    ): "branches of unequal lengths give fewer shapes than outputs, which is refused further on",
-    (
         "edge/touch/grid.py",
         "within & self._columns[0]  ->  within | self._columns[0]",
         "seam = bool",
@@ -110,20 +105,16 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "share_of_bound",
     ): "a digit more to read",
     (
-        "edge/skin/skin.py",
+        "",
         "True  ->  False",
-        "zip(self.readers, chosen, strict=True)",
-    ): "the scheduler plans for each reader",
+        "strict=True",
+    ): "lists of one length, which those who make them see to: that others are refused guards "
+    "against what is not there",
     (
         "edge/commands/terminal.py",
         "202  ->  203",
         "TOUCH",
     ): "a shade of red",
-    (
-        "edge/model/stopping.py",
-        "True  ->  False",
-        "zip(self.rates, self.limits[decision_point], strict=True)",
-    ): "a limit for each rate is asked for where the model's metadata are read",
     (
         "edge/commands/terminal.py",
         "124  ->  125",

@@ -18,11 +18,13 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
+from operator import itemgetter
 from pathlib import Path
-from random import Random
 
 from edge.files import write_whole
 from tests.mutation import runner, shapes
@@ -137,12 +139,21 @@ def changes(root: Path = shapes.ROOT) -> list[Change]:
 
 
 def drawn(count: int, seed: int) -> list[Change]:
-    """As many of each kind, the same for the same tree and seed."""
-    every, out = changes(), []
+    """As many of each kind, the same for the same seed.
+
+    Each change draws a lot of its own, so that code which is changed elsewhere, or moved, hardly
+    changes which are drawn.
+    """
+    lots: list[tuple[bytes, Change]] = []
+    alike: Counter[str] = Counter()
+    for change in changes():
+        what = f"{change.file}: {change.old} -> {change.new}"
+        lots.append((sha256(f"{seed} {what} {alike[what]}".encode()).digest(), change))
+        alike[what] += 1
+    lots.sort(key=itemgetter(0))
+    out = []
     for kind in KINDS:
-        of_kind = [change for change in every if change.kind == kind]
-        draw = Random(f"{kind} {seed}")
-        out += draw.sample(of_kind, min(count // len(KINDS), len(of_kind)))
+        out += [change for _, change in lots if change.kind == kind][: count // len(KINDS)]
     return out
 
 
