@@ -191,3 +191,43 @@ def scatter(points: Sequence[Mapping[str, Any]], *, x: str, title: str, label: s
         axes.set_title(title)
         axes.margins(y=0.12)
         return png(figure)
+
+
+def against(
+    points: Sequence[tuple[str, str, float, float]],
+    reach: Sequence[tuple[float, float]],
+    *,
+    title: str,
+) -> bytes:
+    """Ours against the paper's, a point a number; hollow where its bar misses the diagonal.
+
+    Args:
+        points: (table, task, the paper's percent, ours).
+        reach: (low, high) percent, the ends of each one's bar.
+        title: of the plot.
+    """
+    marks = dict(zip(dict.fromkeys(p[0] for p in points), "os^D", strict=False))
+    colours = dict(zip(sorted({p[1] for p in points}), COLOURS, strict=False))
+    with mpl.rc_context(STYLE):
+        figure = _figure(7.4, 5.6)
+        axes = figure.subplots()
+        ends = (min(min(p[2:]) for p in points) - 4.0, 102.0)
+        axes.plot(ends, ends, color="0.4", lw=1, label="equal")
+        for (table, task, theirs, ours), (low, high) in zip(points, reach, strict=True):
+            colour = colours[task]
+            within = low <= theirs <= high
+            axes.plot([theirs, theirs], [low, high], color=colour, lw=1, alpha=0.45)
+            face = colour if within else "white"
+            axes.plot(theirs, ours, marks[table], color=colour, mfc=face, ms=6)
+        for task, colour in colours.items():
+            axes.plot([], [], "-", color=colour, lw=4, label=task)
+        for table, mark in marks.items():
+            axes.plot([], [], mark, color="0.3", label=table)
+        axes.plot([], [], "o", color="0.3", mfc="white", label="outside the interval")
+        axes.set_xlim(ends)
+        axes.set_ylim(ends)
+        axes.set_xlabel("the paper's accuracy, %")
+        axes.set_ylabel("ours, %")
+        axes.set_title(title)
+        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        return png(figure)

@@ -31,7 +31,8 @@ class Context:
         jobs: processes.
         cluster: a joblib backend that is not this machine's, or None.
         ours: {(table, setting, task): accuracy in percent}, beside the paper's numbers.
-        seeds: how many simulated data sets `ours` is the mean of.
+        others: the same of further data sets of the scene.
+        progress: show how far the work is.
     """
 
     dataset: DataSet
@@ -39,12 +40,18 @@ class Context:
     jobs: int
     cluster: str | None = None
     ours: dict[tuple[str, str, str], float] = field(default_factory=dict)
-    seeds: int = 1
+    others: list[dict[tuple[str, str, str], float]] = field(default_factory=list)
+    progress: bool = True
+
+    @property
+    def every(self) -> list[dict[tuple[str, str, str], float]]:
+        """`ours` of each data set."""
+        return [self.ours, *self.others]
 
     @property
     def tested(self) -> int:
-        """Trials behind each number of `ours`."""
-        return self.seeds * len(self.dataset.trials)
+        """Trials behind the mean of each number over `every` data set."""
+        return len(self.every) * len(self.dataset.trials)
 
     @property
     def labels(self) -> Labels:
@@ -71,13 +78,14 @@ class Context:
     def map(
         self, what: str, function: Callable[..., Any], cases: Sequence[tuple[Any, ...]]
     ) -> list[Any]:
-        """function(*case) of each case, in order, by all processes, with a progress bar."""
+        """function(*case) of each case, in order, by all processes."""
         # A memory map would make arrays read-only files; these are small.
         run = Parallel(
             n_jobs=self.jobs, backend=self.cluster, return_as="generator", max_nbytes=None
         )
         work = (delayed(_single)(function, case) for case in cases)
-        return list(tqdm(run(work), total=len(cases), desc=f"{what:<22}", leave=True))
+        hidden = not self.progress
+        return list(tqdm(run(work), total=len(cases), desc=f"{what:<22}", disable=hidden))
 
     def follow_again(
         self, what: str, views: Sequence[skins.View]

@@ -10,6 +10,8 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+from tqdm import tqdm
+
 from edge.errors import InputError
 from train.cluster import on_cluster
 from train.dataset import load_trials
@@ -83,14 +85,13 @@ def study(
         others = robust.section(context)
         sections = [part(context) for part in SECTIONS]
         if source is not None and seeds > 1:
-            every = [context.ours, *_again(source, seeds - 1, context)]
-            context.ours, context.seeds = paper.mean_of(every), len(every)
+            context.others = _again(source, seeds - 1, context)
     # After all that the paper's numbers are set beside.
     compared = []
     if source is not None:
         theirs_too = {(e.table, e.setting, e.task): e.percent for e in paper.entries()}
-        read = readings.compare(context.ours, theirs_too, context.tested)
-        compared = [paper.section(context), read]
+        read = readings.compare(paper.mean_of(context.every), theirs_too, context.tested)
+        compared = [paper.section(context.every, context.tested), read]
     own, theirs = sections[-2:], sections[:-2]
     sections = [*own, *compared, *theirs, *([] if others is None else [others])]
     sections.insert(0, findings.section(sections))
@@ -122,11 +123,11 @@ def study(
 def _again(scene: Scene, count: int, like: Context) -> list[paper.Numbers]:
     """What the sections that the paper's numbers are set beside find on other seeds."""
     found = []
-    for i in range(1, count + 1):
+    for i in tqdm(range(1, count + 1), desc=f"{'further data sets':<22}"):
         with tempfile.TemporaryDirectory() as folder:
             simulate(replace(scene, seed=scene.seed + i), folder, jobs=like.jobs)
             dataset = load_trials([folder], horizon_s=LONGEST_S)
-        context = Context(dataset, scene, like.jobs, like.cluster)
+        context = Context(dataset, scene, like.jobs, like.cluster, progress=False)
         for part in (resolution.section, classify.scaling, classify.features):
             part(context)
         found.append(context.ours)

@@ -5,7 +5,6 @@ import re
 from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +15,14 @@ from train.__main__ import main
 from train.report.html import page, table_csv
 from train.report.tables import Figure, Section, Table
 from train.study import beyond
-from train.study.paper import difference, entries, mean_of, section
+from train.study.paper import (
+    difference,
+    entries,
+    mean_of,
+    negative_by_chance,
+    right_despite_the_object,
+    section,
+)
 
 
 def test_the_papers_numbers_are_46_and_whole_trials_of_140():
@@ -39,7 +45,7 @@ def test_numbers_that_a_scene_was_held_to_are_told_apart_from_predictions():
     assert {e.percent for e in headlines} == {80.0, 91.43, 72.14}
     ours = {(e.table, e.setting, e.task): 100.0 for e in entries()}
     ours |= {(e.table, e.setting, e.task): e.percent for e in headlines}
-    found = section(SimpleNamespace(ours=ours, tested=140, seeds=1))
+    found = section([ours], 140)
     assert found.text[0].startswith("8 of 46 numbers lie within")
     assert "Of the other 38, 0 lie within" in found.text[0]
     side = found.tables[0]
@@ -89,6 +95,39 @@ def test_more_seeds_narrow_the_interval_of_the_difference():
     one, eight = difference(80.0, 85.0, 140), difference(80.0, 85.0, 8 * 140)
     assert one[0] < eight[0] < 5.0 < eight[1] < one[1]
     assert mean_of([{("I", "1", "t"): 80.0}, {("I", "1", "t"): 90.0}]) == {("I", "1", "t"): 85.0}
+
+
+def test_an_order_is_told_with_the_data_sets_that_have_it_and_what_chance_does():
+    paper = {(e.table, e.setting, e.task): e.percent for e in entries()}
+    against = {key: 142.0 - percent for key, percent in paper.items()}
+    found = section([paper, paper, against], 420)
+    rows = {row[:2]: row[2:5] for row in found.tables[1].rows}
+    assert len(rows) == 8
+    assert all(row[:2] == (1.0, "2 of 3") for row in rows.values())
+    # Mobility is within 6 points in Table II, category within 21.
+    assert rows["II", "mobility"][2] > 5.0 > 0.1 >= rows["II", "category"][2]
+    assert "Ordered against" not in " ".join(found.text)
+    backwards = section([against], 140)
+    words = "Table I, category (-1.00; positive in 0 of 1 data sets; of perfect copies"
+    assert words in " ".join(backwards.text)
+    assert [figure.name for figure in found.figures] == ["paper"]
+
+
+def test_copies_of_equal_settings_are_ordered_by_chance_alone():
+    """Ties count as no order, so it is a little less than a half."""
+    assert 40.0 < negative_by_chance([80.0] * 6, 1120) < 50.0
+    assert negative_by_chance([20.0, 50.0, 80.0, 95.0], 1120) == 0.0
+
+
+def test_what_a_wrong_object_says_of_the_category():
+    numbers = {
+        ("I", "1", "category"): 70.0,
+        ("I", "1", "object"): 60.0,
+        ("I", "6", "category"): 80.0,
+        ("I", "6", "object"): 60.0,
+        ("II", "I", "mobility"): 99.0,
+    }
+    assert right_despite_the_object(numbers) == pytest.approx((25.0 + 50.0) / 2)
 
 
 def test_what_a_clock_measured_is_in_a_file_of_its_own():
