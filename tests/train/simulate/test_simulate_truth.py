@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from edge.errors import EdgeError, InputError
+from edge.errors import InputError
 from train.simulate import run as running
-from train.simulate import viscous
-from train.simulate.engine import check_energy, run_batch
+from train.simulate.engine import run_batch
 from train.simulate.run import kinds, simulate, write
 from train.simulate.scene import from_dict
-from train.simulate.schema import EFFECTS, IMPLIED_BY_FAMILY, LABELLED_BY
 
 BOX = {
     "name": "box",
@@ -191,99 +188,6 @@ class TestFamilies:
     def test_a_family_that_makes_no_sense_is_refused(self, change, says):
         with pytest.raises(InputError, match=says):
             scene(families=[{**FAMILY, **change}])
-
-
-class TestEnergy:
-    def test_relaxing_foam_under_a_pivoting_arm_presses_no_harder_than_a_stiff_one(self):
-        # A lagged lever of the relaxed force gave 4,826 N here, against 56 N without tilt.
-        foam = {"name": "foam", "family": "foam", "conditions": ["fixed"]}
-        for ratio in (0.5, 2.0, 10.0):
-            one = scene(
-                {**foam, "relax_ratio": ratio, "relax_s": 0.3},
-                trials={"count": 2, "after_s": 4.0},
-                effects={"add": ["tilt"]},
-            )
-            stiff = scene(
-                {**foam, "modulus_pa": 12e3 * (1.0 + ratio), "relax_ratio": 0.0, "relax_s": 0.3},
-                trials={"count": 2, "after_s": 4.0},
-                effects={"add": ["tilt"]},
-            )
-            assert run(one).force.max() <= 1.02 * run(stiff).force.max()
-
-    def test_branches_never_give_more_than_they_took(self):
-        rng = np.random.default_rng(3)
-        n = 200
-        own = viscous.Branches([], [], [], np.ones(n), np.zeros(n))
-        for _ in range(2):
-            part = 10.0 ** rng.uniform(-6, 3, n)
-            own.grow(np.exp(-part), 10.0 ** rng.uniform(-1, 2, n) * -np.expm1(-part) / part)
-        depth, work = np.zeros(n), np.zeros(n)
-        for _ in range(500):
-            step = rng.normal(0.0, 0.1, n)
-            elastic = np.maximum(depth + step, 0.0)
-            force = np.maximum(own.gain * elastic + own.load, 0.0)
-            work += force * step
-            depth = depth + step
-            own.move_on(force)
-            assert (own.load <= 0.0).all()
-        assert (work > -1e-9).all()
-
-    def test_a_run_that_makes_energy_is_refused(self):
-        one = scene({**BOX, "conditions": ["fixed"]})
-        batch = run(one)
-        joints = batch.joints.transpose(1, 2, 0).copy()
-        check_energy(one, batch.state, joints, batch.t)
-        joints[100:, 0, 1] -= 1.0
-        with pytest.raises(EdgeError, match=r"trial 1 of box-fixed makes energy: at 1 s"):
-            check_energy(one, batch.state, joints, batch.t)
-
-
-EXTREME = {
-    "mass_kg": 0.05,
-    "friction_static": 0.9,
-    "friction_kinetic": 0.2,
-    "skin_friction": 1.5,
-    "cover_n_m": 500.0,
-    "stribeck_m_s": 0.02,
-    "base_m": 0.1,
-    "height_m": 0.3,
-    "foot_m": 0.2,
-    "aside_m": 0.1,
-    "slope_deg": -10.0,
-}
-CONTACT = [name for name, info in EFFECTS.items() if info.stage == "contact"]
-
-
-@pytest.mark.parametrize("first", CONTACT)
-def test_no_effect_and_no_pair_of_them_makes_energy(first):
-    """Each run is checked as it ends; values are such that it slides, tips, bounces and slips."""
-    for second in CONTACT:
-        pair = {first, second}
-        pair |= {need for name in pair for need in EFFECTS[name].needs}
-        families = [set(EFFECTS[n].families) for n in pair if EFFECTS[n].families]
-        common = sorted(set.intersection(*families)) if families else ["rigid"]
-        if not common:
-            continue
-        keys = {key: EXTREME[key] for name in pair for key in EFFECTS[name].keys}
-        moves = {key: EXTREME[key] for key in ("mass_kg", "friction_static", "friction_kinetic")}
-        condition = "movable" if "sliding" in pair else "fixed"
-        thing = {"name": "thing", "family": common[0], "conditions": [condition]}
-        own = set(IMPLIED_BY_FAMILY.get(common[0], ())) - {*LABELLED_BY}
-        one = scene(
-            {**thing, **moves, **keys, "width_m": 0.05},
-            trials={"count": 1, "lead_s": 0.1, "after_s": 0.5},
-            effects={
-                "add": sorted(pair),
-                "leave_out": sorted(own - pair),
-            },
-        )
-        batch = run(one)
-        assert batch.force.max() > 0.0, pair
-        assert pair <= set(batch_effects(one)), pair
-
-
-def batch_effects(one):
-    return next(iter(kinds(one))).effects
 
 
 class TestLimits:
