@@ -200,6 +200,8 @@ def _size(simulated: dict[str, Any], key: str) -> float | None:
 
 DEPTH_M, STANDS_M = 0.12, 0.15
 """Depth of what is sketched, and how far below the contact it stands, if the scene is silent."""
+STEMS = 30
+"""No more of a plant's stems are drawn."""
 LOST_S = 0.3
 """What tips and has not been felt for so long has fallen."""
 
@@ -245,8 +247,12 @@ def _thing(
     motion, moved = "", max(ahead * float(now[0] - first[0][0]), 0.0)
     given = drawn.get("effects")
     effects = given if isinstance(given, list) else []
+    pressed = 0.0
     if "sliding" not in effects:
-        moved = 0.0
+        moved, pressed = 0.0, moved
+    if "stems" in effects:
+        _stems(axis, drawn, start, ahead, (floor, top), moved, pressed, style)
+        return motion
     static = _size(drawn, "friction_static") or 0.0
     if moved and "tipping" in effects and static > depth / (2.0 * height):
         fallen = since > LOST_S
@@ -258,12 +264,64 @@ def _thing(
     else:
         outline[:, 0] += moved
         aside, foot = _size(drawn, "aside_m"), _size(drawn, "foot_m")
-        if moved and "turning" in effects and aside is not None and foot is not None:
+        if "turning" in effects and aside is not None and foot is not None:
             angle = moved * aside / ((foot / 3.0) ** 2 + aside**2)
-            motion = f", turns by {math.degrees(angle):.0f} degrees seen from above"
+            _from_above(axis, foot, aside, moved, angle, style)
+            if moved:
+                motion = f", turns by {math.degrees(angle):.0f} degrees seen from above"
     shown = start + outline * [ahead, 1.0]
     axis.fill(*shown.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
     return motion
+
+
+def _stems(
+    axis: Any,
+    drawn: dict[str, Any],
+    start: np.ndarray,
+    ahead: float,
+    ends: tuple[float, float],
+    moved: float,
+    pressed: float,
+    style: str,
+) -> None:
+    """Draw a plant's stems from floor to top (`ends`, from the contact's height), moved with their
+    pot, or bent as far as they are pressed."""
+    floor, top = ends
+    count = int(np.clip(_size(drawn, "stem_count") or 12, 1, STEMS))
+    for behind in np.linspace(0.0, _size(drawn, "stem_spread_m") or 0.06, count):
+        bent = max(pressed - behind, 0.0) * (top - floor) / -floor
+        foot = moved + behind
+        axis.plot(
+            start[0] + ahead * np.array([foot, foot + bent]),
+            start[1] + np.array([floor, top]),
+            color=style,
+            alpha=0.5,
+            lw=1,
+        )
+
+
+def _from_above(
+    side: Any, foot: float, aside: float, moved: float, angle: float, style: str
+) -> None:
+    """Draw a thing that turns as it is seen from above, pushed to the right, in a corner of the
+    side's picture; it turns about where it is pushed."""
+    if not side.child_axes:
+        corner = side.inset_axes([0.01, 0.6, 0.3, 0.38])
+        corner.set_title("from above", fontsize=8)
+        corner.set_aspect("equal", adjustable="datalim")
+        corner.set_xticks([])
+        corner.set_yticks([])
+    corner = side.child_axes[0]
+    corners = np.array([[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]]) * foot - [0.0, aside]
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    corner.fill(
+        *(corners @ turn.T + [moved, 0.0]).T,
+        facecolor=style,
+        edgecolor=style,
+        alpha=0.25,
+        hatch="//",
+    )
+    corner.plot(moved, 0.0, "*", color=style)
 
 
 def _contact(

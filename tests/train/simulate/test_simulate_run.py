@@ -182,6 +182,8 @@ class TestCommand:
             {"values": {"width_m": "wide", "mass_kg": "x", "radius_m": [1]}, "effects": 5},
             {"values": [1], "effects": [1, 2], "family": 3},
             {"values": {"width_m": -1, "mass_kg": 1e300}},
+            {"values": {"stem_count": -3, "stem_spread_m": -1}, "effects": ["stems"]},
+            {"values": {"aside_m": 0.1, "foot_m": -2}, "effects": ["turning", "sliding"]},
             "a scene",
         ],
     )
