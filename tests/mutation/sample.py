@@ -23,6 +23,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
+from operator import itemgetter
 from pathlib import Path
 
 from edge.files import write_whole
@@ -138,21 +139,22 @@ def changes(root: Path = shapes.ROOT) -> list[Change]:
 
 
 def drawn(count: int, seed: int) -> list[Change]:
-    """As many of each kind: those whose names, shuffled by the seed, come first. So nearly all of
-    them stay the same when edge/ changes."""
-    met: Counter[str] = Counter()
-    ranked: list[tuple[bytes, int, Change]] = []
-    for i, change in enumerate(changes()):
-        name = f"{seed} {change.file} {change.old} {change.new}"
-        met[name] += 1
-        ranked.append((sha256(f"{name} {met[name]}".encode()).digest(), i, change))
-    ranked.sort(key=lambda one: one[:2])
-    in_order = [change for _, _, change in ranked]
-    return [
-        change
-        for kind in KINDS
-        for change in [one for one in in_order if one.kind == kind][: count // len(KINDS)]
-    ]
+    """As many of each kind, the same for the same seed.
+
+    Each change draws a lot of its own, so that code which is changed elsewhere, or moved, hardly
+    changes which are drawn.
+    """
+    lots: list[tuple[bytes, Change]] = []
+    alike: Counter[str] = Counter()
+    for change in changes():
+        what = f"{change.file}: {change.old} -> {change.new}"
+        lots.append((sha256(f"{seed} {what} {alike[what]}".encode()).digest(), change))
+        alike[what] += 1
+    lots.sort(key=itemgetter(0))
+    out = []
+    for kind in KINDS:
+        out += [change for _, change in lots if change.kind == kind][: count // len(KINDS)]
+    return out
 
 
 def reach(kept: Path | None) -> dict[str, dict[str, list[str]]]:
