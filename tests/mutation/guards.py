@@ -50,6 +50,8 @@ PIPELINE, PROJECTION = "train/pipeline.py", "train/projection.py"
 GRAPH, TRACK = "export/graph.py", "edge/touch/track.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
 TILT = "train/simulate/pivot_solver.py"
+ENERGY = "train/simulate/simulate_energy.py"
+"""Has no such module: its tests are asked about every effect."""
 
 GUARDS = (
     Guard(
@@ -410,6 +412,75 @@ GUARDS = (
         "force = (at.c11 * d0 - at.c01 * d1) / det",
         "force = found[0]",
         "tilt",
+    ),
+    Guard(
+        "what answers to speed only takes",
+        "train/simulate/viscous.py:move_on",
+        "decay * load - (1.0 - decay) * rise * elastic",
+        "decay * load + (1.0 - decay) * rise * elastic",
+        beside=ENERGY,
+    ),
+    Guard(
+        "the arm is as fast as it moved",
+        "train/simulate/effects/inertia.py:move",
+        "own.speed = (state.q - own.before) / state.h",
+        "own.speed = 1.02 * (state.q - own.before) / state.h",
+        beside=ENERGY,
+    ),
+    Guard(
+        "friction's pull is against the slip, on the arm",
+        "train/simulate/effects/friction.py:hold",
+        "state.q_free = state.q_free - state.give * own.jacobian * own.pull",
+        "state.q_free = state.q_free + state.give * own.jacobian * own.pull",
+        beside=ENERGY,
+    ),
+    Guard(
+        "friction holds no more than the load lets it",
+        "train/simulate/effects/friction.py:hold",
+        "own.pull = np.clip(stuck, *bounds(state))",
+        "own.pull = stuck",
+        beside=ENERGY,
+    ),
+    Guard(
+        "the skin's shear cannot lift more than a thing weighs",
+        "train/simulate/effects/friction.py:weigh",
+        'mover.weight = np.maximum(state.values["mass_kg"] * GRAVITY + down, 0.0)',
+        'mover.weight = state.values["mass_kg"] * GRAVITY + down',
+        beside=ENERGY,
+    ),
+    Guard(
+        "what slides has the mass of its step",
+        "train/simulate/motion.py:give_way",
+        "mover.speed + h / inertia * (loads[0] - drag)",
+        "mover.speed + 1.1 * h / inertia * (loads[0] - drag)",
+        beside=ENERGY,
+    ),
+    Guard(
+        "a lean stores what it gives back",
+        "train/simulate/effects/tipping.py:topple",
+        "left = 1.0 - slide / own.travel",
+        "left = 1.0 - 2.0 * slide / own.travel",
+        beside=ENERGY,
+    ),
+    Guard(
+        "a stem's damping is about where it is",
+        "train/simulate/effects/stems.py:bend",
+        "bed.intercepts = own.intercepts + drag * state.depth[0]",
+        "bed.intercepts = own.intercepts - drag * state.depth[0]",
+        beside=ENERGY,
+    ),
+    Guard(
+        "an object inside the arm is refused",
+        "train/simulate/engine.py:check_start",
+        "if (held[0] > 0.0).any(): ...",
+        "if False: ...",
+    ),
+    Guard(
+        "energy out of nothing is refused",
+        "train/simulate/engine.py:check_energy",
+        "if made.any(): ...",
+        "if False: ...",
+        beside=ENERGY,
     ),
 )
 

@@ -73,6 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
                 f"{written.redrawn} of them were drawn again until they did as their labels say",
                 file=sys.stderr,
             )
+        if written.unfelt:
+            print(
+                f"in {written.unfelt} of them no taxel reaches skin.onset_counts "
+                f"({scene.skin.onset}): nothing is felt there",
+                file=sys.stderr,
+            )
         for key, error in written.rough.items():
             print(
                 f"{key} and its like: no step is within trials.tolerance; the one taken errs by "

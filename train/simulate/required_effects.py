@@ -24,7 +24,6 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
         required.pop(name, None)
     while True:
         gone = [n for n in required if any(need not in required for need in EFFECTS[n].needs)]
-        gone += [n for n in required if any(other in required for other in EFFECTS[n].excludes)]
         if not gone:
             return {name: required[name] for name in EFFECTS if name in required}
         for name in gone:
@@ -72,7 +71,6 @@ def check_supported(scene: Scene, where: str) -> None:
         if name == "sliding":
             needs.append("a movable object")
         needs += [f"the effect {need}" for need in info.needs]
-        needs += [f"an object without {other}" for other in info.excludes]
         raise InputError(
             f"{where}: effects.add names {name}, which this scene cannot support: "
             f"it needs {', '.join(needs)}"

@@ -27,11 +27,12 @@ BATCH = 256
 
 @dataclass(frozen=True)
 class Simulated:
-    """One trial's recording: its file's name, how often it was drawn again, and itself where it
-    has not been written yet."""
+    """One trial's recording: its file's name, how often it was drawn again, whether a taxel
+    reaches the skin's onset, and itself where it has not been written yet."""
 
     name: str
     redrawn: int
+    felt: bool
     recording: Recording | None
 
 
@@ -42,12 +43,14 @@ class Written:
     Attributes:
         paths: the files.
         redrawn: how many of the trials were drawn again.
+        unfelt: in how many of them no taxel reaches the skin's onset.
         rough: {a kind's first trials: what its step costs, as a part of the peak force} where
             that is measured and no step is within the scene's tolerance.
     """
 
     paths: list[Path]
     redrawn: int
+    unfelt: int
     rough: dict[str, float]
 
 
@@ -159,7 +162,8 @@ def simulate_part(
         if folder is not None:
             recording.save(Path(folder) / name, trial, lasting=False)
         redrawn = int(trial.meta["simulation"]["redrawn"])
-        out.append(Simulated(name, redrawn, trial if folder is None else None))
+        felt = bool(trial.frames.max(initial=0) >= scene.skin.onset)
+        out.append(Simulated(name, redrawn, felt, trial if folder is None else None))
     return out
 
 
@@ -231,6 +235,7 @@ def write(
     return Written(
         paths=sorted(target / trial.name for trial in made),
         redrawn=sum(1 for trial in made if trial.redrawn),
+        unfelt=sum(1 for trial in made if not trial.felt),
         rough={
             trials[0].key: found[kind].error
             for kind, trials in kinds(scene).items()

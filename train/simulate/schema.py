@@ -30,7 +30,6 @@ class EffectInfo:
     settings: dict[str, Field] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     """Effects without which it means nothing."""
-    excludes: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
     """Object families that support it; empty for all."""
     keys: tuple[str, ...] = ()

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from edge.touch.arm import Chain
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import arm, base
+from train.simulate.effects import friction
 from train.simulate.effects.friction import Shear
 from train.simulate.effects.tipping import Tipping
 from train.simulate.motion import GRAVITY, Mover
@@ -268,6 +269,17 @@ class TestFriction:
         assert abs(shear.pull[0]) < 5.0 * held.force[0, -1]
         # What the skin has moved along the face is the stretch of its own spring.
         assert abs(shear.stretch[0]) == pytest.approx(abs(shear.pull[0]) / 1e4, rel=0.05)
+
+    def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
+        box = {"mass_kg": 0.05, "friction_static": 0.5, "friction_kinetic": 0.5, "width_m": 0.2}
+        held = run(make(one_object(conditions=["movable"], skin_friction=0.5, **box)))
+        state = held.state
+        state.of(Shear).pull = 5.0 / state.along_face[2]
+        friction.weigh(state)
+        assert state.of(Mover).weight.tolist() == [0.0, 0.0]
+        state.of(Shear).pull = -state.of(Shear).pull
+        friction.weigh(state)
+        np.testing.assert_allclose(state.of(Mover).weight, 0.05 * GRAVITY + 5.0)
 
     def test_the_shear_presses_a_pushed_box_to_the_floor(self):
         box = {"mass_kg": 1.0, "friction_static": 0.56, "friction_kinetic": 0.5, "width_m": 0.2}

@@ -62,6 +62,13 @@ class TestTurning:
         total = turned.counts[0].sum(axis=(1, 2)) / 1000.0
         np.testing.assert_allclose(total, turned.force[0], atol=0.05)
 
+    def test_off_its_middle_it_is_lighter_by_its_own_turn(self):
+        # A free disc of mass m, pushed e beside its middle: 1 / m + e^2 / (m R^2 / 2).
+        aside, radius = 0.06, 0.12
+        felt = 1.0 / (1.0 / MASS + aside**2 / (0.5 * MASS * radius**2))
+        batch = push(aside_m=aside, foot_m=2.0 * radius)
+        assert batch.state.of(Mover).inertia[0] == pytest.approx(felt, rel=1e-12)
+
     def test_in_the_middle_it_is_as_if_it_could_not_turn(self):
         assert push(aside_m=0.0, foot_m=0.2).counts.tobytes() == push().counts.tobytes()
 

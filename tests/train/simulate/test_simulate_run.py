@@ -210,6 +210,17 @@ class TestCommand:
         assert "no joint angles" in capsys.readouterr().err
 
 
+def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):
+    path = tmp_path / "deaf.toml"
+    path.write_text(
+        "[trials]\ncount = 2\nafter_s = 0.3\n[step_s]\nbase = 0.01\n[effects.dead_band]\n"
+        'counts = 65000\n[[object]]\nname = "box"\nfamily = "rigid"\nconditions = ["fixed"]\n'
+    )
+    assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().err
+    assert "in 2 of them no taxel reaches skin.onset_counts (200): nothing is felt" in told
+
+
 def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):
     path = tmp_path / "light.toml"
     path.write_text(
