@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate.arm import Pose
 from train.simulate.contact import Array, Springs
@@ -87,15 +86,17 @@ class Recorder:
         Raises:
             NotTaped: a function does what a tape cannot hold.
         """
-        tapes: list[list[Tape]] = [[] for _ in stages]
         times = np.array([count for _, count in stages])
         clock = np.array([first, 0, 0])
+        tapes: list[Tape] = []
         code, ways = np.zeros((0, ROW), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
         while not run_frames(code, ways, times, clock, frames):
             stage = int(clock[1])
             kept = self.kept if stage == len(stages) - 1 else []
-            tapes[stage].append(self.record(stages[stage][0], kept))
-            code, ways = _joined(tapes)
+            tapes.append(self.record(stages[stage][0], kept))
+            begin = len(code)
+            code = np.concatenate([code, tapes[-1].code()])
+            ways = np.concatenate([[[stage, begin, len(code)]], ways])
         for slot in self.slots:
             if slot.plain:
                 slot.put(slot.buffers)
@@ -144,12 +145,3 @@ class Recorder:
             if np.broadcast_shapes(end.shape, buffer.shape) != buffer.shape:
                 raise NotTaped("an array changes its shape")
             tape.emit("copy", buffer.shape, [buffer, end])
-
-
-def _joined(tapes: list[list[Tape]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All rows one after the other, and (stage, first row, last row + 1) of each tape."""
-    flat = [(stage, tape) for stage, several in enumerate(tapes) for tape in several]
-    code = np.array([row for _, tape in flat for row in tape.rows], dtype=np.int64)
-    lengths = np.array([len(tape.rows) for _, tape in flat])
-    ends = np.cumsum(lengths)
-    return code, np.stack([[stage for stage, _ in flat], ends - lengths, ends], axis=1)

@@ -150,7 +150,7 @@ def simulate_trials(
     plan = make_plan(scene, kind_of(scene, first.object, first.condition).effects)
     for physics, true in true_runs(scene, trials, step_s, plan):
         if true.any():
-            yield from recordings(read_out(physics, plan), scene, step_s, true)
+            yield from recordings(read_out(physics, plan, true), scene, step_s, true)
 
 
 def simulate_part(

@@ -37,15 +37,16 @@ class SensorFrames:
             np.rint(counts, out=counts)
         return np.minimum(counts, FULL, out=counts)
 
-    def whole(self, state: State) -> NDArray[Any]:
-        """(n, frames, rows, cols) counts, before any sensor's effect."""
+    def whole(self, state: State, some: NDArray[np.intp]) -> NDArray[Any]:
+        """(n, frames, rows, cols) counts of some trials, before any sensor's effect."""
+        _, frames, rows, window = self.window.shape
         cols = state.skin.cols
-        n, frames, rows, window = self.window.shape
-        counts: NDArray[Any] = np.zeros((n, frames, rows, cols), dtype=self.kind)
-        for i, column in enumerate(state.columns[0]):
+        counts: NDArray[Any] = np.zeros((len(some), frames, rows, cols), dtype=self.kind)
+        for one, i in zip(counts, some, strict=True):
+            column, seen = int(state.columns[0, i]), self.window[i]
             fits = min(window, cols - column)
-            counts[i, :, :, column : column + fits] = self.window[i, :, :, :fits]
-            counts[i, :, :, : window - fits] = self.window[i, :, :, fits:]
+            one[:, :, column : column + fits] = seen[:, :, :fits]
+            one[:, :, : window - fits] = seen[:, :, fits:]
         return counts
 
     def in_counts(self, counts: NDArray[Any]) -> NDArray[np.uint16]:

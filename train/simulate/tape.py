@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from train.simulate.contact import Array
 from train.simulate.replay import CODE, KINDS, ROW, replay
@@ -168,7 +169,7 @@ class Tape:
 
     lasting: dict[int, Any]
     known: dict[int, Any] = field(default_factory=dict)
-    numbers: dict[tuple[float, int], Array] = field(default_factory=dict)
+    numbers: dict[tuple[float, tuple[int, ...]], Array] = field(default_factory=dict)
     rows: list[list[int]] = field(default_factory=list)
     caught_up: int = 0
 
@@ -186,16 +187,16 @@ class Tape:
         self.known[id(array)] = array
         return self.view(array)
 
-    def read(self, value: Any, inner: int = 1) -> Any:
-        """An operand as an array of known memory; a number is repeated `inner` times.
+    def read(self, value: Any, shape: tuple[int, ...] = (1,)) -> Any:
+        """An operand as an array of known memory; a number is repeated in a shape.
 
         Raises:
             NotTaped: an array that came about beside the tape.
         """
         if not getattr(value, "shape", ()):
-            key = (float(value), inner)
+            key = (float(value), shape)
             if key not in self.numbers:
-                self.numbers[key] = np.full(inner, key[0])
+                self.numbers[key] = np.full(shape, key[0])
                 self.known[id(self.numbers[key])] = self.numbers[key]
             return self.numbers[key]
         own = id(owner(value))
@@ -215,7 +216,10 @@ class Tape:
         elif self.lasts(out):
             raise NotTaped("an array of the state is changed in place")
         inner = out.shape[-1] if out.ndim else 1
-        operands = [self.read(value, inner) for value in inputs]
+        # Where all else lies in one piece, so does a number.
+        arrays = [out, *(x for x in inputs if getattr(x, "shape", ()))]
+        flat = out.ndim and all(x.shape == out.shape and x.flags.c_contiguous for x in arrays)
+        operands = [self.read(value, out.shape if flat else (inner,)) for value in inputs]
         for i, array in enumerate(operands):
             scattered = array.strides[-1] != 8 or array.shape[-1] != inner
             if name != "copy" and inner > 1 and scattered:
@@ -224,7 +228,13 @@ class Tape:
         return out if isinstance(out, Taped) else self.view(out)
 
     def put_at(self, out: Any, index: Any, values: Any) -> None:
-        """Record the sums by number of a flat array."""
+        """Record the sums by number of a flat array.
+
+        Raises:
+            NotTaped: it is the state's.
+        """
+        if self.lasts(out):
+            raise NotTaped("an array of the state is changed in place")
         shape = np.broadcast_shapes(index.shape, values.shape)
         operands = [self.put("copy", (x,), self.new(shape)) for x in (values, index)]
         addresses = [address(array) for array in (out, *operands)]
@@ -308,8 +318,11 @@ class Tape:
         self.rows.append([CODE["call"], function.address, address(table), *[0] * (ROW - 3)])
         return results
 
+    def code(self, first: int = 0) -> NDArray[np.int64]:
+        """(rows, ROW) the rows from `first` on."""
+        return np.array(self.rows[first:], dtype=np.int64).reshape(-1, ROW)
+
     def catch_up(self) -> None:
         """Carry out what has been recorded, for a branch that wants to know."""
-        if self.caught_up < len(self.rows):
-            replay(np.array(self.rows[self.caught_up :], dtype=np.int64))
-            self.caught_up = len(self.rows)
+        replay(self.code(self.caught_up))
+        self.caught_up = len(self.rows)

@@ -31,12 +31,8 @@ def run(name, *inputs):
     lasting = {id(array): array for array in inputs if isinstance(array, np.ndarray)}
     tape = Tape(lasting)
     out = tape.put(name, inputs)
-    assert replay(coded(tape))
+    assert replay(tape.code())
     return np.asarray(out)
-
-
-def coded(tape):
-    return np.array(tape.rows, dtype=np.int64)
 
 
 @pytest.mark.parametrize("shapes", SHAPES, ids=str)
@@ -83,7 +79,7 @@ def test_what_goes_along_an_axis_goes_one_after_the_other(name, n):
     for running, method in ((False, "reduce"), (True, "accumulate")):
         tape = Tape({id(values): values})
         out = tape.along(name, tape.view(values), running)
-        replay(coded(tape))
+        replay(tape.code())
         want = getattr(getattr(np, name), method)(values, axis=0)
         np.testing.assert_array_equal(np.asarray(out), want)
 
@@ -92,7 +88,7 @@ def test_what_does_not_lie_side_by_side_is_copied_first():
     wide = numbers((5, 14))
     tape = Tape({id(wide): wide})
     out = tape.put("add", (wide[:, ::2], wide.T[:7].T))
-    replay(coded(tape))
+    replay(tape.code())
     np.testing.assert_array_equal(np.asarray(out), wide[:, ::2] + wide[:, :7])
 
 
@@ -101,7 +97,7 @@ def test_sums_run_along_any_axis(axis):
     values = numbers((6, 5, 7))
     tape = Tape({id(values): values})
     out = np.add.accumulate(tape.view(values), axis=axis)
-    replay(coded(tape))
+    replay(tape.code())
     np.testing.assert_array_equal(np.asarray(out), np.add.accumulate(values, axis=axis))
 
 
@@ -113,7 +109,7 @@ def test_sums_by_number_are_added_one_after_the_other():
     tape = Tape({id(values): values, id(index): index})
     out = tape.put("copy", (0.0,), tape.new((5,)))
     np.add.at(out, tape.view(index).astype(np.int64), tape.view(values))
-    replay(coded(tape))
+    replay(tape.code())
     np.testing.assert_array_equal(np.asarray(out), want)
 
 
@@ -124,7 +120,7 @@ def test_a_frame_is_kept_in_its_place_and_kind(kind):
     tape = Tape({id(values): values})
     tape.keep(room, tape.view(values))
     clock = np.array([2, 0, 0])
-    assert run_frames(coded(tape), np.array([[0, 0, 1]]), np.array([1]), clock, 4)
+    assert run_frames(tape.code(), np.array([[0, 0, 1]]), np.array([1]), clock, 4)
     np.testing.assert_array_equal(room[2], values.astype(kind))
     np.testing.assert_array_equal(room[3], values.astype(kind))
     assert not room[[0, 1, 4, 5]].any()
@@ -140,10 +136,10 @@ def test_frames_end_where_a_branch_would_go_another_way():
     # 2 is found above 0 and so is 1, but 0 is not: the third run changes nothing.
     clock = np.array([0, 0, 0])
     ways = np.array([[0, 0, len(tape.rows)]])
-    assert not run_frames(coded(tape), ways, np.array([2]), clock, 5)
+    assert not run_frames(tape.code(), ways, np.array([2]), clock, 5)
     np.testing.assert_array_equal(left, [1.0, -2.0])
     np.testing.assert_array_equal(clock, [1, 0, 0])
-    assert not replay(coded(tape))
+    assert not replay(tape.code())
 
 
 def test_four_dimensions_that_cannot_become_three_are_refused():

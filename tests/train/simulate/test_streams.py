@@ -36,7 +36,7 @@ def test_a_trial_s_draw_does_not_hang_on_the_trials_beside_it(kind):
 
 
 def test_noise_is_normal_and_each_number_takes_two_bytes():
-    values = streams.noise(np.random.default_rng(0), (1000, 200))
+    values = streams.drawn(np.random.default_rng(0), streams.quantiles(), (1000, 200))
     assert values.dtype == np.float32
     assert abs(float(values.mean())) < 4 / np.sqrt(values.size)
     assert float(values.std()) == pytest.approx(1.0, abs=0.01)
@@ -44,5 +44,5 @@ def test_noise_is_normal_and_each_number_takes_two_bytes():
     again = np.random.default_rng(0)
     again.bytes(2 * values.size)
     fresh = np.random.default_rng(0)
-    streams.noise(fresh, (1000, 200))
+    streams.drawn(fresh, streams.quantiles(), (1000, 200))
     assert fresh.random() == again.random()

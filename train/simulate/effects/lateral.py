@@ -80,8 +80,7 @@ def image(state: State) -> None:
 
 def along_columns(values: Array) -> Array:
     """(L, n) the sums over the columns of (L, C, n), one term after the other."""
-    sums: Array = np.add.accumulate(values, axis=1)[:, -1]
-    return sums
+    return total(np.moveaxis(values, 1, 0))
 
 
 def row_loads(state: State, depth: Array, wide: Array) -> Array:

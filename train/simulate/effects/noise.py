@@ -16,8 +16,9 @@ def add(build: Build) -> None:
     def hiss(readings: Readings) -> None:
         """Counts + size * N(0, 1)."""
         counts, seed = readings.counts, readings.seed
+        table = streams.quantiles() * size
         for i, trial in enumerate(readings.trials):
             generator = streams.stream(seed, "noise", trial.key, trial.number)
-            counts[i] += streams.noise(generator, counts.shape[1:]) * size
+            counts[i] += streams.drawn(generator, table, counts.shape[1:])
 
     build.read("sensor", 40, hiss)

@@ -43,7 +43,5 @@ def slip(state: State) -> None:
     """Stick first; where the push is more than that holds, slide; stop at rest, exactly."""
     mover = state.of(Mover)
     moving = (mover.speed > 0.0) | (state.loads[0] > mover.hold)
-    if not moving.any():
-        return
     speed, loads = give_way(state, mover, mover.drag, mover.inertia)
     advance(state, mover, moving & (speed > 0.0), speed, loads)

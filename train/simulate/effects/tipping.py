@@ -66,8 +66,6 @@ def topple(state: State) -> None:
     hold = np.where(own.tips, own.force, mover.hold)
     leans = own.tips & (slide > 0.0)
     moving = leans | (mover.speed > 0.0) | (state.loads[0] > hold)
-    if not moving.any():
-        return
     left = 1.0 - slide / own.travel
     drag = np.where(own.tips, own.force * left, mover.drag)
     speed, loads = give_way(state, mover, drag, mover.inertia)
