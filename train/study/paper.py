@@ -253,11 +253,9 @@ def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
     return [
         "Over all settings that have both, category is above object by so much that, of the "
         f"trials told a wrong object, {paper:.0f} % are told the right category in the paper and "
-        f"{here:.0f} % here; a guess among four categories has 25 %. Here objects that feel alike "
-        "are mostly of one category, as it is softness and mobility that shape a touch. In the "
-        "paper they are hardly more often so than by chance: something told single objects "
-        "apart that has nothing to do with their category, such as thresholds set by hand for "
-        "each object (section III-B). It is what most of the numbers outside have in common."
+        f"{here:.0f} % here; a guess among four categories has 25 %. The more it is, the more "
+        "alike the objects of a category feel, so that what is too coarse to tell an object still "
+        "tells its category."
     ]
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from train.crossval import leave_one_out
@@ -13,10 +13,13 @@ from train.dataset import load_trials
 from train.simulate import scene as scenes
 from train.simulate.convergence import measure
 from train.simulate.run import kinds, steps, total_trials, write
+from train.study.paper import difference
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
-PAPER = {"category": 112, "mobility": 128, "object": 101}
-"""Right of 140: 80 %, 91.43 %, 72.14 %."""
+PAPER = {"category": 80.0, "mobility": 91.43, "object": 72.14}
+"""Percent of 140 trials."""
+SEEDS = 4
+"""Data sets whose mean is held to the paper: one alone may lie as far off as its own chance."""
 
 
 @pytest.fixture(scope="module")
@@ -52,13 +55,22 @@ def test_each_trial_is_felt_and_long_enough(dataset):
     assert {t.labels["object"] for t in short} <= {"bed pillow"}
 
 
+@pytest.fixture(scope="module")
+def sets(cody18, dataset, tmp_path_factory):
+    """The scene's data set and those of the next seeds."""
+    found = [dataset]
+    for i in range(1, SEEDS):
+        folder = tmp_path_factory.mktemp("again")
+        write(replace(cody18, seed=cody18.seed + i), folder)
+        found.append(load_trials([folder]))
+    return found
+
+
 @pytest.mark.parametrize("task", PAPER)
-def test_headline_accuracies_lie_within_the_two_samples_interval(dataset, task):
-    right = leave_one_out(dataset.features(), dataset.labels(task)).max()
-    # One data set against another: the paper's has its own scatter, and so has this seed's.
-    paper = PAPER[task] / 140
-    scatter = math.sqrt((paper * (1.0 - paper) + right * (1.0 - right)) / 140)
-    assert abs(right - paper) <= 1.96 * scatter
+def test_headline_accuracies_lie_within_the_two_samples_interval(sets, task):
+    ours = [100.0 * leave_one_out(one.features(), one.labels(task)).max() for one in sets]
+    low, high = difference(PAPER[task], float(np.mean(ours)), 140 * SEEDS)
+    assert low <= 0.0 <= high
 
 
 def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
