@@ -89,6 +89,12 @@ class TestSlope:
 
 
 class TestToppling:
+    def test_it_turns_about_its_edge_as_a_box_does(self):
+        # m (b^2 + (2 h)^2) / 3 about an edge, felt at the height h.
+        batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
+        felt = 0.8 * (0.08**2 + 0.8**2) / 3.0 / 0.4**2
+        assert batch.state.of(Mover).inertia[0] == pytest.approx(felt, rel=1e-12)
+
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as it is.
         batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)

@@ -13,6 +13,7 @@ from scipy.linalg import solve, toeplitz
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import base, contact
 from train.simulate.effects import lateral
+from train.simulate.reader import Value
 
 RADIUS = 0.04604
 
@@ -225,3 +226,62 @@ class TestAskew:
         assert found.sum() == pytest.approx(sum(rows), rel=0.06)
         assert found == pytest.approx(rows, abs=0.16 * max(rows))
         assert state.image.max() == pytest.approx(peak, rel=0.1)
+
+
+def test_foam_pressed_flat_is_as_hard_as_the_skin():
+    # 20 mm at 2 kPa: its column ends at 93 %, and then the taxel is all that gives.
+    foam = {"family": "foam", "modulus_pa": 2e3, "depth_m": 0.02}
+    batch = run(make(one_object(**foam), after_s=4.0))
+    depth, force = batch.traces["depth_m"][0], batch.force[0]
+    give = np.diff(depth)[-50:] / np.diff(force)[-50:]
+    assert (give > 0.0).all()
+    assert (give <= 1.0 / (16 * 1e4)).all()
+    assert 0.93 * 0.02 < depth.max() < 0.022
+
+
+def test_a_sleeve_is_in_series_with_the_skin():
+    covered = run(make(one_object(cover_n_m=2500.0)))
+    np.testing.assert_allclose(covered.state.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
+
+
+def test_a_sleeve_spreads_the_load_and_loses_none():
+    plain, covered = (
+        run(make(one_object(width_m=0.05, **more)))
+        for more in ({}, {"cover_n_m": 2500.0, "cover_spread": 0.2})
+    )
+    for batch in (plain, covered):
+        total = batch.counts[0].sum(axis=(1, 2)) / 1000.0
+        np.testing.assert_allclose(total, batch.force[0], atol=0.05)
+    assert (covered.counts[0, -1] > 0).sum() > (plain.counts[0, -1] > 0).sum()
+
+
+class TestBubbles:
+    HEIGHT, STIFFNESS = 0.008, 1500.0
+
+    def wrap(self, **keys):
+        thing = {"family": "bubbles", "bubble_m": self.HEIGHT, "bubble_n_m": self.STIFFNESS}
+        scene = make(one_object(**thing, **keys))
+        return run(replace(scene, taxel_n_m=Value(1e12, 1e12)) if keys["pop_n"] > 1e3 else scene)
+
+    @pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
+    def test_they_stiffen_by_the_gas_law(self, part):
+        # f = k0 d / (1 - d / b), touched by its tangents at b / 2 and 3 b / 4.
+        bed, columns = (batch := self.wrap(pop_n=1e6)).state.bed, len(batch.state.reach)
+        one = slice(columns // 2, None, columns)  # of the middle column
+        touched, stiffness = bed.gaps[one, 0][:3], bed.stiffness[one, 0][:3]
+        depth = part * self.HEIGHT
+        force = (np.maximum(touched[0] + depth - touched, 0.0) * stiffness).sum()
+        want = self.STIFFNESS * depth / (1.0 - part)
+        assert force == pytest.approx(want if part >= 0.5 else 0.75 * want, rel=1e-6)
+
+    def test_burst_ones_leave_their_backing(self):
+        batch = self.wrap(pop_n=0.5)
+        bed = batch.state.bed
+        alive = bed.alive.reshape(len(bed.alive), 4, -1, batch.state.n)
+        burst = alive[:, 3] == 1.0
+        assert burst.any()
+        assert not burst.all()
+        assert (alive[:, :3].swapaxes(0, 1)[:, burst] == 0.0).all()
+        assert (alive[:, :3].swapaxes(0, 1)[:, ~burst] == 1.0).all()
+        # Nothing bears there until it is pressed through the bubble's height.
+        assert batch.traces["depth_m"][0, -1] > self.HEIGHT
