@@ -13,9 +13,16 @@ def test_each_ladder_is_of_a_case_and_lies_on_a_known_scale():
 
 def test_a_search_ends_at_the_first_failure():
     case = Case("g", "n", "", "", 0, lambda x: float(x >= 1e3))
-    assert search(case, Ladder("x", decades(0, 6, 1), lambda x: {"x": x})) == (1e2, 1e3, False)
+    # Between 100 and 1000 it is narrowed down.
+    assert search(case, Ladder("x", decades(0, 6, 1), lambda x: {"x": x})) == (900.0, 1e3, False)
+    assert search(case, Ladder("x", [100, 1200], lambda x: {"x": x})) == (100, 1200, False)
     assert search(case, Ladder("x", [1.0, 2.0], lambda x: {"x": x})) == (2.0, None, False)
     assert search(case, Ladder("x", [1e4], lambda x: {"x": x})) == (None, 1e4, False)
+
+
+def test_a_case_that_draws_holds_where_it_holds_with_every_seed():
+    case = Case("g", "n", "", "", 0, lambda x, seed: float(x + seed >= 9))
+    assert search(case, Ladder("x", [1, 4, 5, 9], lambda x: {"x": x, "seed": 0})) == (4, 5, False)
 
 
 def test_a_refusal_is_no_wrong_answer():

