@@ -219,11 +219,46 @@ def columns(draw: np.random.Generator) -> Hard:
     return Hard(X, labels(draw, n), 0.5 * (X[:4] + X[4:8]), c)
 
 
+def dominated(draw: np.random.Generator) -> Hard:
+    """One feature 1e3 to 1e16 times as large as the others, which alone tell the rows apart."""
+    n = int(draw.integers(8, 40))
+    X = typical(draw, n)
+    X[:, :8] = np.rint(2.0 * draw.uniform(size=(n, 8))) * 10.0 ** draw.uniform(3.0, 16.0)
+    queries = X[draw.integers(0, n, QUERIES)]
+    away = 10.0 ** -draw.uniform(0.0, 12.0)
+    queries[:, 8:] *= 1.0 + away * draw.normal(size=(QUERIES, WIDTH - 8))
+    scaling = str(draw.choice(["none", "III", "V"]))
+    return Hard(X, labels(draw, n), queries, choice(draw, n, scaling))
+
+
+def lines(draw: np.random.Generator) -> Hard:
+    """Rows on one line, in steps that are equal or nearly so; queries on the line."""
+    n = int(draw.integers(8, 40))
+    start = typical(draw, 1) * 10.0 ** draw.uniform(0.0, 8.0)
+    step = draw.normal(size=WIDTH) * 10.0 ** draw.uniform(-6.0, 3.0)
+    at = draw.integers(-6, 7, (n, 1)) + draw.choice([0.0, 1e-14, 1e-9]) * draw.normal(size=(n, 1))
+    queries = start + 0.5 * draw.integers(-12, 13, (QUERIES, 1)) * step
+    scaling = str(draw.choice(["none", "I", "II", "III", "IV", "V"]))
+    return Hard(start + at * step, labels(draw, n), queries, choice(draw, n, scaling))
+
+
+def denormals(draw: np.random.Generator) -> Hard:
+    """Columns of a few of the smallest numbers that there are, beside ordinary ones."""
+    n = int(draw.integers(8, 40))
+    X, small = typical(draw, n), draw.random(WIDTH) < 0.6
+    few = draw.integers(0, 50, (n, int(small.sum()))) * 2.0 ** draw.integers(0, 30)
+    X[:, small] = few * float(np.finfo(np.float64).smallest_subnormal)
+    queries = X[draw.integers(0, n, QUERIES)]
+    queries[::2] = typical(draw, len(queries[::2]))
+    scaling = str(draw.choice(["none", "III", "IV"]))
+    return Hard(X, labels(draw, n), queries, choice(draw, n, scaling))
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Hard]] = {
     family.__name__: family
     for family in (
         contacts, lattices, duplicates, spheres, permutations, near_duplicates, offsets, scales,
-        bisectors, discriminants, outside, limits, columns,
+        bisectors, discriminants, outside, limits, columns, dominated, lines, denormals,
     )
 }  # fmt: skip
 
