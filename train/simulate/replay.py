@@ -250,12 +250,6 @@ def play(code: NDArray[Any], first: int, last: int, frame: int) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def replay(code: NDArray[Any]) -> bool:
-    """Run a tape (rows, ROW) once; see `play`."""
-    return play(code, 0, len(code), 0)
-
-
-@njit(cache=True, error_model="numpy")
 def run_frames(
     code: NDArray[Any], ways: NDArray[Any], times: NDArray[Any], clock: NDArray[Any], frames: int
 ) -> bool:
@@ -294,3 +288,9 @@ def run_frames(
         clock[0] += 1
         clock[1] = 0
     return True
+
+
+def replay(code: NDArray[Any]) -> bool:
+    """Run one tape (rows, ROW) once; False where it did not run to its end (`play`)."""
+    ways, once, clock = np.array([[0, 0, len(code)]]), np.array([1]), np.array([0, 0, 0])
+    return bool(run_frames(code, ways, once, clock, 1))

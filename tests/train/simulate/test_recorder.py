@@ -131,6 +131,10 @@ def in_place(state):
     state.force += 1.0
 
 
+def sum_in_place(state):
+    np.add.at(state.force, np.zeros_like(state.force), state.force)
+
+
 def count(state):
     state.n = state.n + 1
 
@@ -143,7 +147,9 @@ def ask(state):
     state.columns = state.columns + 1.0
 
 
-@pytest.mark.parametrize("function", [pick, loop, beside, in_place, count, widen, ask])
+@pytest.mark.parametrize(
+    "function", [pick, loop, beside, in_place, sum_in_place, count, widen, ask]
+)
 def test_what_a_tape_cannot_hold_is_refused_and_changes_nothing(state, function):
     state.force = np.array([1.0, 2.0, 3.0])
     before = state.columns

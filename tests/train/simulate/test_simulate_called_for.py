@@ -14,7 +14,7 @@ import pytest
 from train.simulate import plan as plans
 from train.simulate import streams
 from train.simulate.assemble import make_plan
-from train.simulate.engine import begin, kind_of, run_batch, values_of
+from train.simulate.engine import READ_AT_ONCE, begin, kind_of, run_batch, values_of
 from train.simulate.motion import Mover
 from train.simulate.plan import STAGES
 from train.simulate.required_effects import required_effects
@@ -203,7 +203,7 @@ def test_6_results_depend_on_neither_batch_nor_chunk(sensor):
     add = ["tilt", "inertia"]
     if sensor:
         add += [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
-    one = scene(*add, objects=everything(), after_s=0.4)
+    one = scene(*add, objects=everything(), after_s=0.4, count=READ_AT_ONCE + 1)
     for kind, trials in kinds(one).items():
         trials = tuple(trials)
         whole = run_batch(one, trials, 0.01)
@@ -213,6 +213,10 @@ def test_6_results_depend_on_neither_batch_nor_chunk(sensor):
             assert some.counts.tobytes() == whole.counts[where].tobytes(), kind.effects
             assert some.joints.tobytes() == whole.joints[where].tobytes(), kind.effects
             assert some.force.tobytes() == whole.force[where].tobytes(), kind.effects
+            if sensor:
+                for name in ("times", "kept", "valid"):
+                    read, all_read = getattr(some, name), getattr(whole, name)
+                    assert read.tobytes() == all_read[where].tobytes(), (name, kind.effects)
 
 
 def test_who_called_is_told():
