@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from edge.touch.arm import Chain
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import arm, base
-from train.simulate.effects import friction
+from train.simulate.effects import friction, tilt
 from train.simulate.effects.friction import Shear
 from train.simulate.effects.tipping import Tipping
 from train.simulate.motion import GRAVITY, Mover
@@ -296,6 +296,30 @@ class TestFriction:
 
 
 class TestTilt:
+    def test_depth_and_tilt_follow_the_joints_as_their_jacobians_say(self):
+        state = run(make(one_object(width_m=0.05), "tilt")).state
+        tilt.pivot(state)
+        (depth, angle), jacobian, lever = state.y_frame, state.jacobian, state.of(tilt.Tilt).lever
+        for j in range(4):
+            step = np.zeros_like(state.q)
+            step[j] = 1e-6
+            state.q = state.q + step
+            tilt.pivot(state)
+            # The point of the forearm that is looked at moves along it; the Jacobian's does not.
+            along = angle * (lever - state.of(tilt.Tilt).lever)[0]
+            for now, then, slope in zip(
+                state.y_frame, (depth + along, angle), jacobian, strict=True
+            ):
+                np.testing.assert_allclose((now - then) / 1e-6, slope[j], atol=2e-5)
+            state.q = state.q - step
+
+    def test_the_skin_bears_what_goes_along_its_own_normal(self):
+        batch = run(make(one_object(width_m=0.05), "tilt"))
+        askew = batch.state.depth[1]
+        assert (np.abs(askew) > 0.1).all()
+        want = batch.state.loads[0] * np.cos(np.arcsin(askew))
+        np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-12)
+
     def test_leaving_tilt_out_costs_a_part_of_a_fixed_boxs_force(self):
         flat = run(make(one_object(width_m=0.4))).force[0, -1]
         tilted = run(make(one_object(width_m=0.4), "tilt")).force[0, -1]

@@ -285,3 +285,12 @@ class TestBubbles:
         assert (alive[:, :3].swapaxes(0, 1)[:, ~burst] == 1.0).all()
         # Nothing bears there until it is pressed through the bubble's height.
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
+
+
+def test_stems_bent_too_far_have_slipped_off():
+    batch = run(make(one_object(family="foliage", stem_slip_m=0.03, stem_spread_m=0.5)))
+    bed = batch.state.bed
+    bent = batch.state.depth[0] - bed.line_gap
+    assert (bent > 0.03).any()
+    assert (bed.weight[bent > 0.03] == 0.0).all()
+    assert (bed.weight[bent <= 0.03] > 0.0).any()
