@@ -27,6 +27,7 @@ class Builder:
         self._scope, self._container = scope, container
         self.decision_point = decision_point
         self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
+        self._made: dict[tuple[Any, ...], str] = {}
         self._branch: list[onnx.NodeProto] | None = None
 
     def constant(self, value: Any, dtype: Any = np.float64) -> str:
@@ -66,8 +67,12 @@ class Builder:
         return self.node("Gather", [x, self.constant(columns, np.int64)], axis=1)
 
     def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
-        """Add an operator of one output and return its name."""
-        return self.nodes(operator, inputs, [output], **attributes)[0]
+        """Add an operator of one output and return its name; of equal ones, one is enough."""
+        key = (operator, *inputs, *sorted(attributes.items()))
+        made = self._made if self._branch is None else {}
+        if output or key not in made:
+            made[key] = self.nodes(operator, inputs, [output], **attributes)[0]
+        return made[key]
 
     def nodes(
         self, operator: str, inputs: list[str], outputs: list[str], **attributes: Any

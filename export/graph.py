@@ -174,11 +174,16 @@ def _decide(
     known = build.node("LessOrEqual", [distances, build.constant(LARGEST)])
     said = build.node("Where", [known, said, build.constant(-1, np.int64)])
     ballots = build.constant(np.vstack([np.eye(classes), np.zeros((1, classes))]))
-    cast = build.node("Gather", [ballots, said])
-    votes = build.node("ReduceMean", [cast, build.ints(1)], f"{task}_scores", keepdims=0)
     if k <= 2:
         # Two neighbours agree or tie: either way the nearest has it.
-        build.node("Gather", [said, build.constant(0, np.int64)], f"{task}_label", axis=1)
+        said_first = [said, build.constant(0, np.int64)]
+        label = build.node("Gather", said_first, f"{task}_label", axis=1)
+    if k == 1:
+        build.node("Gather", [ballots, label], f"{task}_scores")
+        return
+    cast = build.node("Gather", [ballots, said])
+    votes = build.node("ReduceMean", [cast, build.ints(1)], f"{task}_scores", keepdims=0)
+    if k == 2:
         return
     # The first neighbour whose class has the most votes is the nearest of the tied.
     own = build.node("GatherElements", [votes, said], axis=1)
