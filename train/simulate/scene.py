@@ -117,6 +117,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         )
     labels = top.table("labels", {}).fields(schema.LABELS)
     add, leave_out, settings = _effects(top.table("effects", {}))
+    spread = top.table("spread", {}).fields(schema.SPREAD)
     scene = Scene(
         name=top.text("name", Path(where).stem or "scene"),
         seed=seed,
@@ -133,14 +134,20 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         skin=skin,
         taxel_n_m=taxel,
         place_m=place_m,
-        spread=top.table("spread", {}).fields(schema.SPREAD),
+        spread=spread,
         labels=labels,
-        objects=_objects(top, seed, labels["push_n"], skin),
+        objects=_objects(top, seed, labels["push_n"], skin, spread),
         add=add,
         leave_out=leave_out,
         settings=settings,
     )
     top.done()
+    for key, needed in schema.SPREAD_OF_MOVABLE.items():
+        if spread[key] > 0.0 and not any(key in item.given for item in scene.objects):
+            raise InputError(
+                f"{where}: spread.{key} has nothing to differ in: give a movable object {needed}, "
+                f"or leave spread.{key} out"
+            )
     check_supported(scene, where)
     return scene
 
@@ -245,7 +252,11 @@ def _skin(table: SceneTable) -> tuple[SkinLayout, Value]:
 
 
 def _objects(
-    top: SceneTable, seed: int, push_n: float, skin: SkinLayout
+    top: SceneTable,
+    seed: int,
+    push_n: float,
+    skin: SkinLayout,
+    spread: dict[str, float],
 ) -> tuple[SceneObject, ...]:
     tables = list(_named(top, "object"))
     for family in _named(top, "family"):
@@ -254,7 +265,7 @@ def _objects(
             tables.append(SceneTable(drawn, top.where, called))
     if not tables:
         raise InputError(f"{top.where}: give at least one [[object]] or [[family]]")
-    objects = tuple(map(_object, tables))
+    objects = tuple(_object(table, spread) for table in tables)
     slugs = [o.slug for o in objects]
     for table, item in zip(tables, objects, strict=True):
         if not item.slug:
@@ -270,7 +281,7 @@ def _named(top: SceneTable, key: str) -> Iterator[SceneTable]:
         yield SceneTable(table.raw, top.where, f"{key} {table.text('name')!r}: ")
 
 
-def _object(table: SceneTable) -> SceneObject:
+def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
     name = table.text("name")
     family = table.choice("family", schema.FAMILIES)
     conditions = table.names("conditions", schema.CONDITIONS)
@@ -278,9 +289,17 @@ def _object(table: SceneTable) -> SceneObject:
         raise table.fail("conditions", "fixed, movable or both")
     own = schema.FAMILY_KEYS[family]
     values: dict[str, Value] = {}
+    # What the scene spreads around 0 differs in trials of an object that is silent of it, too.
+    differs = {
+        key
+        for key, needed in schema.SPREAD_OF_MOVABLE.items()
+        if spread[key] > 0.0 and "movable" in conditions and table.has(needed)
+    }
     for key in schema.keys_of(family):
         limits = schema.OBJECT[key]
         default = own.get(key, limits.default)
+        if key in differs:
+            default = 0.0
         if table.has(key) or default is not None:
             values[key] = table.value(key, limits, default)
     if "stem_count" in own and table.has("stem_count"):  # a family's range is drawn by now
@@ -296,9 +315,8 @@ def _object(table: SceneTable) -> SceneObject:
         wanted = f"at most friction_static ({static.low:g})"
         raise table.fail("friction_kinetic", wanted, kinetic.high)
     table.done()
-    return SceneObject(
-        name, family, conditions, values, frozenset(filter(table.has, schema.OBJECT))
-    )
+    given = differs.union(filter(table.has, schema.OBJECT))
+    return SceneObject(name, family, conditions, values, frozenset(given))
 
 
 def _effects(

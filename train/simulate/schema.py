@@ -67,6 +67,8 @@ SPREAD = {
     "mass": Field(0.0, 1.0, 0.0, "as a part of its value"),
     "cover": Field(0.0, 1.0, 0.0, "of the skin's and the cover's stiffness, as a part"),
 }
+SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
+"""Spreads around 0 of what a movable object may be silent of, where it has this other key."""
 OBJECT = {
     "mass_kg": Field(0.0, 1e12, None, "kilograms", open_low=True),
     "friction_static": Field(0.0, 5.0, None, "mu_s"),

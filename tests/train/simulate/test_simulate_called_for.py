@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from edge.errors import InputError
 from train.simulate import plan as plans
 from train.simulate import streams
 from train.simulate.assemble import make_plan
@@ -252,3 +253,19 @@ def test_the_plan_is_flat():
     assert all(callable(f) for stage in STAGES for f in getattr(plan, stage))
     assert state.of(Mover).slide.shape == (3,)
     assert plans.STAGES == STAGES
+
+
+def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():
+    boxes = [
+        {"name": "box", "family": "rigid", "conditions": ["fixed", "movable"], "foot_m": 0.2,
+         "mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35},
+        {"name": "wall", "family": "rigid", "conditions": ["fixed"]},
+    ]  # fmt: skip
+    one = from_dict({"object": boxes, "spread": {"slope_deg": 1.0, "aside_m": 0.01}})
+    box, wall = one.objects
+    assert {"slope", "turning"} <= set(required_effects(one, box, "movable"))
+    assert not {"slope", "turning"} & set(required_effects(one, box, "fixed"))
+    assert (box.values["slope_deg"].low, "slope_deg" in wall.values) == (0.0, False)
+    for key, needed in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
+        with pytest.raises(InputError, match=f"spread.{key} .*: give a movable object {needed}"):
+            from_dict({"object": [boxes[1]], "spread": {key: 1e-3}})
