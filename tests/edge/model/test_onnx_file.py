@@ -169,6 +169,20 @@ def test_shapes_of_each_operator(made, shape):
     assert reckoned == ((3, 5) if made.op_type == "TopK" else shape)
 
 
+def test_the_shape_of_a_choice_is_that_of_its_larger_branch():
+    branches = [
+        helper.make_graph(
+            [helper.make_node("Concat", ["x"] * n, ["z"], axis=0)],
+            "b",
+            [],
+            [helper.make_empty_tensor_value_info("z")],
+        )
+        for n in (1, 3)
+    ]
+    choice = node("If", then_branch=branches[0], else_branch=branches[1])
+    assert shapes(model([choice]).SerializeToString())["y"] == (3, 2)
+
+
 def doubled(times):
     names = ["x", *(f"v{i}" for i in range(times - 1)), "y"]
     return [helper.make_node("Concat", [a, a], [b], axis=1) for a, b in pairwise(names)]

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.runtime.joint_stream import AHEAD_S, LONGEST_LINE, Joints, from_file, from_udp
+from edge.runtime.joint_stream import (
+    AHEAD_S,
+    BACKWARD_LINES,
+    LONGEST_LINE,
+    Joints,
+    from_file,
+    from_udp,
+)
 
 
 class Wire:
@@ -154,6 +161,15 @@ def test_a_malformed_line_is_counted_and_changes_nothing(wire, line, problem):
     assert wire.at() == [0.5, 0.5]
     assert wire.joints.malformed == 1
     assert problem in wire.joints.problem
+
+
+def test_a_clock_that_was_set_back_a_little_is_believed_after_so_many_lines(wire):
+    wire.send(1.0, [0.5, 0.5])
+    for i in range(BACKWARD_LINES):
+        wire.send(0.5 + 0.01 * i, [0.25, 0.25])
+        wire.joints.at(0.0)
+    assert wire.at() == [0.25, 0.25]
+    assert wire.joints.malformed == BACKWARD_LINES - 1
 
 
 def test_a_line_may_come_in_pieces(wire):

@@ -8,7 +8,7 @@ import pytest
 
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
 from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
 from edge.skin.buffers import SEQUENCE_FRAMES
@@ -308,3 +308,18 @@ def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
     for file, wanted in ((CODY, False), (calibrated(CODY), True)):
         with pytest.raises(BusMissing):
             Skin.open(file, calibrated=wanted)
+
+
+@pytest.mark.parametrize(("rest", "valid"), [(1000, False), (7999, False), (8000, True)])
+def test_a_value_further_below_its_baseline_than_any_touch_is_not_valid(rest, valid):
+    """By 40000 counts of the file's `saturation_counts` and 2000 of drift."""
+
+    def resting_at(counts):
+        calibration = replace(calibrated(CODY).calibration, baseline=np.full((16, 24), counts))
+        return replace(CODY, calibration=calibration)
+
+    clock = VirtualClock()
+    buses = fake_buses(resting_at(rest), lambda t: np.zeros((16, 24), np.uint16), clock)
+    with Skin(resting_at(50_000), buses, clock=clock) as skin:
+        skin.start()
+        assert skin.read().valid.all() == skin.read().valid.any() == valid

@@ -50,6 +50,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
         ("block = [4, 3]", "block = [4, 2]", "names 8 taxels, but an AD7147 has 12 stages"),
         ("chips = [", "chip = [", "bus 0: chips must be a list of tables, not []"),
         ("device = 1", 'device = "a\\u0000b"', "device must be the number of a bus or its path"),
+        ("device = 1", "device = 1\nclock_hz = 999", "clock_hz must be a whole number from 1000"),
         ("device = 1", "device = -1", "device must be the number of a bus or its path"),
         ("channel = 0, address = 0x2D", "address = 0x70", "address must be 0x2c to 0x2f, not 112"),
     ],
@@ -121,6 +122,10 @@ def test_a_kind_that_is_unknown_is_named_before_chips_that_are_missing():
     text = SERIAL.replace('"block"', '"microcontroller"').split("chips")[0]
     with pytest.raises(InputError, match="kind must be one of"):
         skinfile.parse(text)
+
+
+def test_the_slowest_clock_is_of_1000_hertz():
+    assert skinfile.parse(SMALL.replace("device = 1", "device = 1\nclock_hz = 1000")).buses
 
 
 def test_the_largest_value_of_a_microcontroller_is_that_of_its_bits():
