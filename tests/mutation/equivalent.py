@@ -124,6 +124,11 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "",
     ): "how wide a text is set is a matter of looks",
     (
+        "edge/runtime/joint_stream.py",
+        "16  ->  17",
+        "BACKWARD_LINES",
+    ): "another number of lines: a test holds that it is as many as the constant says",
+    (
         "edge/skin/skin.py",
         "4  ->  5",
         "FOLLOW_FRAMES",

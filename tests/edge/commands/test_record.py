@@ -1,6 +1,7 @@
 """Trials as `record` saves them: safe names, two recorders in one folder, angles where known."""
 
 import io
+import json
 import os
 import signal
 import subprocess
@@ -31,8 +32,8 @@ def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp
 
 
 @contextmanager
-def recorder(folder, *, names=None, posed=False):
-    with Lines(io.StringIO()) as lines:
+def recorder(folder, out=None, *, names=None, posed=False):
+    with Lines(out or io.StringIO()) as lines:
         yield Recorder(str(folder), {"object": "box"}, {}, names, lines, posed)
 
 
@@ -57,10 +58,12 @@ def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_pat
 
 
 def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(tmp_path, caplog):
-    with recorder(tmp_path, names=("shoulder", "elbow"), posed=True) as mine:
+    out = io.StringIO()
+    with recorder(tmp_path, out, names=("shoulder", "elbow"), posed=True) as mine:
         mine.save(frames(np.array([0.1, 0.2]), None), complete=True)
     trial = load(tmp_path / "box-001.npz")
     assert trial.joint_names == ("shoulder", "elbow")
+    assert json.loads(out.getvalue())["frames_without_joints"] == 1
     assert trial.joints[0].tolist() == [0.1, 0.2]
     assert caplog.messages == [f"{tmp_path}/box-001.npz: 1 of 2 frames have no joint angles"]
 

@@ -10,7 +10,7 @@ from edge.fake.player import fake_skin
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
-from edge.skin.read_scheduler import ReadScheduler, spread_by
+from edge.skin.read_scheduler import SELECT_BITS, VERIFY_BITS, ReadScheduler, spread_by
 from edge.touch.frame import Frame
 
 CODY = skinfile.load(skinfile.shipped("cody"))
@@ -84,6 +84,14 @@ def test_a_wire_too_slow_for_one_chip_still_reads_one():
     scheduler = ReadScheduler.of(slow)
     seen = [scheduler.plan(None)[0] for _ in range(32)]
     assert sorted(i for chips in seen for i in chips) == list(range(32))
+
+
+@pytest.mark.parametrize(
+    ("verify", "bits"), [(False, SELECT_BITS), (True, SELECT_BITS + VERIFY_BITS)]
+)
+def test_reading_a_mux_back_is_paid_for_where_it_is_done(verify, bits):
+    file = replace(ONE, reading=replace(ONE.reading, verify_mux=verify))
+    assert [budget.select for budget in ReadScheduler.of(file)._budgets] == [bits]
 
 
 def test_every_plan_fits_the_period():
