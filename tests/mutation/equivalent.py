@@ -124,6 +124,11 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "",
     ): "how wide a text is set is a matter of looks",
     (
+        "edge/fake/player.py",
+        "2048  ->  2049",
+        "",
+    ): "where a fake chip rests: any value near the middle will do",
+    (
         "edge/runtime/joint_stream.py",
         "16  ->  17",
         "BACKWARD_LINES",
