@@ -127,6 +127,7 @@ def test_the_longest_name_can_be_written(tmp_path):
 def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
     (tmp_path / "file").write_text("")
     check_writable(tmp_path / "new" / "folder")
-    for folder in (tmp_path / "file" / "folder", "/proc/none", "a\0b"):
-        with pytest.raises(InputError, match="cannot be written"):
+    reasons = {tmp_path / "file" / "folder": "Not a directory", "a\0b": "embedded null byte"}
+    for folder, reason in {**reasons, "/proc/none": "No such file"}.items():
+        with pytest.raises(InputError, match=f"cannot be written: {reason}"):
             check_writable(folder)
