@@ -268,7 +268,7 @@ def _thing(
             angle = moved * aside / ((foot / 3.0) ** 2 + aside**2)
             _from_above(axis, foot, aside, moved, angle, style)
             if moved:
-                motion = f", turns by {math.degrees(angle):.0f} degrees seen from above"
+                motion = f", turns by {math.degrees(angle):.0f} degrees"
     shown = start + outline * [ahead, 1.0]
     axis.fill(*shown.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
     return motion
@@ -307,7 +307,7 @@ def _from_above(
     side's picture; it turns about where it is pushed."""
     if not side.child_axes:
         corner = side.inset_axes([0.01, 0.6, 0.3, 0.38])
-        corner.set_title("from above", fontsize=8)
+        corner.set_xlabel("from above", fontsize=8, labelpad=2)
         corner.set_aspect("equal", adjustable="datalim")
         corner.set_xticks([])
         corner.set_yticks([])

@@ -48,7 +48,7 @@ def test_what_turns_is_seen_from_above_turned_about_where_it_is_pushed():
     values = {"aside_m": 0.05, "foot_m": 0.3}
     axis, says = sketch(["sliding", "turning"], 0.1, **values)
     angle = 0.1 * 0.05 / (0.1**2 + 0.05**2)
-    assert says == f", turns by {np.degrees(angle):.0f} degrees seen from above"
+    assert says == f", turns by {np.degrees(angle):.0f} degrees"
     (corner,) = axis.child_axes
     shown = outline(corner)
     pushed = np.array([0.1, 0.0])
