@@ -18,7 +18,8 @@ from train import operating_points
 from train.choosing import LEAVE_OUT, TRIAL
 from train.crossval import jobs_here
 from train.fitting import MOST_TRIALS, fit
-from train.projection import KINDS, SCALINGS
+from train.projection import KINDS
+from train.scaling import SCALINGS
 from train.stopping import FEWEST
 
 FRONTS = Path("build/tradeoff/front.json")

@@ -18,7 +18,8 @@ from threadpoolctl import threadpool_limits
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.distance import running_squares
-from train.projection import RoundingGrid, Spectrum, centred_and_scaled, on_grid
+from train.projection import RoundingGrid, Spectrum, on_grid
+from train.scaling import centred_and_scaled
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -44,7 +45,7 @@ def split_neighbours(
         X: (n, features * samples).
         train: (m,) rows of X, rising; scaling and components are fitted on them alone.
         test: (t,) rows of X.
-        scaling: one of `train.projection.SCALINGS`.
+        scaling: one of `train.scaling.SCALINGS`.
         max_components: components tried, from 1.
         max_k: neighbours wanted, at most m.
         features: names of the feature types, in the order of X.
@@ -189,7 +190,7 @@ def leave_one_out(
         y: (n,) labels.
         max_components: principal components tried, from 1.
         max_k: neighbours tried, from 1; at most n - 1.
-        scaling: one of `train.projection.SCALINGS`, fitted inside each fold.
+        scaling: one of `train.scaling.SCALINGS`, fitted inside each fold.
         features: names of the feature types, in the order of X.
         jobs: processes.
     """

@@ -26,7 +26,8 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of
-from train.projection import Spectrum, centred_and_scaled, widths_of
+from train.projection import Spectrum
+from train.scaling import centred_and_scaled, widths_of
 
 FOLDS = 10
 SEED = 2012
@@ -74,7 +75,7 @@ class SearchGrid:
     """Candidates that share a decomposition of the features.
 
     Attributes:
-        scaling: one of `train.projection.SCALINGS`.
+        scaling: one of `train.scaling.SCALINGS`.
         projection: one of `train.projection.KINDS`.
         features: names of those taken; all where empty.
         components: numbers of components, rising; `lda` takes all directions there are.

@@ -98,7 +98,7 @@ def fit(
         data: recordings, folders of them, or a data set that was loaded for the features.
         features: names of sets and of single features.
         projection: `pca` or `lda`.
-        scaling: one of `train.projection.SCALINGS`.
+        scaling: one of `train.scaling.SCALINGS`.
         components: principal components.
         k: neighbours.
         window_s: seconds from onset; where None `WINDOW_S`, or two, four or eight times that where

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from edge.config import json_file
 from edge.errors import InputError
-from train.projection import SCALINGS
+from train.scaling import SCALINGS
 
 SHIPPED = Path(__file__).with_name("tradeoff") / "front.json"
 """The front of the simulated `cody18`."""

@@ -17,7 +17,8 @@ from sklearn.utils.validation import check_is_fitted
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.distance import squared_distances
-from train.projection import Projection, widths_of
+from train.projection import Projection
+from train.scaling import widths_of
 
 
 def vote(labels: NDArray[np.int64], classes: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -111,7 +112,7 @@ class Choice:
     """What a task is fitted with.
 
     Attributes:
-        scaling: one of `train.projection.SCALINGS`.
+        scaling: one of `train.scaling.SCALINGS`.
         components: most coordinates.
         k: neighbours that vote.
         projection: one of `train.projection.KINDS`.

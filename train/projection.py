@@ -1,4 +1,4 @@
-"""Scaling and projection of feature vectors, as a scikit-learn transformer.
+"""Projection of scaled feature vectors, as a scikit-learn transformer.
 
 A fitted `Projection` gives the coordinates of the ONNX graph, to the bit where sums are exact (see
 there); `export/build.py` writes it down.
@@ -16,10 +16,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from edge.touch.measures import feature
-
-SCALINGS = ("none", "I", "II", "III", "IV", "V")
-"""No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
+from train.scaling import centred_and_scaled, column_means
 
 WEIGHT_BITS = 20
 """Components of up to 128 columns are multiples of 2 ** -WEIGHT_BITS; see `Projection`."""
@@ -30,9 +27,6 @@ MOST_COLUMNS = 1 << 12
 """Beyond them too few bits are left for the components."""
 RANGE = 4.0
 """How far beyond the training set's range a query may lie and still be projected exactly."""
-SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
-"""Above, squares overflow in a distance. Below, nothing has been asked of the graph: the hard
-cases go down to it."""
 CLOSE_EIGENVALUES = 1e-6
 WELL_CONDITIONED = 1e-8
 """Variance, as a part of the largest, down to which eigenvectors of a covariance are trusted."""
@@ -43,143 +37,11 @@ NO_DISTANCE = 1e-6
 """How far classes lie apart in a direction, as a part of all spread, below which it is rounding."""
 
 
-def _exponents(X: NDArray[np.float64], axes: tuple[int, ...]) -> NDArray[np.int32]:
-    """The powers of two that bring the largest entries along some axes near 1.
-
-    Multiplied by them, nothing is rounded, and neither sums nor squares leave float64.
-    """
-    return np.asarray(np.frexp(np.abs(X).max(axis=axes, initial=0.0))[1])
-
-
-def _mean(X: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(p,) mean of each column, also where its sum would overflow."""
-    powers = _exponents(X, (0,))
-    return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
-
-
-def widths_of(
-    columns: int, features: Sequence[str], widths: Sequence[int] | None = None
-) -> tuple[int, ...]:
-    """How many of so many columns each feature type has: `widths`, or an equal share.
-
-    Raises:
-        InputError: the columns are no whole number of samples a feature.
-    """
-    if widths is None:
-        if columns % len(features):
-            raise InputError(
-                f"{columns} columns are no whole number of samples of {len(features)} features"
-            )
-        return (columns // len(features),) * len(features)
-    if len(widths) != len(features) or sum(widths) != columns:
-        raise InputError(f"{columns} columns are not those of {len(features)} features")
-    return tuple(widths)
-
-
-def scale_of(
-    X: NDArray[np.float64],
-    method: str,
-    features: Sequence[str] = FEATURES,
-    widths: Sequence[int] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Offset and gain of each feature type: scaled = (x - offset) * gain.
-
-    The statistics are over all samples of a feature type in all trials (paper, section IV-D),
-    not over columns. Where a maximum or a standard deviation is 0 the type is dropped (gain 0):
-    it was constant in training and must not dominate when it moves.
-
-    Args:
-        X: (n, p).
-        method: one of `SCALINGS`. Method V brings contact_motion to the range of max_force and
-            contact_area and leaves all else alone; without them it is no scaling.
-        features: names of the types, in the order of X.
-        widths: columns of each; equal where None.
-
-    Returns:
-        (features,) and (features,).
-
-    Raises:
-        InputError: the method is unknown, or the columns are not those of the features.
-    """
-    types = len(features)
-    ends = np.cumsum(widths_of(X.shape[1], features, widths))
-    if method == "none":
-        return np.zeros(types), np.ones(types)
-    blocks = np.split(X, ends[:-1], axis=1)
-    powers = np.array([_exponents(block, (0, 1)) for block in blocks], dtype=np.int32)
-    small = [np.ldexp(block, -power) for block, power in zip(blocks, powers, strict=True)]
-    mean = np.array([block.mean() for block in small])
-    largest = np.array([np.abs(block).max(initial=0.0) for block in small])
-    ones, zeros = np.ones(types), np.zeros(types)
-
-    def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
-        gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
-        with np.errstate(over="ignore"):  # what is then infinite is refused
-            return np.asarray(np.ldexp(gain, -powers))
-
-    if method == "I":
-        return np.ldexp(mean, powers), inverse(largest)
-    if method == "II":
-        return zeros, inverse(largest)
-    if method == "III":
-        return np.ldexp(mean, powers), ones
-    if method == "IV":
-        squares = []
-        for name, block, middle in zip(features, small, mean, strict=True):
-            # Cells and joints each have a level of their own, which tells them apart and no
-            # trial: a wide feature deviates from each column's mean.
-            middles = block.mean(axis=0) if feature(name).wide else middle
-            squares.append(((block - middles) ** 2).mean())
-        deviation = np.sqrt(squares)
-        # A spread below the rounding of its own mean is no spread.
-        deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
-        return np.ldexp(mean, powers), inverse(deviation)
-    if method == "V":
-        gain = ones.copy()
-        whole = np.ldexp(largest, powers)
-        ranges = [whole[i] for i, name in enumerate(features) if name in FEATURES[:2]]
-        if ranges and FEATURES[2] in features:
-            motion = list(features).index(FEATURES[2])
-            gain[motion] = max(ranges) * inverse(largest)[motion]
-        return zeros, gain
-    raise InputError(f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}")
-
-
-def centred_and_scaled(
-    X: NDArray[np.float64],
-    method: str,
-    features: Sequence[str] = FEATURES,
-    widths: Sequence[int] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Mean (p,) and gain (p,) of each column of X (n, p), and (X - mean) * gain (n, p).
-
-    A scaling shifts each type by a constant, which centring takes away again: the mean is
-    subtracted from the features themselves, where it loses nothing. See `scale_of`.
-
-    Raises:
-        InputError: the scale is beyond what distances hold.
-    """
-    # The order in memory decides the order of sums, and so which of equal axes is found.
-    X = np.ascontiguousarray(X, dtype=np.float64)
-    with np.errstate(over="ignore", invalid="ignore"):
-        mean = _mean(X)
-        _, gains = scale_of(X, method, features, widths)
-        gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
-        d = (X - mean) * gain
-    largest = float(np.abs(d).max(initial=0.0))
-    if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE):
-        raise InputError(
-            f"the features spread over {largest:g} once scaled; distances need "
-            f"{SMALLEST_SCALE:g} to {LARGEST_SCALE:g}: store them in other units"
-        )
-    return mean, gain, d
-
-
 def _centred(
     X: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Mean (p,), X without it, and which columns have no variance (p,)."""
-    mean = _mean(X)
+    mean = column_means(X)
     centred = X - mean
     # What is left of a constant column is the rounding of its mean.
     still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)
@@ -376,7 +238,7 @@ class Projection(TransformerMixin, BaseEstimator):
     than `RANGE` times outside it are projected with ordinary rounding.
 
     Args:
-        scaling: one of `SCALINGS`.
+        scaling: one of `train.scaling.SCALINGS`.
         components: most coordinates wanted; at most the numerical rank, and one less than the
             classes, are kept.
         features: names of the feature types, in the order of X.

@@ -50,7 +50,7 @@ from edge.errors import InputError
 from edge.model.stopping import TEST_SHARE, Novelty, Stopping, StoppingRule, margin
 from edge.touch.features import FEATURES
 from train.pipeline import Choice, ContactClassifier, columns_of, label_distances, vote
-from train.projection import widths_of
+from train.scaling import widths_of
 
 FOLDS = 10
 FEWER_FOLDS = 5

@@ -14,7 +14,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 from export import graph
 from train.pipeline import Choice, ContactClassifier, vote
-from train.projection import HALF_BITS, SCALINGS
+from train.projection import HALF_BITS
+from train.scaling import SCALINGS
 
 
 def features(n, seed=0):

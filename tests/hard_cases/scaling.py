@@ -14,7 +14,8 @@ from sklearn.preprocessing import MaxAbsScaler, StandardScaler
 from tests.hard_cases import exact
 from tests.hard_cases.cases import Case
 from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
-from train.projection import CLOSE_EIGENVALUES, SCALINGS, Projection, principal_axes
+from train.projection import CLOSE_EIGENVALUES, Projection, principal_axes
+from train.scaling import SCALINGS
 
 SEEDS = st.integers(0, 10**6)
 METHODS = st.sampled_from(SCALINGS)

@@ -47,6 +47,7 @@ class Guard:
 
 CONTACT, GRID = "edge/touch/contact.py", "edge/touch/grid.py"
 PIPELINE, PROJECTION = "train/pipeline.py", "train/projection.py"
+SCALING = "train/scaling.py"
 GRAPH, TRACK = "export/graph.py", "edge/touch/track.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
 TILT = "train/simulate/pivot_solver.py"
@@ -56,13 +57,13 @@ ENERGY = "train/simulate/simulate_energy.py"
 GUARDS = (
     Guard(
         "a type that told nothing gets no gain",
-        f"{PROJECTION}:scale_of",
+        f"{SCALING}:scale_of",
         "np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)",
         "np.divide(1.0, scale, out=np.ones(types), where=scale > 0.0)",
     ),
     Guard(
         "a spread that is rounding is no spread",
-        f"{PROJECTION}:scale_of",
+        f"{SCALING}:scale_of",
         "deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0",
         "pass",
         "spread and rounding",
@@ -114,7 +115,7 @@ GUARDS = (
     ),
     Guard(
         "scales that cannot be held are refused",
-        f"{PROJECTION}:centred_and_scaled",
+        f"{SCALING}:centred_and_scaled",
         "if not (largest == 0.0 or SMALLEST_SCALE <= largest <= LARGEST_SCALE): ...",
         "if False: ...",
     ),
@@ -127,7 +128,7 @@ GUARDS = (
     ),
     Guard(
         "sums do not hang on the order in memory",
-        f"{PROJECTION}:centred_and_scaled",
+        f"{SCALING}:centred_and_scaled",
         "X = np.ascontiguousarray(X, dtype=np.float64)",
         "X = np.asarray(X, dtype=np.float64)",
         beside="train/distance.py",

@@ -10,7 +10,8 @@ from train import crossval
 from train.crossval import leave_one_out, neighbours, split_neighbours, votes_right
 from train.dataset import load_trials
 from train.pipeline import NearestNeighbours, vote
-from train.projection import SCALINGS, Projection, Spectrum, principal_axes
+from train.projection import Projection, Spectrum, principal_axes
+from train.scaling import SCALINGS
 
 
 def sklearn_table(X, y, scaling, components, ks):

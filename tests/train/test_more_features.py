@@ -6,7 +6,8 @@ import pytest
 from edge.errors import InputError
 from train.dataset import load_trials
 from train.pipeline import Choice, ContactClassifier
-from train.projection import Projection, scale_of
+from train.projection import Projection
+from train.scaling import scale_of
 
 SIX = ("skin_force", "contact_motion", "left_length", "max_force", "regions", "contact_area")
 

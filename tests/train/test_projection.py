@@ -1,4 +1,4 @@
-"""Scaling and projections against formulas, exact fractions, long double and fifty digits."""
+"""Projections against exact fractions, long double and fifty digits."""
 
 from fractions import Fraction
 
@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from train.projection import SCALINGS, Projection, Spectrum, principal_axes, scale_of
+from train.projection import Projection, Spectrum, principal_axes
+from train.scaling import SCALINGS
 
 
 def data(n=30, seed=0):
@@ -18,48 +19,6 @@ def data(n=30, seed=0):
     X[:, 40:80] *= 30
     X[:, 80:] *= 0.02
     return X
-
-
-def test_scalings_are_the_papers_equations_per_feature_type():
-    X = data()
-    f = [X[:, i * 40 : i * 40 + 40] for i in range(3)]
-    expected = {
-        "none": f,
-        "I": [(b - b.mean()) / b.max() for b in f],
-        "II": [b / b.max() for b in f],
-        "III": [b - b.mean() for b in f],
-        "IV": [(b - b.mean()) / b.std() for b in f],
-        "V": [f[0], f[1], f[2] * max(f[0].max(), f[1].max()) / f[2].max()],
-    }
-    assert set(expected) == set(SCALINGS)
-    for method, blocks in expected.items():
-        offset, gain = (np.repeat(part, 40) for part in scale_of(X, method))
-        scaled = (X - offset) * gain
-        assert scaled == pytest.approx(np.hstack(blocks), rel=1e-14, abs=1e-13)
-
-
-def test_a_wide_feature_deviates_from_the_mean_of_each_column():
-    """Method IV: a cell's own level would swamp what the trials differ in."""
-    around = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    level = np.array([1000.0, -1000.0])
-    _, gain = scale_of(level + around, "IV", ["taxel_force_mean"], [2])
-    assert gain.tolist() == [1.0]
-
-
-@pytest.mark.parametrize("method", ["I", "II", "IV", "V"])
-def test_a_feature_type_that_told_nothing_in_training_is_dropped(method):
-    X = data()
-    X[:, 80:] = 0.0
-    fitted = Projection(method).fit(X)
-    moved = X.copy()
-    moved[:, 80:] = 1e6
-    assert (fitted.transform(moved) == fitted.transform(X)).all()
-
-
-def test_a_spread_that_is_only_rounding_is_no_spread():
-    X = data()
-    X[:, 80:] = 0.1  # its mean is not exactly 0.1
-    assert scale_of(X, "IV")[1][2] == 0.0
 
 
 def test_components_match_long_double_and_have_a_fixed_sign():
@@ -144,12 +103,6 @@ def test_what_a_projection_cuts_off_is_below_float64_of_its_range():
     exact = (X - projection.mean_).astype(np.longdouble) @ projection.weights_.astype(np.longdouble)
     reach = np.abs(X - projection.mean_).max()
     assert float(np.abs(projection.transform(X) - exact).max()) < 120 * 2.0**-51 * reach
-
-
-def test_features_whose_squares_vanish_or_overflow_are_refused():
-    for scale in (1e-110, 1e-33, 1e110):
-        with pytest.raises(InputError, match="other units"):
-            Projection("none", 2).fit(data() * scale)
 
 
 def exact_distances(rows, labels, shrinkage):
@@ -249,21 +202,6 @@ def test_discriminants_without_labels_and_unknown_projections_are_refused():
         Projection(kind="lda").fit(data())
     with pytest.raises(InputError, match="one of pca, lda, not 'nca'"):
         Projection(kind="nca").fit(data())
-
-
-@pytest.mark.parametrize("scale", [1e-165, 1e160, 1e306])
-def test_method_iv_standardises_at_any_scale(scale):
-    """Squares of such features vanish, or leave float64."""
-    X = np.abs(np.random.default_rng(0).normal(size=(300, 120)))
-    usual, far = (Projection("IV", 5).fit(v).transform(v) for v in (X, X * scale))
-    assert far == pytest.approx(usual, rel=1e-3, abs=1e-3)
-
-
-def test_a_scale_that_is_no_number_is_refused():
-    X = data()
-    X[0, 0], X[1, 0] = 1.7e308, -1.7e308
-    with pytest.raises(InputError, match="other units"):
-        Projection("none").fit(X)
 
 
 @pytest.mark.parametrize("offset", [1e6, 1e9])

@@ -7,9 +7,9 @@ from typing import Any
 
 from edge.touch.features import FEATURES
 from train.evaluate import Result
-from train.projection import SCALINGS
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, percent, score
+from train.scaling import SCALINGS
 from train.study.context import Context
 from train.study.paper import entries
 from train.study.readings import EACH_TRIAL, scaled_by_trial

@@ -33,7 +33,7 @@ def nested(
     Args:
         X: (n, p).
         y: {task: (n,) labels}.
-        scaling: one of `train.projection.SCALINGS`.
+        scaling: one of `train.scaling.SCALINGS`.
         features: names of the types in X.
         widths: columns of each; equal where None.
     """
