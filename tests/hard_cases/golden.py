@@ -24,7 +24,8 @@ from export.__main__ import main as export
 from export.api import describe
 from export.graph import to_onnx
 from tests.conftest import FOREARM, touch
-from tests.hard_cases.adversarial import Hard, corpus, made
+from tests.hard_cases.adversarial import corpus
+from tests.hard_cases.families import Hard, made
 from tests.hard_cases.models import features, labels_for
 from tests.hard_cases.neighbours import SHORT, lattice, near_duplicates, offset_data
 from train.dataset import DataSet, load_trials

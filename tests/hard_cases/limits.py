@@ -12,8 +12,9 @@ from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, TrackSettings
-from tests.hard_cases.adversarial import FAMILIES, judged
+from tests.hard_cases.adversarial import judged
 from tests.hard_cases.cases import Case
+from tests.hard_cases.families import FAMILIES
 from tests.hard_cases.frames import FOREARM
 from tests.hard_cases.models import Array, Ours, features
 from tests.hard_cases.neighbours import LISTS, WHOLE, near_duplicates

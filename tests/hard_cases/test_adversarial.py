@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.hard_cases.adversarial import FAMILIES, corpus, judged
+from tests.hard_cases.adversarial import corpus, judged
+from tests.hard_cases.families import FAMILIES
 
 
 @pytest.mark.parametrize(("family", "seed"), corpus())
