@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
         if written.unfelt:
             print(
-                f"in {written.unfelt} of them no taxel reaches skin.onset_counts "
+                f"in {written.unfelt} of them no taxel rises above skin.onset_counts "
                 f"({scene.skin.onset}): nothing is felt there",
                 file=sys.stderr,
             )

@@ -27,8 +27,8 @@ BATCH = 256
 
 @dataclass(frozen=True)
 class Simulated:
-    """One trial's recording: its file's name, how often it was drawn again, whether a taxel
-    reaches the skin's onset, and itself where it has not been written yet."""
+    """One trial's recording: its file's name, how often it was drawn again, whether a taxel rises
+    above the skin's onset, and itself where it has not been written yet."""
 
     name: str
     redrawn: int
@@ -43,7 +43,7 @@ class Written:
     Attributes:
         paths: the files.
         redrawn: how many of the trials were drawn again.
-        unfelt: in how many of them no taxel reaches the skin's onset.
+        unfelt: in how many of them no taxel rises above the skin's onset.
         rough: {a kind's first trials: what its step costs, as a part of the peak force} where
             that is measured and no step is within the scene's tolerance.
     """
@@ -162,7 +162,7 @@ def simulate_part(
         if folder is not None:
             recording.save(Path(folder) / name, trial, lasting=False)
         redrawn = int(trial.meta["simulation"]["redrawn"])
-        felt = bool(trial.frames.max(initial=0) >= scene.skin.onset)
+        felt = bool(trial.frames.max(initial=0) > scene.skin.onset)
         out.append(Simulated(name, redrawn, felt, trial if folder is None else None))
     return out
 

@@ -12,7 +12,14 @@ from edge.errors import InputError
 from edge.recording import load
 from train.__main__ import main
 from train.simulate import scene as scenes
-from train.simulate.run import simulate, total_trials, write
+from train.simulate.run import (
+    parts,
+    simulate,
+    simulate_part,
+    simulate_trials,
+    total_trials,
+    write,
+)
 from train.simulate.scene import from_dict
 
 DEMO = Path(__file__).parents[3] / "train" / "scenes" / "demo.toml"
@@ -218,7 +225,20 @@ def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):
     )
     assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().err
-    assert "in 2 of them no taxel reaches skin.onset_counts (200): nothing is felt" in told
+    assert "in 2 of them no taxel rises above skin.onset_counts (200): nothing is felt" in told
+
+
+def test_a_touch_whose_peak_is_the_onset_is_not_felt(demo):
+    """A contact begins above it (`edge.touch.track`)."""
+    from dataclasses import replace
+
+    trials, step_s = parts(demo)[0]
+    one = trials[:1]
+    ((_, trial),) = simulate_trials(demo, one, step_s)
+    peak = int(trial.frames.max())
+    for onset, felt in ((peak - 1, True), (peak, False)):
+        scene = replace(demo, skin=replace(demo.skin, onset_counts=onset))
+        assert [made.felt for made in simulate_part(scene, one, step_s, None)] == [felt]
 
 
 def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):
