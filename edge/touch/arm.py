@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge.config import ConfigTable, read_toml
+from edge.config import ConfigTable, read_toml, shown
 from edge.errors import InputError
 
 Vector = tuple[float, float, float]
@@ -344,6 +344,9 @@ def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
 
 def _joint_from(table: ConfigTable, index: int) -> Joint:
     name = table.text("name", f"joint {index}")
+    if table.has("name"):
+        # A number in the chain is none that a URDF tells, whose joints stand in any order.
+        table.prefix = f"joint {shown(name)}: "
     steps: dict[str, Vector] = {}
     for key in ("origin_xyz", "origin_rpy", "translate"):
         if table.has(key):

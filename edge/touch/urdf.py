@@ -61,7 +61,7 @@ def _numbers(path: str | os.PathLike[str], text: str, what: str, count: int) -> 
 
 def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:
     name = str(element.get("name"))
-    kind = str(element.get("type"))
+    kind = str(element.get("type", ""))
     mimic = element.find("mimic")
     if mimic is not None and kind != "fixed":
         raise InputError(

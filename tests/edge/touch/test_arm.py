@@ -137,6 +137,24 @@ def test_a_urdf_whose_links_go_round_in_a_loop_ends(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("old", "new", "joint", "found"),
+    [
+        ('type="continuous"', 'type="floating"', "roll", "floating"),
+        ('type="prismatic"', 'type="slider"', "slide", "slider"),
+        ('type="continuous"', "", "roll", ""),
+    ],
+)
+def test_a_urdf_joint_of_unknown_type_is_named(urdf, old, new, joint, found):
+    urdf.write_text(URDF.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        Chain.from_urdf(urdf, "base", "hand")
+    assert str(caught.value) == (
+        f"{urdf}: joint '{joint}': type must be one of revolute, continuous, prismatic, fixed, "
+        f"not '{found}'"
+    )
+
+
+@pytest.mark.parametrize(
     ("text", "word"),
     [
         ("x = ", "not TOML"),
@@ -151,6 +169,7 @@ def test_a_urdf_whose_links_go_round_in_a_loop_ends(tmp_path):
             "lower limit 0.0523599 exceeds",
         ),
         ("[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'", "type must be one of .* not 'ball'"),
+        ("[[joint]]\nname = 'hip'\naxis = [0, 0]", "joint 'hip': axis must be a list of 3"),
         ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "joint 0: unknown key offset"),
     ],
 )
