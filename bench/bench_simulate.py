@@ -17,7 +17,7 @@ import pytest
 from edge import recording
 from train.simulate.engine import run_batch
 from train.simulate.explain import costs
-from train.simulate.run import kinds, parts, recordings, simulate_trials
+from train.simulate.run import kinds, parts, simulate_trials
 from train.simulate.scene import COLUMN_ANGLES_DEG, from_dict, load
 from train.simulate.scene_model import TrialSpec
 from train.simulate.schema import EFFECTS
@@ -128,19 +128,18 @@ def bench_write(benchmark, note, tmp_path):
     """Recordings of one batch to files, beside simulating them."""
     scene = make("rigid", "fixed")
     trials = tuple(next(iter(kinds(scene).values())))
-    simulated = []
-    batches = []
+    simulated, files = [], []
 
     def simulate():
         began = time.perf_counter()
-        batches[:] = [run_batch(scene, trials, 0.01)]
+        files[:] = simulate_trials(scene, trials, 0.01)
         simulated.append(time.perf_counter() - began)
 
     runs = iter(range(100))
 
     def write():
         folder = tmp_path / str(next(runs))
-        for name, trial in recordings(batches[0], scene, 0.01):
+        for name, trial in files:
             recording.save(folder / name, trial)
 
     benchmark.pedantic(write, setup=simulate, rounds=3, iterations=1)

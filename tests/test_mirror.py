@@ -54,6 +54,7 @@ THROUGH = {
     "train/importers/mcap.py": "train/importers/test_log_importers.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
+    "train/simulate/base_steps.py": "train/simulate/test_simulate_oracles.py",
     "train/simulate/families.py": "train/simulate/test_simulate_truth.py",
     "train/simulate/effects/slope.py": "train/simulate/test_simulate_pushing.py",
     "train/simulate/effects/turning.py": "train/simulate/test_simulate_pushing.py",
@@ -61,6 +62,7 @@ THROUGH = {
     "train/simulate/explain.py": "train/simulate/test_simulate_called_for.py",
     "train/simulate/reader.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/scene_model.py": "train/simulate/test_simulate_scene.py",
+    "train/simulate/state.py": "train/simulate/test_trial.py",
     "train/simulate/sensor_frames.py": "train/simulate/test_simulate_run.py",
 }
 """{module, or a report's folder of sections: the test file that specifies it as a part of more}."""

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tests.hard_cases.cases import Case
 from tests.train.simulate.conftest import Rig
+from tests.train.simulate.test_pivot_solver import tilt_cases, tilt_error, tilt_loads
 from tests.train.simulate.test_simulate_stability import (
     SPEED,
     cases,
@@ -16,11 +17,8 @@ from tests.train.simulate.test_simulate_stability import (
     ledger,
     lugre,
     naive_push,
-    tilt_cases,
-    tilt_error,
-    tilt_loads,
+    taxel_forces,
 )
-from train.simulate import contact
 
 SEEDS = st.integers(0, 10**6)
 SOME_MASSES = 10.0 ** np.arange(-9, 10, 3)
@@ -114,23 +112,16 @@ def shared_error(stiff: float, seed: int) -> float:
     gaps = np.sort(rng.uniform(0.0, 1e-3, (7, 50)), axis=0)
     gaps[0] = 0.0
     k = np.full((7, 50), stiff)
-    slopes, intercepts = contact.sort_bed(gaps, k)
-    trace = Rig(h=0.01, slopes=slopes, intercepts=intercepts).run(30)
-    force = trace.force[-1]
-    loads = contact.spring_loads(trace.depth[-1][None], gaps, k, np.ones((1, 50)))
-    held = loads.sum(axis=(0, 1)) > 0.0
-    whole = contact.share_out(force, loads.copy()).sum(axis=(0, 1))
-    return float(np.abs(whole[held] / force[held] - 1.0).max(initial=0.0))
+    force, naive, shared = taxel_forces(Rig, gaps, k, 30)
+    held = naive > 0.0
+    return float(np.abs(shared[held] / force[held] - 1.0).max(initial=0.0))
 
 
 def shared_usual() -> str:
     gaps = np.zeros((7, 1))
     gaps[1:] = 5e-4
-    k = np.full((7, 1), 1e15)
-    slopes, intercepts = contact.sort_bed(gaps, k)
-    trace = Rig(h=0.01, slopes=slopes, intercepts=intercepts).run(30)
-    loads = contact.spring_loads(trace.depth[-1][None], gaps, k, np.ones((1, 1)))
-    off = abs(float(loads.sum() / trace.force[-1, 0]) - 1.0)
+    force, naive, _ = taxel_forces(Rig, gaps, np.full((7, 1), 1e15), 30)
+    off = abs(float(naive[0] / force[0]) - 1.0)
     return f"stiffness times depth at 1e15 N/m: off by {off:.1e}"
 
 

@@ -1,16 +1,16 @@
-"""Kinematics of many arms at once, in elementwise arithmetic whose bits do not depend on how
-many there are (a matrix product's do)."""
+"""Kinematics of an arm, compiled: one trial's arithmetic, which knows of no other's."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from train.simulate.contact import Array, total
+from train.simulate.compiled import Array
 
 
 class Pose(NamedTuple):
@@ -29,123 +29,155 @@ class Pose(NamedTuple):
     origins: Array
 
 
+JOINTS = 16
+"""That turn, at most."""
+SHIFT, TURN, AXIS, MAIN, WIDTH = 0, 3, 12, 15, 16
+"""Of a row of the table: a shift, a turn by rows, the joint's axis, which of the frame's own axes
+that is (3 where it is none)."""
+
+
 class Kinematics:
-    """Forward kinematics and the Jacobian's parts of a chain of turning joints."""
+    """A chain of turning joints taken apart into constant steps and turns.
+
+    Attributes:
+        table: (dof + 1, WIDTH) what lies before each joint, and its axis; last what lies behind.
+    """
 
     def __init__(self, chain: Chain) -> None:
-        """Take the chain apart into constant steps and turns.
+        """Of a chain.
 
         Raises:
-            InputError: a joint slides.
+            InputError: a joint slides, or there are too many.
         """
         self.chain = chain
-        self._steps: list[tuple[Array | None, Array | None, Array]] = []
-        pending: tuple[Array | None, Array | None] = (None, None)
+        if chain.dof > JOINTS:
+            raise InputError(
+                f"the arm has {chain.dof} joints that turn; the simulator takes at most {JOINTS}: "
+                "make the others fixed"
+            )
+        rows: list[Array] = []
+        pending = (np.zeros(3), np.eye(3))
         for joint in chain.joints:
             if joint.kind == "prismatic":
                 raise InputError(
                     f"joint {joint.name!r} slides; the simulator's arms only turn: make it fixed"
                 )
             before = _joined(pending, _fixed(joint.origin_xyz, joint.origin_rpy))
-            after = _fixed(joint.translate, (0.0, 0.0, 0.0))
+            pending = _fixed(joint.translate, (0.0, 0.0, 0.0))
             if joint.kind == "fixed":
-                pending = _joined(before, after)
+                pending = _joined(before, pending)
                 continue
             axis = np.array(joint.axis) / math.hypot(*joint.axis)
-            self._steps.append((*before, axis))
-            pending = after
-        self._last = pending
+            main = int(np.argmax(np.abs(axis)))
+            rows.append(_row(before, axis, main if abs(axis[main]) == 1.0 else 3))
+        self.table = np.array([*rows, _row(pending, np.zeros(3), 3)])
 
     def pose(self, q: Array) -> Pose:
         """Poses at the angles q (dof, n)."""
         dof, n = q.shape
-        rotation = np.zeros_like(q, shape=(3, 3, n))
-        for i in range(3):
-            rotation[i, i] = 1.0
-        origin = np.zeros_like(q, shape=(3, n))
-        axes, origins = (np.empty_like(q, shape=(3, dof, n)) for _ in range(2))
-        sine, cosine = np.sin(q), np.cos(q)
-        for j, (shift, turn, axis) in enumerate(self._steps):
-            rotation, origin = _move(rotation, origin, shift, turn)
-            axes[:, j] = _times(rotation, axis)
-            origins[:, j] = origin
-            rotation = _turned(rotation, axis, sine[j], cosine[j])
-        rotation, origin = _move(rotation, origin, *self._last)
-        return Pose(origin, rotation, axes, origins)
+        origin, rotation = np.empty((n, 3)), np.empty((n, 3, 3))
+        axes, origins = np.empty((n, 3, dof)), np.empty((n, 3, dof))
+        poses(self.table, np.ascontiguousarray(q.T), origin, rotation, axes, origins)
+        return Pose(*(np.moveaxis(part, 0, -1) for part in (origin, rotation, axes, origins)))
 
 
-def _fixed(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[Array | None, Array | None]:
-    shift = np.array(xyz) if any(xyz) else None
-    if not any(rpy):
-        return shift, None
+def _row(before: tuple[Array, Array], axis: Array, main: int) -> Array:
+    return np.concatenate([before[0], before[1].ravel(), axis, [main]])
+
+
+def _fixed(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[Array, Array]:
     (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
-    return shift, np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    turn = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.array(xyz), np.array(turn)
 
 
-def _joined(
-    a: tuple[Array | None, Array | None], b: tuple[Array | None, Array | None]
-) -> tuple[Array | None, Array | None]:
-    """The transform a, then b; None stands for no shift and for no turn."""
-    shift, turn = a
-    step = b[0] if b[0] is None or turn is None else turn @ b[0]
-    total = shift if step is None else step if shift is None else shift + step
-    return total, b[1] if turn is None else turn if b[1] is None else turn @ b[1]
+def _joined(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The transform a, then b."""
+    return a[0] + a[1] @ b[0], a[1] @ b[1]
 
 
-def _move(
-    rotation: Array, origin: Array, shift: Array | None, turn: Array | None
-) -> tuple[Array, Array]:
-    if shift is not None:
-        origin = origin + _times(rotation, shift)
-    if turn is not None:
-        rotation = np.stack([_times(rotation, turn[:, c]) for c in range(3)], axis=1)
-    return rotation, origin
+@njit(error_model="numpy")
+def move(step: Array, origin: Array, rotation: Array) -> None:
+    """Go on by a row's shift and turn, as seen from the frame that has been reached."""
+    for i in range(3):
+        shifted = rotation[i, 0] * step[SHIFT]
+        for k in range(1, 3):
+            shifted += rotation[i, k] * step[SHIFT + k]
+        origin[i] += shifted
+    for i in range(3):
+        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
+        for k in range(3):
+            rotation[i, k] = a * step[TURN + k] + b * step[TURN + 3 + k] + c * step[TURN + 6 + k]
 
 
-def _times(rotation: Array, vector: Any) -> Array:
-    """(3, 3, n) times a constant vector; its zeros cost nothing."""
-    total: Array | None = None
-    for c in range(3):
-        if vector[c] != 0.0:
-            term = rotation[:, c] if vector[c] == 1.0 else rotation[:, c] * float(vector[c])
-            total = term if total is None else total + term
-    return np.zeros_like(rotation[:, 0]) if total is None else total
-
-
-def _turned(rotation: Array, axis: Array, sine: Array, cosine: Array) -> Array:
-    """Rotation times the turn about `axis` (Rodrigues): I + sin K + (1 - cos) K^2."""
-    out = np.empty_like(rotation)
-    main = int(np.argmax(np.abs(axis)))
-    if abs(axis[main]) == 1.0:
+@njit(error_model="numpy")
+def turn(step: Array, angle: float, rotation: Array) -> None:
+    """Turn about the row's axis (Rodrigues): I + sin K + (1 - cos) K^2."""
+    sine, cosine, main = math.sin(angle), math.cos(angle), int(step[MAIN])
+    if main < 3:
         # About one of the frame's own axes the other two turn in their plane.
-        if axis[main] < 0.0:
+        if step[AXIS + main] < 0.0:
             sine = -sine
-        a, b = (main + 1) % 3, (main + 2) % 3
-        out[:, main] = rotation[:, main]
-        np.multiply(rotation[:, a], cosine, out=out[:, a])
-        out[:, a] += rotation[:, b] * sine
-        np.multiply(rotation[:, b], cosine, out=out[:, b])
-        out[:, b] -= rotation[:, a] * sine
-        return out
-    x, y, z = axis
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    k2 = k @ k
-    for c in range(3):
-        out[:, c] = rotation[:, c] + (
-            sine * _times(rotation, k[:, c]) + (1.0 - cosine) * _times(rotation, k2[:, c])
-        )
-    return out
+        first, second = (main + 1) % 3, (main + 2) % 3
+        for i in range(3):
+            a, b = rotation[i, first], rotation[i, second]
+            rotation[i, first] = a * cosine + b * sine
+            rotation[i, second] = b * cosine - a * sine
+        return
+    x, y, z = step[AXIS], step[AXIS + 1], step[AXIS + 2]
+    rest = 1.0 - cosine
+    for i in range(3):
+        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
+        # a row of the rotation times K, and that times K again
+        u, v, w = b * z - c * y, c * x - a * z, a * y - b * x
+        rotation[i, 0] = a + (sine * u + rest * (v * z - w * y))
+        rotation[i, 1] = b + (sine * v + rest * (w * x - u * z))
+        rotation[i, 2] = c + (sine * w + rest * (u * y - v * x))
+
+
+@njit(error_model="numpy")
+def pose_of(
+    table: Array, q: Array, origin: Array, rotation: Array, axes: Array, origins: Array
+) -> None:
+    """One arm's pose at its angles (dof, or more room), into arrays as of `Pose`."""
+    for i in range(3):
+        origin[i] = 0.0
+        for k in range(3):
+            rotation[i, k] = 1.0 if i == k else 0.0
+    for j in range(len(table) - 1):
+        step = table[j]
+        move(step, origin, rotation)
+        for i in range(3):
+            origins[i, j] = origin[i]
+            axes[i, j] = (
+                rotation[i, 0] * step[AXIS]
+                + rotation[i, 1] * step[AXIS + 1]
+                + rotation[i, 2] * step[AXIS + 2]
+            )
+        turn(step, q[j], rotation)
+    move(table[-1], origin, rotation)
+
+
+@njit(cache=True, error_model="numpy")
+def poses(
+    table: Array, q: Array, origin: Array, rotation: Array, axes: Array, origins: Array
+) -> None:
+    """The poses of n arms, (n, ...) each."""
+    for i in range(len(q)):
+        pose_of(table, q[i], origin[i], rotation[i], axes[i], origins[i])
 
 
 def dot(a: Array, b: Array) -> Array:
     """Sum over the first axis, one term after the other: the same bits in any batch."""
-    return total(a * b)
+    product = a * b
+    whole: Array = product[0]
+    for term in product[1:]:
+        whole = whole + term
+    return whole
 
 
 def cross(a: Array, b: Array) -> Array:

@@ -9,17 +9,13 @@ from __future__ import annotations
 from importlib import import_module
 
 from train.simulate import base
-from train.simulate.plan import Around, Build, Plan
+from train.simulate.plan import Build, Plan
 from train.simulate.scene_model import Scene
 
 
-def make_plan(
-    scene: Scene,
-    effects: tuple[str, ...],
-    around: Around = lambda owner, function: function,
-) -> Plan:
-    """The plan of a scene's trials with these effects; `around` can time its solvers."""
-    build = Build(scene, effects, around)
+def make_plan(scene: Scene, effects: tuple[str, ...]) -> Plan:
+    """The plan of a scene's trials with these effects."""
+    build = Build(scene, effects)
     base.add(build)
     for name in effects:
         build.owner = name

@@ -9,49 +9,39 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
+from train.simulate import base_steps
 from train.simulate.arm import cross, dot
-from train.simulate.contact import (
-    Array,
-    Coordinates,
-    closed_form,
-    relieve,
-    share_out,
-    sort_bed,
-    spring_loads,
-    total,
-)
+from train.simulate.compiled import Array, addresses
+from train.simulate.contact import sort_bed, total
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 
 # Ranks within the stages; effects put themselves between.
-SWING, PLACE, SPRINGS, WINDOW, BED, ORDER = 0, 5, 10, 30, 40, 60
-LOCATE, LAYOUT = 10, 20
+SWING, PLACE, SPRINGS, WINDOW, BED, ORDER, HAND_OVER = 0, 5, 10, 30, 40, 60, 200
+LOCATE = 10
 PREDICT, PRESS, SETTLE = 10, 30, 60
 TICK, BEAR, IMAGE = 0, 10, 30
 
 
 def add(build: Build) -> None:
     """Put the base's functions into the plan."""
-    build.wrap(solve)
+    build.wrap(base_steps.solve)
+    build.press = base_steps.press
     build.put("setup", SWING, swing)
     build.put("setup", PLACE, place)
     build.put("setup", SPRINGS, springs)
     build.put("setup", WINDOW, window)
     build.put("setup", BED, lay_bed)
     build.put("setup", ORDER, order_bed)
-    build.put("frame", LOCATE, locate)
-    build.put("step", PREDICT, predict)
-    build.put("step", PRESS, press)
-    build.put("step", SETTLE, settle)
-    build.put("sample", TICK, tick)
-    build.put("sample", BEAR, bear)
-    build.put("sample", IMAGE, image)
-    build.trace("depth_m", deepest)
-
-
-def solve(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
-    """The force of the bed as it stands, in closed form."""
-    return closed_form(state.bed.slopes, state.bed.intercepts, y, c)
+    build.put("setup", HAND_OVER, hand_over)
+    build.put("frame", LOCATE, base_steps.locate)
+    build.put("step", PREDICT, base_steps.predict)
+    build.put("step", PRESS, base_steps.press)
+    build.put("step", SETTLE, base_steps.settle)
+    build.put("sample", TICK, base_steps.tick)
+    build.put("sample", BEAR, base_steps.bear)
+    build.put("sample", IMAGE, base_steps.image)
+    build.trace("depth_m", None, "deepest")
 
 
 def equilibrium(state: State, t: float | Array) -> Array:
@@ -90,7 +80,6 @@ def swing(state: State) -> None:
     state.joint_k = k
     state.lag = d / k * state.rate
     state.q = equilibrium(state, 0.0) - state.lag
-    state.frame = np.zeros(state.n)
 
 
 STILL_M_S = 1e-6
@@ -101,8 +90,7 @@ def place(state: State) -> None:
     """Put the object where the sweep meets it after the lead."""
     p, skin = state.values, state.skin
     state.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
-    low, high = float(state.row_z.min()), float(state.row_z.max())
-    state.z = np.clip(state.scene.place_m + p["place_m"], low, high)
+    state.z = state.scene.place_m + p["place_m"]
     pose = state.kinematics.pose(equilibrium(state, p["lead_s"]) - state.lag)
     along = pose.rotation[:, 2]
     point = pose.origin + along * state.z
@@ -125,8 +113,6 @@ def place(state: State) -> None:
     state.meeting_angle = np.arctan2(
         dot(speed, pose.rotation[:, 1]), dot(speed, pose.rotation[:, 0])
     )
-    state.force = np.zeros(state.n)
-    state.loads = (np.zeros(state.n),)
 
 
 def springs(state: State) -> None:
@@ -193,79 +179,54 @@ def order_bed(state: State) -> None:
     bed = state.bed
     if len(bed.line_gap) == 1 < len(bed.weight):
         covered_rows = total(bed.weight)
-        bed.slopes, bed.intercepts = sort_bed(bed.gaps, bed.stiffness * covered_rows)
+        law = sort_bed(bed.gaps, bed.stiffness * covered_rows)
+        bed.law_gaps, bed.slopes, bed.intercepts = law
         return
     all_gaps = (bed.line_gap[:, None] + bed.gaps[None]).reshape(-1, state.n)
     all_stiffness = (bed.weight[:, None] * bed.stiffness[None]).reshape(-1, state.n)
-    bed.slopes, bed.intercepts = sort_bed(all_gaps, all_stiffness)
+    bed.law_gaps, bed.slopes, bed.intercepts = sort_bed(all_gaps, all_stiffness)
 
 
-def locate(state: State) -> None:
-    """Depth, its Jacobian and what the step's loads take off it, at the frame's joint angles."""
-    pose = state.kinematics.pose(state.q)
-    state.pose = pose
-    along = pose.rotation[:, 2]
-    point = pose.origin + along * state.z
-    state.point = point
-    normal = state.normal
-    crossed = cross(normal[:, None], pose.axes)
-    jacobian = dot(point[:, None] - pose.origins, crossed)
-    state.q_frame = state.q
-    state.jacobian = (jacobian,)
-    depth = dot(point - state.face, normal) + state.skin.radius_m
-    state.y_frame = (depth,)
-    state.compliance = (dot(jacobian * jacobian, state.give),)
-
-
-def predict(state: State) -> None:
-    """Where the arm would be after the step with no load on it.
-
-    Each joint obeys d q' + k (q - q_eq) = -J^T F; backward Euler in closed form.
-    """
-    state.t = state.t + state.h
-    target = equilibrium(state, state.t)
-    state.q_free = (state.held * state.q + state.joint_k * target) * state.give
-    moved = state.q_free - state.q_frame
-    state.y = tuple(y + dot(j, moved) for y, j in zip(state.y_frame, state.jacobian, strict=True))
-
-
-def press(state: State) -> None:
-    """The contact's loads with the object at rest."""
-    state.loads = state.solve(state, state.y, state.compliance)
-
-
-def settle(state: State) -> None:
-    """The joints give way to the loads."""
-    loads = state.loads
-    torque = state.jacobian[0] * loads[0]
-    for jacobian, load in zip(state.jacobian[1:], loads[1:], strict=True):
-        torque = torque + jacobian * load
-    state.q = state.q_free - state.give * torque
-    state.depth = relieve(state.y, state.compliance, loads)
-
-
-def tick(state: State) -> None:
-    """The frame ends at its own time: sums of steps would drift from it."""
-    state.frame = state.frame + 1.0
-    state.t = state.frame / state.scene.trials["rate_hz"]
-
-
-def bear(state: State) -> None:
-    """The force that the skin bears, and each line's depth."""
-    state.force = state.loads[0]
-    state.line_depth = state.depth[0] - state.bed.line_gap
-
-
-def deepest(state: State) -> Array:
-    """(n,) metres to which the deepest of the lines is pressed."""
-    covered = state.bed.weight > 0.0
-    return np.asarray(np.where(covered, state.line_depth, 0.0).max(axis=0))
-
-
-def image(state: State) -> None:
-    """The force shared out among taxels: (rows, columns, n) newtons. Where a column has more
-    springs than one, its first says what it bears."""
-    bed, columns = state.bed, len(state.columns)
-    depth = np.broadcast_to(state.line_depth, bed.weight.shape)
-    loads = spring_loads(depth, bed.gaps[:columns], bed.stiffness[:columns], bed.weight)
-    state.image = share_out(state.force, loads)
+def hand_over(state: State) -> None:
+    """Give each trial's record what the setup has found; from here on it is the trial."""
+    skin, bed, values, n = state.skin, state.bed, state.values, state.n
+    dof, lines, columns = len(state.q), len(bed.weight), len(state.columns)
+    of_rows = {
+        "row_z": np.broadcast_to(state.row_z, (skin.rows, n)),
+        "weight": bed.weight,
+        "line_gap": np.broadcast_to(bed.line_gap, bed.weight.shape),
+        "line_depth": np.zeros((lines, n)),
+        "gaps": bed.gaps,
+        "stiffness": bed.stiffness,
+        "column_gaps": state.column_gaps,
+        "reach": state.reach,
+        "law_gaps": bed.law_gaps,
+        "slopes": bed.slopes,
+        "intercepts": bed.intercepts,
+        "image": np.zeros((skin.rows, columns, n)),
+    }
+    numbers = {
+        "h": state.h,
+        "rate_hz": state.scene.trials["rate_hz"],
+        "joints": dof,
+        "chain": addresses(state.kinematics.table)[0],
+        "z": state.z,
+        "taxel_k": state.taxel_k,
+        "width_m": values["width_m"],
+        "face_radius_m": values["radius_m"],
+        "skin_radius_m": skin.radius_m,
+        "row_pitch_m": skin.row_pitch_m,
+        "rows": skin.rows,
+        "lines": lines,
+        "columns": columns,
+        "springs": len(bed.gaps),
+        "law_lines": len(bed.slopes),
+        **{name: getattr(state, name).T for name in ("normal", "face", "along_face")},
+        **{name: state.lend(name, array) for name, array in of_rows.items()},
+    }
+    trial = state.trial.view(np.ndarray)
+    for name, value in numbers.items():
+        trial[name] = value
+    for name in ("start", "rate", "travel_s", "held", "give", "joint_k", "q"):
+        trial[name][:, :dof] = np.broadcast_to(getattr(state, name), (dof, n)).T
+    trial["coordinates"] = np.maximum(trial["coordinates"], 1)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from train.simulate.assemble import make_plan
-from train.simulate.contact import Array
+from train.simulate.compiled import Array
 from train.simulate.engine import Batch, begin, kind_of, run_batch
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SPREAD

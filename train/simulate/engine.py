@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,13 +14,14 @@ from train.simulate import streams
 from train.simulate.arm import Kinematics
 from train.simulate.assemble import make_plan
 from train.simulate.base import equilibrium
-from train.simulate.contact import Array
-from train.simulate.plan import Plan
+from train.simulate.compiled import Array, each
+from train.simulate.plan import RUN_STAGES, Plan
 from train.simulate.required_effects import required_effects
+from train.simulate.run_frames import run_frames
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
 from train.simulate.schema import SPREAD, STIFFNESSES
 from train.simulate.sensor_frames import SensorFrames
-from train.simulate.state import Kept, Readings, State
+from train.simulate.state import Readings, State
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,11 @@ def frame_count(scene: Scene) -> int:
     return round(duration * scene.trials["rate_hz"]) + 1
 
 
+def whole_steps(scene: Scene, step_s: float) -> int:
+    """Steps of about this length that make a frame."""
+    return max(1, round(1.0 / (scene.trials["rate_hz"] * step_s)))
+
+
 def begin(
     scene: Scene, plan: Plan, trials: tuple[TrialSpec, ...], step_s: float, values: dict[str, Array]
 ) -> State:
@@ -129,7 +135,7 @@ def begin(
         h=step_s,
         values=values,
         kinematics=Kinematics(scene.arm),
-        solve=plan.solve,
+        solve=plan.solve.address,
     )
     for function in plan.setup:
         function(state)
@@ -172,12 +178,20 @@ def run_batch(
         step_s: the physics' step; a whole number of them makes a frame.
         plan: the kind's, where it is at hand.
         values: {name: (n,)} in place of the scene's draws.
-        images: False for the physics alone (forces, joints); `counts` are then empty.
+        images: False for forces, joints and traces alone; `counts` are then empty.
     """
     first = trials[0]
     plan = plan or make_plan(scene, kind_of(scene, first.object, first.condition).effects)
     physics = run_physics(scene, trials, step_s, plan=plan, values=values, images=images)
-    return read_out(physics, plan)
+    parts = list(readings(physics, plan))
+
+    def whole(name: str) -> Any:
+        values = [getattr(part, name) for part in parts]
+        return None if values[0] is None else np.concatenate(values)
+
+    found = {name: whole(name) for name in ("counts", "joints", "times", "kept", "valid")}
+    force, traces = physics.force, physics.traces
+    return Batch(trials, physics.t, force=force, traces=traces, state=physics.state, **found)
 
 
 def run_physics(
@@ -193,43 +207,44 @@ def run_physics(
     values = values_of(scene, trials) if values is None else values
     frames = frame_count(scene)
     rate_hz = scene.trials["rate_hz"]
-    substeps = max(1, round(1.0 / (rate_hz * step_s)))
-    step_s = 1.0 / (rate_hz * substeps)
-    state = begin(scene, plan, trials, step_s, values)
+    substeps = whole_steps(scene, step_s)
+    state = begin(scene, plan, trials, 1.0 / (rate_hz * substeps), values)
     check_start(state, plan)
     n, dof = len(trials), len(scene.stiffness)
-    joints = np.empty((frames, dof, n))
-    force = np.zeros((frames, n))
-    traces = {name: np.zeros((frames, n)) for name in plan.traces}
     seen = SensorFrames(scene, plan, state, frames if images else 0)
-    kept: list[Kept] = [(joints, lambda state: state.q), (force, lambda state: state.force)]
-    kept += [(traces[name], quantity) for name, quantity in plan.traces.items()]
-    if images:
-        kept.append((seen.window.transpose(1, 2, 3, 0), seen.of))
-    # The clock and the force alone, where no images are asked for.
-    sample = plan.sample if images else plan.sample[:2]
-    joints[0] = state.q
-    for k in range(1, frames):
-        for function in (*plan.frame, *substeps * plan.step, *sample):
-            function(state)
-        for room, quantity in kept:
-            room[k] = quantity(state)
-        if k == 1 and plan.taped:
-            from train.simulate.recorder import Recorder
-
-            stages = ((plan.frame, 1), (plan.step, substeps), (sample, 1))
-            Recorder(state, kept).run(stages, k + 1, frames)
-            break
-    t = np.arange(frames) / rate_hz
-    check_energy(scene, state, joints, t)
-    return PhysicsRun(
-        frames=seen,
-        t=t,
-        joints=np.ascontiguousarray(joints.transpose(2, 0, 1)),
-        force=np.ascontiguousarray(force.T),
-        traces={name: np.ascontiguousarray(kept.T) for name, kept in traces.items()},
-        state=state,
+    joints, force = np.empty((n, frames, dof)), np.zeros((n, frames))
+    traces = np.zeros((len(plan.traces), n, frames))
+    run_frames(
+        state.trial.view(np.ndarray),
+        tuple(plan.addresses(stage) for stage in RUN_STAGES),
+        substeps,
+        joints,
+        force,
+        seen.window,
+        seen.scale,
+        not seen.raw,
+        state.places(list(plan.traces.values())),
+        traces,
     )
+    check_found(state)
+    t = np.arange(frames) / rate_hz
+    check_energy(scene, state, joints.transpose(1, 2, 0), t)
+    kept = dict(zip(plan.traces, traces, strict=True))
+    return PhysicsRun(frames=seen, t=t, joints=joints, force=force, traces=kept, state=state)
+
+
+def check_found(state: State) -> None:
+    """Refuse a batch in which a contact's loads were not found.
+
+    Raises:
+        EdgeError: names the scene, and how many trials that was in.
+    """
+    if state.trial.lost.any():
+        raise EdgeError(
+            f"{state.scene.name}: how far the forearm tilts was not found in "
+            f"{np.count_nonzero(state.trial.lost)} trials; "
+            "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+        )
 
 
 ENERGY_MADE = 0.01
@@ -242,11 +257,13 @@ def check_start(state: State, plan: Plan) -> None:
     Raises:
         InputError: names the first such trial, and by how much its face is turned.
     """
-    for function in plan.frame:
-        function(state)
-    held = state.solve(state, state.y_frame, tuple(np.zeros_like(c) for c in state.compliance))
-    if (held[0] > 0.0).any():
-        i = int(np.argmax(held[0] > 0.0))
+    t = state.trial
+    each(plan.addresses("frame"), t.here)
+    t.free, t.c = t.y_frame, 0.0
+    each(np.array([state.solve]), t.here)
+    held = t.found[:, 0] > 0.0
+    if held.any():
+        i = int(np.argmax(held))
         trial, yaw = state.trials[i], abs(state.values["yaw_deg"][i])
         raise InputError(
             f"{state.scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
@@ -294,45 +311,29 @@ READ_AT_ONCE = 4
 """Trials whose frames stay in a processor's cache while one sensor's effect follows the other."""
 
 
-def read_out(physics: PhysicsRun, plan: Plan, wanted: NDArray[np.bool_] | None = None) -> Batch:
-    """The batch as a plan's sensor and clock show it.
+def readings(
+    physics: PhysicsRun, plan: Plan, which: NDArray[np.intp] | None = None
+) -> Iterator[Readings]:
+    """What a plan's sensor and clock show of a run's trials, a few at a time.
 
     One run serves any plan that differs in these alone, as long as each of them has some: the
     frames are kept in whole counts where no sensor's effect is called for.
 
     Args:
-        wanted: (n,) trials to read; the others' counts are zero.
+        which: the trials to read; None for all.
     """
     state, frames = physics.state, physics.frames
-    n = state.n
-    shape = (n, len(frames.window[0]), state.skin.rows, state.skin.cols)
-    counts, joints = np.zeros(shape, dtype=np.uint16), np.empty_like(physics.joints)
-    found: dict[str, Any] = dict.fromkeys(("times", "kept", "valid"))
-    which = np.arange(n) if wanted is None else np.flatnonzero(wanted)
+    which = np.arange(state.n) if which is None else which
     for some in np.split(which, range(READ_AT_ONCE, len(which), READ_AT_ONCE)):
-        readings = Readings(
+        seen = Readings(
             seed=state.scene.seed,
+            which=some,
             trials=tuple(state.trials[i] for i in some),
             t=physics.t,
             counts=frames.whole(state, some),
             joints=physics.joints[some],
         )
         for function in (*plan.clock, *plan.sensor):
-            function(readings)
-        counts[some], joints[some] = frames.in_counts(readings.counts), readings.joints
-        for name in found:
-            part = getattr(readings, name)
-            if part is not None:
-                if found[name] is None:
-                    found[name] = np.zeros((n, *part.shape[1:]), dtype=part.dtype)
-                found[name][some] = part
-    return Batch(
-        trials=state.trials,
-        t=physics.t,
-        counts=counts,
-        joints=joints,
-        force=physics.force,
-        traces=physics.traces,
-        state=state,
-        **found,
-    )
+            function(seen)
+        seen.counts = frames.in_counts(seen.counts)
+        yield seen

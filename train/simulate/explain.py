@@ -7,10 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from train.simulate.assemble import make_plan
+from train.simulate.compiled import each
 from train.simulate.convergence import Convergence, measure
-from train.simulate.engine import kind_of, run_batch
-from train.simulate.plan import STAGES, Plan
+from train.simulate.engine import begin, frame_count, kind_of, run_batch, values_of, whole_steps
+from train.simulate.plan import PYTHON_STAGES, RUN_STAGES, STAGES, Plan
 from train.simulate.required_effects import required_effects
 from train.simulate.run import kinds, steps
 from train.simulate.scene_model import Scene, TrialSpec
@@ -21,58 +24,61 @@ MEASURED = 64
 REPEATS = 2
 
 
-class Stopwatch:
-    """Time spent in functions that call each other, each with its own share alone."""
-
-    def __init__(self) -> None:
-        """Nothing measured yet."""
-        self.spent: dict[str, float] = {}
-        self._inside: list[float] = []
-
-    def around(self, owner: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, timed for `owner`."""
-
-        def timed(*arguments: Any) -> Any:
-            self._inside.append(0.0)
-            begin = time.perf_counter()
-            result = function(*arguments)
-            took = time.perf_counter() - begin
-            self.spent[owner] = self.spent.get(owner, 0.0) + took - self._inside.pop()
-            if self._inside:
-                self._inside[-1] += took
-            return result
-
-        return timed
-
-
-def timed_plan(scene: Scene, effects: tuple[str, ...], stopwatch: Stopwatch) -> Plan:
-    """A plan whose functions report their time under the effect that they belong to.
-
-    They run as they are: a tape has no functions.
-    """
-    plan = make_plan(scene, effects, around=stopwatch.around)
-    stages: dict[str, Any] = {
-        stage: tuple(stopwatch.around(plan.owners[f], f) for f in getattr(plan, stage))
-        for stage in STAGES
-    }
-    return replace(plan, taped=False, **stages)
-
-
 def costs(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> dict[str, float]:
     """{effect, or `base`: microseconds a trial} of one kind, the better of two runs.
 
-    An effect that takes the place of a base function is charged with all that it does there.
+    An effect that takes the place of a base function is charged with all that it does there, one
+    that answers for the contact with the answers.
     """
     first = trials[0]
-    effects = kind_of(scene, first.object, first.condition).effects
+    plan = make_plan(scene, kind_of(scene, first.object, first.condition).effects)
     many = tuple(replace(trials[i % len(trials)], number=i) for i in range(MEASURED))
     best: dict[str, float] = {}
     for _ in range(REPEATS):
-        stopwatch = Stopwatch()
-        run_batch(scene, many, step_s, plan=timed_plan(scene, effects, stopwatch))
-        for name, spent in stopwatch.spent.items():
+        for name, spent in spent_in(scene, many, step_s, plan).items():
             best[name] = min(best.get(name, spent), spent)
-    return {name: best.get(name, 0.0) / MEASURED * 1e6 for name in ("base", *effects)}
+    return {name: best.get(name, 0.0) / MEASURED * 1e6 for name in ("base", *plan.effects)}
+
+
+def spent_in(
+    scene: Scene, trials: tuple[TrialSpec, ...], step_s: float, plan: Plan
+) -> dict[str, float]:
+    """{effect, or `base`: seconds} of one batch, function by function.
+
+    Each compiled function is called for all trials before the next one is.
+    """
+    spent = dict.fromkeys(("base", *plan.effects), 0.0)
+
+    def timed(function: Any, *arguments: Any) -> float:
+        begun = time.perf_counter()
+        function(*arguments)
+        return time.perf_counter() - begun
+
+    def around(function: Any) -> Callable[[Any], None]:
+        def charged(argument: Any) -> None:
+            spent[plan.owners[function]] += timed(function, argument)
+
+        return charged
+
+    stages: dict[str, Any] = {
+        stage: tuple(map(around, getattr(plan, stage))) for stage in PYTHON_STAGES
+    }
+    run_batch(scene, trials, step_s, plan=replace(plan, **stages))
+    substeps = whole_steps(scene, step_s)
+    state = begin(scene, plan, trials, step_s, values_of(scene, trials))
+    where = state.trial.here
+    one = {f: np.array([f.address]) for stage in RUN_STAGES for f in getattr(plan, stage)}
+    solve = np.array([plan.solve.address])
+    for _ in range(1, frame_count(scene)):
+        for function in (*plan.frame, *substeps * plan.step, *plan.sample):
+            took = timed(each, one[function], where)
+            if function is plan.press:
+                # It is the solver that takes the time, and once more does no harm.
+                solved = min(timed(each, solve, where), took)
+                spent[plan.owners[plan.solve]] += solved
+                took -= solved
+            spent[plan.owners[function]] += took
+    return spent
 
 
 def explain(scene: Scene) -> str:

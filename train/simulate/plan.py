@@ -6,21 +6,29 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from train.simulate.contact import Array
+import numpy as np
+from numpy.typing import NDArray
+
 from train.simulate.scene_model import Scene
 from train.simulate.schema import EFFECTS
-from train.simulate.state import Readings, Solver, State
+from train.simulate.state import Readings, State
+from train.simulate.trial import Part
 
-PhysicsFunction = Callable[[State], None]
+SetupFunction = Callable[[State], None]
 SensorFunction = Callable[[Readings], None]
-Around = Callable[[str, Callable[..., Any]], Callable[..., Any]]
-"""(owner, function) -> the function with something put around it: nothing, or a stopwatch."""
+Compiled = Any
+"""A function of a trial, compiled (`trial.compiled`): it has an `address`."""
+Trace = tuple[Part | None, str]
+"""A field of an effect's own part of a trial, or of the trial itself."""
 
-PHYSICS_STAGES = ("setup", "frame", "step", "sample")
-"""Once a batch; once a frame before its steps; each step; once a frame after its steps."""
+RUN_STAGES = ("frame", "step", "sample")
+"""Compiled: once a frame before its steps; each step; once a frame after its steps."""
+PHYSICS_STAGES = ("setup", *RUN_STAGES)
+"""The setup runs once a batch."""
 SENSOR_STAGES = ("clock", "sensor")
 """Once on the frames' times; once on all frames."""
 STAGES = (*PHYSICS_STAGES, *SENSOR_STAGES)
+PYTHON_STAGES = ("setup", *SENSOR_STAGES)
 
 
 @dataclass(frozen=True)
@@ -28,19 +36,23 @@ class Plan:
     """What one kind of trial runs, in order."""
 
     effects: tuple[str, ...]
-    setup: tuple[PhysicsFunction, ...]
-    frame: tuple[PhysicsFunction, ...]
-    step: tuple[PhysicsFunction, ...]
-    sample: tuple[PhysicsFunction, ...]
+    setup: tuple[SetupFunction, ...]
+    frame: tuple[Compiled, ...]
+    step: tuple[Compiled, ...]
+    sample: tuple[Compiled, ...]
     clock: tuple[SensorFunction, ...]
     sensor: tuple[SensorFunction, ...]
-    solve: Solver
-    traces: dict[str, Callable[[State], Array]]
-    """{name: what it is in a state (n,)}, kept for every frame."""
+    solve: Compiled
+    press: Compiled
+    """The function of `step` that asks the solver."""
+    traces: dict[str, Trace]
+    """{name: where it stands}, kept for every frame."""
     owners: dict[Any, str]
     """{function: the effect it belongs to, or `base`}."""
-    taped: bool = True
-    """Frames are run by tape (`recorder`), not function by function."""
+
+    def addresses(self, stage: str) -> NDArray[np.int64]:
+        """Of the functions of a compiled stage, in order."""
+        return np.array([function.address for function in getattr(self, stage)], dtype=np.int64)
 
     def __len__(self) -> int:
         """How many functions there are in all stages."""
@@ -53,15 +65,17 @@ class Build:
 
     scene: Scene
     effects: tuple[str, ...]
-    around: Around = lambda owner, function: function
     owner: str = "base"
-    entries: list[tuple[str, int, PhysicsFunction]] = field(default_factory=list)
+    entries: list[tuple[str, int, Any]] = field(default_factory=list)
     sensors: list[tuple[str, int, SensorFunction]] = field(default_factory=list)
-    solve: Solver = field(init=False)
-    traces: dict[str, Callable[[State], Array]] = field(default_factory=dict)
+    solve: Compiled = field(init=False)
+    press: Compiled = field(init=False)
+    traces: dict[str, Trace] = field(default_factory=dict)
     owners: dict[Any, str] = field(default_factory=dict)
+    parts: set[Part] = field(default_factory=set)
+    """That several effects share, and one of them has put in."""
 
-    def put(self, stage: str, rank: int, function: PhysicsFunction) -> None:
+    def put(self, stage: str, rank: int, function: SetupFunction | Compiled) -> None:
         """Add a function to a stage of the physics; the lower rank runs first."""
         self.entries.append((stage, rank, function))
         self.owners[function] = self.owner
@@ -71,18 +85,21 @@ class Build:
         self.sensors.append((stage, rank, function))
         self.owners[function] = self.owner
 
-    def replace(self, function: PhysicsFunction, by: PhysicsFunction) -> None:
+    def replace(self, function: Any, by: Any) -> None:
         """Let `by` run where `function` would."""
         self.entries = [(s, r, by if f is function else f) for s, r, f in self.entries]
         self.owners[by] = self.owner
+        if function is self.press:
+            self.press = by
 
-    def wrap(self, solve: Solver) -> None:
-        """Let `solve` answer for the contact; it may ask the one before it."""
-        self.solve = self.around(self.owner, solve)
+    def wrap(self, solve: Compiled) -> None:
+        """Let `solve` answer for the contact; it may call the one before it."""
+        self.solve = solve
+        self.owners[solve] = self.owner
 
-    def trace(self, name: str, quantity: Callable[[State], Array]) -> None:
-        """Keep a quantity (n,) of every frame under this name."""
-        self.traces[name] = quantity
+    def trace(self, name: str, part: Part | None, field: str) -> None:
+        """Keep a field of every frame under this name: of an effect's part, or of the trial."""
+        self.traces[name] = part, field
 
     def settings(self, effect: str) -> dict[str, float]:
         """The effect's settings of the scene."""
@@ -92,7 +109,7 @@ class Build:
     def plan(self) -> Plan:
         """The plan as it has been put together."""
 
-        def stage(name: str) -> tuple[PhysicsFunction, ...]:
+        def stage(name: str) -> tuple[Any, ...]:
             ranked = sorted((e for e in self.entries if e[0] == name), key=lambda e: e[1])
             return tuple(function for _, _, function in ranked)
 
@@ -109,6 +126,7 @@ class Build:
             clock=reading("clock"),
             sensor=reading("sensor"),
             solve=self.solve,
+            press=self.press,
             traces=self.traces,
             owners=self.owners,
         )

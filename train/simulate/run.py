@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,16 @@ from edge.recording import Recording
 from train.cluster import on_cluster
 from train.simulate.assemble import make_plan
 from train.simulate.convergence import Convergence, measure
-from train.simulate.engine import Batch, Kind, begin, check_start, kind_of, read_out, values_of
+from train.simulate.engine import (
+    Kind,
+    PhysicsRun,
+    begin,
+    check_start,
+    kind_of,
+    readings,
+    values_of,
+)
+from train.simulate.plan import Plan
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SOFT_FAMILIES
 from train.simulate.truth import true_runs
@@ -98,48 +108,45 @@ def file_name(scene: Scene, trial: TrialSpec) -> str:
 
 
 def recordings(
-    batch: Batch, scene: Scene, step_s: float, wanted: NDArray[np.bool_] | None = None
+    physics: PhysicsRun,
+    plan: Plan,
+    scene: Scene,
+    step_s: float,
+    which: NDArray[np.intp] | None = None,
 ) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial of a batch, or of those `wanted` (n,)."""
+    """(file name, recording) of each trial of a run, or of some, as a scene's plan shows them."""
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
-    values = batch.state.values
-    for i, trial in enumerate(batch.trials):
-        if wanted is not None and not wanted[i]:
-            continue
-        kept = slice(None) if batch.kept is None else batch.kept[i]
-        t = batch.t if batch.times is None else batch.times[i]
-        soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
-        file = file_name(scene, trial)
-        meta: dict[str, Any] = {
-            "labels": {
-                "category": f"{soft}-{trial.condition}",
-                "mobility": trial.condition,
-                "softness": soft,
-                "object": trial.object.name,
-            },
-            "skin": skin,
-            "arm": arm,
-            "source": f"simulated: {scene.name}",
-            "trial": Path(file).stem,
-            "simulation": {
-                "seed": scene.seed,
-                "step_s": step_s,
-                "family": trial.object.family,
-                "redrawn": trial.attempt,
-                "effects": list(kind_of(scene, trial.object, trial.condition).effects),
-                "values": {k: float(v[i]) for k, v in values.items() if np.isfinite(v[i])},
-            },
-        }
-        yield (
-            file,
-            Recording(
-                t=t[kept],
-                frames=batch.counts[i][kept],
-                joints=batch.joints[i][kept],
-                valid=None if batch.valid is None else batch.valid[i],
-                meta=meta,
-            ),
-        )
+    values = physics.state.values
+    for seen in readings(physics, plan, which):
+        for i, trial in enumerate(seen.trials):
+            kept = slice(None) if seen.kept is None else seen.kept[i]
+            t = seen.t if seen.times is None else seen.times[i]
+            drawn = {name: float(value[seen.which[i]]) for name, value in values.items()}
+            soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
+            file = file_name(scene, trial)
+            meta: dict[str, Any] = {
+                "labels": {
+                    "category": f"{soft}-{trial.condition}",
+                    "mobility": trial.condition,
+                    "softness": soft,
+                    "object": trial.object.name,
+                },
+                "skin": skin,
+                "arm": arm,
+                "source": f"simulated: {scene.name}",
+                "trial": Path(file).stem,
+                "simulation": {
+                    "seed": scene.seed,
+                    "step_s": step_s,
+                    "family": trial.object.family,
+                    "redrawn": trial.attempt,
+                    "effects": list(plan.effects),
+                    "values": {k: v for k, v in drawn.items() if math.isfinite(v)},
+                },
+            }
+            valid = None if seen.valid is None else seen.valid[i]
+            frames, joints = seen.counts[i][kept], seen.joints[i][kept]
+            yield file, Recording(t=t[kept], frames=frames, joints=joints, valid=valid, meta=meta)
 
 
 def simulate_trials(
@@ -149,8 +156,7 @@ def simulate_trials(
     first = trials[0]
     plan = make_plan(scene, kind_of(scene, first.object, first.condition).effects)
     for physics, true in true_runs(scene, trials, step_s, plan):
-        if true.any():
-            yield from recordings(read_out(physics, plan, true), scene, step_s, true)
+        yield from recordings(physics, plan, scene, step_s, np.flatnonzero(true))
 
 
 def simulate_part(

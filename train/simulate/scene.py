@@ -19,6 +19,7 @@ from train.simulate.reader import SceneTable, Value
 from train.simulate.required_effects import check_supported
 from train.simulate.scene_model import Scene, SceneObject
 from train.simulate.schema import EFFECTS
+from train.simulate.streams import FARTHEST
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
@@ -118,6 +119,13 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     labels = top.table("labels", {}).fields(schema.LABELS)
     add, leave_out, settings = _effects(top.table("effects", {}))
     spread = top.table("spread", {}).fields(schema.SPREAD)
+    room_m = min(skin.row0_z_m - place_m, place_m - _last_row_m(skin)) / FARTHEST
+    if spread["place_m"] > room_m + 1e-12:
+        raise InputError(
+            f"{where}: spread.place_m must be at most {math.floor(1e4 * room_m) / 1e4:g}, not "
+            f"{spread['place_m']:g}: some objects would be met beyond the skin's rows, as "
+            f"motion.place_m is {place_m:g} and draws lie up to {FARTHEST:g} times the spread away"
+        )
     scene = Scene(
         name=top.text("name", Path(where).stem or "scene"),
         seed=seed,
@@ -210,12 +218,17 @@ def _motion(
             if not low - 1e-7 <= angle <= high + 1e-7:
                 raise table.fail(f"start_deg of {joint}", f"{low:g} to {high:g}", angle)
     travel_s = table.number("travel_s", 1e6, 0.0, 1e6, open_low=True)
-    last_m = skin.row0_z_m - skin.pitch[0] * (skin.rows - 1)
+    last_m = _last_row_m(skin)
     middle_m = 0.5 * (last_m + skin.row0_z_m)
     usual_m = PLACE_M if last_m <= PLACE_M <= skin.row0_z_m else middle_m
     place_m = table.number("place_m", usual_m, last_m, skin.row0_z_m)
     table.done()
     return tuple(map(math.radians, start)), tuple(map(math.radians, rate)), travel_s, place_m
+
+
+def _last_row_m(skin: SkinLayout) -> float:
+    """z of the skin's last row in its link."""
+    return skin.row0_z_m - skin.pitch[0] * (skin.rows - 1)
 
 
 def _stroke(

@@ -155,7 +155,7 @@ EFFECTS: dict[str, EffectInfo] = {
     "tilt": EffectInfo(
         "the forearm pivots about the contact",
         "contact",
-        2,
+        3,
         families=(RIGID, FOAM, PILLOW, BUBBLES),
     ),
     "relaxation": EffectInfo("standard linear solid", "contact", 1, families=ELASTIC),
@@ -172,7 +172,7 @@ EFFECTS: dict[str, EffectInfo] = {
         {"shear_n_m": Field(0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True)},
         keys=("skin_friction",),
     ),
-    "sliding": EffectInfo("sticks, then slides on the floor", "contact", 3),
+    "sliding": EffectInfo("sticks, then slides on the floor", "contact", 2),
     "slope": EffectInfo(
         "a table that is not level", "contact", 1, needs=("sliding",), keys=("slope_deg",)
     ),

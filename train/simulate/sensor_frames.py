@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from train.simulate.contact import Array
 from train.simulate.plan import Plan
+from train.simulate.run_frames import FULL
 from train.simulate.scene_model import Scene
 from train.simulate.state import State
-
-FULL = 65535.0
 
 
 class SensorFrames:
@@ -30,28 +29,37 @@ class SensorFrames:
         shape = (state.n, frames, scene.skin.rows, len(state.columns))
         self.window: NDArray[Any] = np.zeros(shape, dtype=self.kind)
 
-    def of(self, state: State) -> Array:
-        """(rows, columns, n) what is kept of a frame."""
-        counts = state.image * self.scale
-        if not self.raw:
-            np.rint(counts, out=counts)
-        return np.minimum(counts, FULL, out=counts)
-
     def whole(self, state: State, some: NDArray[np.intp]) -> NDArray[Any]:
         """(n, frames, rows, cols) counts of some trials, before any sensor's effect."""
-        _, frames, rows, window = self.window.shape
-        cols = state.skin.cols
-        counts: NDArray[Any] = np.zeros((len(some), frames, rows, cols), dtype=self.kind)
+        _, frames, rows, _ = self.window.shape
+        counts: NDArray[Any] = np.zeros((len(some), frames, rows, state.skin.cols), self.kind)
         for one, i in zip(counts, some, strict=True):
-            column, seen = int(state.columns[0, i]), self.window[i]
-            fits = min(window, cols - column)
-            one[:, :, column : column + fits] = seen[:, :, :fits]
-            one[:, :, : window - fits] = seen[:, :, fits:]
+            _unroll(self.window[i], int(state.columns[0, i]), one)
         return counts
 
     def in_counts(self, counts: NDArray[Any]) -> NDArray[np.uint16]:
         """Whole counts within the converter's range, once every sensor's effect has run."""
-        if self.raw:
-            np.rint(counts, out=counts)
-            np.clip(counts, 0.0, FULL, out=counts)
-        return counts.astype(np.uint16, copy=False)
+        if not self.raw:
+            return counts
+        whole = np.empty(counts.shape, dtype=np.uint16)
+        _round(counts.reshape(-1), whole.reshape(-1))
+        return whole
+
+
+@njit(cache=True)
+def _unroll(window: NDArray[Any], first: int, frames: NDArray[Any]) -> None:
+    """Put a window's columns where they are around the skin, `first` the first of them."""
+    fits = min(window.shape[2], frames.shape[2] - first)
+    for k in range(len(frames)):
+        for row in range(frames.shape[1]):
+            for c in range(fits):
+                frames[k, row, first + c] = window[k, row, c]
+            for c in range(fits, window.shape[2]):
+                frames[k, row, c - fits] = window[k, row, c]
+
+
+@njit(cache=True)
+def _round(counts: NDArray[np.float32], whole: NDArray[np.uint16]) -> None:
+    """The nearest whole counts that the converter can read."""
+    for i in range(len(counts)):
+        whole[i] = np.uint16(min(max(np.rint(counts[i]), 0.0), FULL))

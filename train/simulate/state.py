@@ -1,73 +1,73 @@
-"""What a batch of trials carries from step to step, and what its sensors make of it."""
+"""What a batch of trials begins with, and what its sensors make of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.simulate.arm import Kinematics, Pose
-from train.simulate.contact import Array, Coordinates, Springs
+from train.simulate.arm import Kinematics
+from train.simulate.compiled import Array, addresses
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
+from train.simulate.trial import TRIAL, Part
 
-Own = TypeVar("Own")
+Rows = Any
+"""(n,) records, with their fields as attributes: `np.recarray`."""
 
 
 @dataclass
 class Bed:
-    """The springs between skin and object: L lines (rows, or stems) of C springs (columns).
+    """The springs between skin and object: L lines (rows, or stems) of S springs.
 
     Attributes:
-        gaps: (C, n) metres at which a spring is touched, at zero depth of its line.
-        stiffness: (C, n) newtons a metre.
+        gaps: (S, n) metres at which a spring is touched, at zero depth of its line.
+        stiffness: (S, n) newtons a metre.
         weight: (L, n) the part of each line that the object covers.
         line_gap: (L, n) metres by which the object's face draws back; (1, n) where it is flat.
-        slopes, intercepts: (E, n) the law of the whole bed, phi(a) = max_s (K_s a - B_s).
+        law_gaps, slopes, intercepts: (E, n) the law of the whole bed, phi(a) = max_s (K_s a - B_s),
+            and the depths from which each K_s counts.
     """
 
     gaps: Array
     stiffness: Array
     weight: Array
     line_gap: Array
+    law_gaps: Array = field(init=False)
     slopes: Array = field(init=False)
     intercepts: Array = field(init=False)
-
-    def lines_of(self, springs: Springs, lever: Array) -> Springs:
-        """The bed's springs with its lines as they are now, at their levers (L, n)."""
-        return springs._replace(weight=self.weight, line_gap=self.line_gap, lever=lever)
 
 
 @dataclass
 class State:
-    """A batch of n trials, from its first step to its last.
+    """A batch of n trials: what the setup finds out, for all of them at once, and their records.
 
-    The base's functions set what is declared here; an effect keeps a dataclass of its own
-    (`own`), so the state of an effect that is not called for does not exist.
+    The base's functions set what is declared here; an effect keeps a part of its own
+    (`trial.Part`), so the state of an effect that is not called for does not exist. What a trial
+    is from its first step to its last stands in its record: `trial` has those of all.
 
     Attributes:
         h: seconds, the step.
-        frame: (n,) the number of the frame that has ended last.
-        t: seconds; (n,) once a frame has ended.
         values: {name: (n,)} of what was drawn for each trial.
-        solve: (state, y, C) -> the loads at which arm and bed agree.
-        own: {class: instance}, the called effects' own state.
+        solve: address of the compiled function that answers for the contact.
+        trial: (n,) of `TRIAL`; its `here`, `own` and `solve` are set from the beginning.
+        own: {part: (n,) of its records}, the called effects' own state.
+        arrays: {name: (n, ...)} what the records hold addresses of, trial by trial.
         start, rate: (dof, n) and (dof, 1), the equilibrium point at t = 0 and its speed.
         lag: (dof, 1) radians by which a joint trails its equilibrium point in free motion.
         travel_s: (dof, n) seconds for which the equilibrium point moves.
         held, give, joint_k: (dof, 1) of a joint's step: what damping holds, the compliance
             of the whole, the spring.
-        q, q_free, q_frame: (dof, n) radians: now, after the step without load, at the frame.
-        point: (3, n) metres on the forearm's axis, beside the middle of the contact.
+        q: (dof, n) radians, before the first step.
+        row_z: (rows, 1) metres in the skin's link, of its rows.
+        z: (n,) the same of what meets the object.
         approach: (n,) m/s along the push before the contact.
         normal, face, along_face: (3, n) the object's face: its normal, a point, the direction
             along the forearm.
-        y, y_frame, loads, compliance, jacobian, depth: of the contact's coordinates
-            (`contact`).
-        force: (n,) newtons that the skin bears.
-        image: (rows, columns, n) newtons a taxel, of the skin's rows and of `columns`.
+        columns: (C, n) those that can touch; `column_gaps` (C, n) metres that each lies back at
+            zero depth, `reach` the part of it that the face can touch.
+        taxel_k: (n,) newtons a metre, of a taxel and what is in series with it.
     """
 
     scene: Scene
@@ -77,11 +77,11 @@ class State:
     h: float | Array
     values: dict[str, Array]
     kinematics: Kinematics
-    solve: Solver
-    own: dict[type, Any] = field(default_factory=dict)
+    solve: int
+    own: dict[Part, Rows] = field(default_factory=dict)
+    arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
+    trial: Rows = field(init=False)
 
-    frame: Array = field(init=False)
-    t: float | Array = 0.0
     travel_s: Array = field(init=False)
     start: Array = field(init=False)
     lag: Array = field(init=False)
@@ -90,10 +90,6 @@ class State:
     give: Array = field(init=False)
     joint_k: Array = field(init=False)
     q: Array = field(init=False)
-    q_free: Array = field(init=False)
-    q_frame: Array = field(init=False)
-    pose: Pose = field(init=False)
-    point: Array = field(init=False)
 
     row_z: Array = field(init=False)
     z: Array = field(init=False)
@@ -108,29 +104,38 @@ class State:
     taxel_k: Array = field(init=False)
     bed: Bed = field(init=False)
 
-    y: Coordinates = field(init=False)
-    y_frame: Coordinates = field(init=False)
-    jacobian: Coordinates = field(init=False)
-    compliance: Coordinates = field(init=False)
-    loads: Coordinates = field(init=False)
-    depth: Coordinates = field(init=False)
+    def __post_init__(self) -> None:
+        """The records, which know where they are."""
+        self.trial = np.zeros(self.n, dtype=TRIAL).view(np.recarray)
+        self.trial.here = addresses(self.trial)
+        self.trial.solve = self.solve
 
-    force: Array = field(init=False)
-    line_depth: Array = field(init=False)
-    image: Array = field(init=False)
+    def of(self, part: Part) -> Rows:
+        """An effect's own state (n,)."""
+        return self.own[part]
 
-    def of(self, kind: type[Own]) -> Own:
-        """An effect's own state."""
-        return cast(Own, self.own[kind])
+    def begin(self, part: Part, /, **values: Any) -> Rows:
+        """An effect's own state, zero but for these values (n,); `of` finds it, and so does what
+        is compiled."""
+        rows = self.own[part] = part.rows(self.n)
+        self.trial.own[:, part.slot] = addresses(rows)
+        for name, value in values.items():
+            rows[name] = value
+        return rows
 
-    def keep(self, own: object) -> None:
-        """Put an effect's own state where `of` finds it."""
-        self.own[type(own)] = own
+    def lend(self, name: str, values: NDArray[Any]) -> NDArray[np.int64]:
+        """(n,) addresses of values (..., n), laid out trial by trial; `arrays` has them."""
+        by_trial = values.T if values.ndim == 2 else np.moveaxis(values, -1, 0)
+        own = self.arrays[name] = np.array(by_trial, order="C")
+        return addresses(own)
 
-
-Kept = tuple[NDArray[Any], Callable[[State], Array]]
-"""Room (frames, ...) for a quantity of every frame, and what it is in a state."""
-Solver = Callable[[State, Coordinates, Coordinates], Coordinates]
+    def places(self, fields: list[tuple[Part | None, str]]) -> NDArray[np.int64]:
+        """(fields, n) addresses of a field of the trials themselves, or of an effect's part."""
+        found = np.zeros((len(fields), self.n), dtype=np.int64)
+        for place, (part, name) in zip(found, fields, strict=True):
+            rows = self.trial if part is None else self.own[part]
+            place[:] = addresses(rows) + rows.dtype.fields[name][1]
+        return found
 
 
 @dataclass
@@ -139,8 +144,9 @@ class Readings:
 
     Attributes:
         seed: the scene's.
+        which: (n,) of the batch's trials.
         t: (frames,) seconds.
-        counts: (n, frames, rows, cols), float32 until every sensor effect has run.
+        counts: (n, frames, rows, cols), float32 until every sensor effect has run, then uint16.
         joints: (n, frames, dof) radians.
         times: (n, frames) seconds, where a clock effect shifts them.
         kept: (n, frames) bool, where frames are lost.
@@ -148,6 +154,7 @@ class Readings:
     """
 
     seed: int
+    which: NDArray[np.intp]
     trials: tuple[TrialSpec, ...]
     t: Array
     counts: NDArray[Any]

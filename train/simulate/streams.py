@@ -6,9 +6,14 @@ import hashlib
 from functools import cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+FARTHEST = 2.5
+"""Deviations from the middle that a normal draw lies at most."""
 
+
+@cache
 def key(name: str) -> tuple[int, int]:
     """Two 32-bit words that stand for `name` on every machine and in every run."""
     digest = hashlib.sha256(name.encode()).digest()
@@ -22,7 +27,11 @@ def stream(seed: int, name: str, condition: str, trial: int | None = None) -> np
     leaves the draws of all others as they were.
     """
     words = (*key(name), *key(condition), *(() if trial is None else (trial,)))
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=words)))
+    # What SeedSequence(seed, spawn_key=words) makes of them itself, at twice its speed.
+    entropy = np.zeros(4 + len(words), dtype=np.uint32)
+    entropy[:2] = seed & 0xFFFFFFFF, seed >> 32
+    entropy[4:] = words
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy)))
 
 
 def draws(
@@ -32,13 +41,13 @@ def draws(
 
     Args:
         trials: (n,) trial numbers, 0 and up.
-        kind: `uniform` on [0, 1), or `normal` of mean 0 and deviation 1, cut at 2.5.
+        kind: `uniform` on [0, 1), or `normal` of mean 0 and deviation 1, cut at `FARTHEST`.
     """
     generator = stream(seed, name, condition)
     count = int(trials.max()) + 1
     if kind == "uniform":
         return generator.random(count)[trials]
-    return np.clip(generator.standard_normal(count), -2.5, 2.5)[trials]
+    return np.clip(generator.standard_normal(count), -FARTHEST, FARTHEST)[trials]
 
 
 @cache
@@ -49,12 +58,18 @@ def quantiles() -> NDArray[np.float32]:
     return np.asarray(ndtri((np.arange(65536) + 0.5) / 65536.0), dtype=np.float32)
 
 
-def drawn(
-    generator: np.random.Generator, table: NDArray[np.float32], shape: tuple[int, ...]
-) -> NDArray[np.float32]:
-    """Numbers of a table of 65,536 (`quantiles`, times a deviation), each by 16 random bits:
-    several times faster than `standard_normal`, and finer than any taxel's reading."""
-    count = int(np.prod(shape))
-    words = generator.bit_generator.random_raw(-(-count // 4)).astype("<u8").view("<u2")[:count]
-    # No word is beyond the table's end; told to wrap, numpy does not look.
-    return np.take(table, words, mode="wrap").reshape(shape)
+def add_drawn(
+    generator: np.random.Generator, table: NDArray[np.float32], to: NDArray[np.float32]
+) -> None:
+    """Add to each number one of a table of 65,536 (`quantiles`, times a deviation), by 16 random
+    bits: several times faster than `standard_normal`, and finer than any taxel's reading."""
+    words = generator.bit_generator.random_raw(-(-to.size // 4)).astype("<u8").view("<u2")
+    _add_picked(words, table, to.reshape(-1))
+
+
+@njit(cache=True)
+def _add_picked(
+    words: NDArray[np.uint16], table: NDArray[np.float32], to: NDArray[np.float32]
+) -> None:
+    for i in range(len(to)):
+        to[i] += table[words[i]]

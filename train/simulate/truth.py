@@ -21,9 +21,6 @@ from train.simulate.schema import THICKNESS
 
 REDRAWS = 40
 """Draws of one trial that may contradict its label before the scene is refused."""
-AT_ONCE = 16
-"""Trials that are drawn again together: of few, several further draws each, of which the first
-that is true counts. A batch of few trials takes hardly less time than one of so many."""
 
 
 @dataclass(frozen=True)
@@ -102,15 +99,9 @@ def true_runs(
     """
     while trials:
         physics = run_physics(scene, trials, step_s, plan=plan)
-        first: dict[tuple[str, int], int] = {}
-        wrong: dict[tuple[str, int], tuple[TrialSpec, Contradiction]] = {}
-        for i, (trial, found) in enumerate(zip(trials, contradictions(physics), strict=True)):
-            if found:
-                wrong[trial.key, trial.number] = trial, found
-            else:
-                first.setdefault((trial.key, trial.number), i)
-        yield physics, np.isin(np.arange(len(trials)), list(first.values()))
-        again = [last for which, last in wrong.items() if which not in first]
+        judged = contradictions(physics)
+        yield physics, np.array([found is None for found in judged])
+        again = [(trial, found) for trial, found in zip(trials, judged, strict=True) if found]
         for trial, found in again:
             if trial.attempt + 1 >= REDRAWS:
                 kind = "soft" if "yielded" in found.what else trial.condition
@@ -119,8 +110,4 @@ def true_runs(
                     f"of {REDRAWS} draws it contradicted that within {scene.labels['window_s']:g} "
                     f"s of the touch (the last {found.what}); {found.mend}"
                 )
-        trials = tuple(
-            replace(trial, attempt=attempt)
-            for trial, _ in again
-            for attempt in range(trial.attempt + 1, REDRAWS)[: max(1, AT_ONCE // len(again))]
-        )
+        trials = tuple(replace(trial, attempt=trial.attempt + 1) for trial, _ in again)

@@ -12,64 +12,30 @@ stands for the whole contact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 
 from train.simulate import base
-from train.simulate.contact import Array, Coordinates, Springs, relieve
+from train.simulate.compiled import Array, call, matrix, vector, vectors, whole
+from train.simulate.pivot_solver import PIVOT, pivot_of
 from train.simulate.plan import Build
-from train.simulate.state import Bed, State
+from train.simulate.state import Rows, State
+from train.simulate.trial import Part, compiled
 
-
-@dataclass
-class Branches:
-    """The branches of a batch.
-
-    Attributes:
-        decay, rise: (n,) e and s of each branch.
-        loads: each branch's part of Z: (n,), or (rows, n) where the forearm pivots.
-        gain: (n,) 1 + sum s.
-        load: Z, the sum of `loads`.
-    """
-
-    decay: list[Array]
-    rise: list[Array]
-    loads: list[Array]
-    gain: Array
-    load: Array
-
-    def grow(self, decay: Array, rise: Array) -> None:
-        """One more branch."""
-        self.decay.append(decay)
-        self.rise.append(rise)
-        self.loads.append(np.zeros_like(self.load))
-        self.gain = self.gain + rise
-
-    def move_on(self, force: Array) -> None:
-        """What a step's force leaves behind for the next.
-
-        Where nothing is borne the surface comes back by itself: there (1 + sum s) F_e = -Z.
-        """
-        elastic = np.maximum((force - self.load) / self.gain, 0.0)
-        self.loads = [
-            decay * load - (1.0 - decay) * rise * elastic
-            for decay, rise, load in zip(self.decay, self.rise, self.loads, strict=True)
-        ]
-        self.load = sum(self.loads[1:], self.loads[0])
-
-
-class ViscousBed(Bed):
-    """A bed whose lines have branches of their own."""
-
-    gain: Array
-    load: Array
-
-    def lines_of(self, springs: Springs, lever: Array) -> Springs:
-        """The bed's springs, with what answers to speed."""
-        lines = super().lines_of(springs, lever)
-        return lines._replace(gain=self.gain, load=self.load)
-
+MOST = 2
+"""Branches of a contact."""
+BRANCHES = Part(
+    "viscous",
+    *whole("elastic", "count", "lines"),
+    *vectors(MOST, "decay", "rise"),
+    "gain",
+    *whole("loads", "load"),
+)
+"""The branches of a trial: the elastic law's solver; how many there are, and of how many lines;
+e and s of each; 1 + sum s; each branch's part of Z (MOST, lines), and Z (lines,)."""
+branches_of = BRANCHES.of
 
 RANK = base.ORDER + 30
 """In the setup, where the branches begin; effects let them `grow` right after."""
@@ -77,56 +43,82 @@ RANK = base.ORDER + 30
 
 def add(build: Build) -> None:
     """Let the contact answer to speed; the second effect that asks finds it done."""
-    if any(function in (begin, begin_lines) for _, _, function in build.entries):
+    if BRANCHES in build.parts:
         return
-    if "tilt" in build.effects:
-        from train.simulate.effects.tilt import line_forces
+    build.parts.add(BRANCHES)
+    by_line = "tilt" in build.effects
+    elastic = build.solve.address
 
-        def relax_lines(state: State) -> None:
-            """Each row's branches move on; a row that the face does not cover bears nothing."""
-            own, bed = state.of(Branches), state.bed
-            assert isinstance(bed, ViscousBed)
-            own.move_on(line_forces(state))
-            bed.load = own.load
+    def begin(state: State) -> None:
+        """No branch yet, of the whole contact or of any row."""
+        lines = state.skin.rows if by_line else 1
+        none = np.zeros((lines, state.n))
+        load = state.lend("branch", none)
+        loads = state.lend("branches", np.zeros((MOST, *none.shape)))
+        state.begin(BRANCHES, elastic=elastic, lines=lines, gain=1.0, loads=loads, load=load)
 
-        build.put("setup", RANK, begin_lines)
-        build.put("setup", RANK + 9, give_lines)
-        build.put("step", base.SETTLE + 10, relax_lines)
-        return
-    elastic = build.solve
-
-    def viscous(state: State, y: Coordinates, c: Coordinates) -> Coordinates:
-        """F = gain F_e + Z: the elastic law with its compliance scaled, about a load that is
-        there already. A contact never pulls: there F = 0."""
-        own = state.of(Branches)
-        (force,) = elastic(state, relieve(y, c, (own.load,)), (own.gain * c[0],))
-        whole = own.gain * force + own.load
-        return (np.where((force > 0.0) & (whole > 0.0), whole, 0.0),)
-
-    build.wrap(viscous)
     build.put("setup", RANK, begin)
-    build.put("step", base.SETTLE + 10, relax)
+    if by_line:
+        build.put("setup", RANK + 9, answer_to_speed)
+        build.put("step", base.SETTLE + 10, relax_lines)
+    else:
+        build.wrap(solve)
+        build.put("step", base.SETTLE + 10, relax)
 
 
-def begin(state: State) -> None:
-    """No branch yet."""
-    state.keep(Branches([], [], [], np.ones(state.n), np.zeros(state.n)))
+def grow(branches: Rows, decay: Array, rise: Array) -> None:
+    """One more branch, with e and s (n,)."""
+    i = int(branches.count[0])
+    branches.decay[:, i], branches.rise[:, i] = decay, rise
+    branches.gain += rise
+    branches.count += 1
 
 
-def relax(state: State) -> None:
+@njit(error_model="numpy")
+def move_on(own: Any, line: int, force: float) -> None:
+    """What a step's force on a line leaves behind for the next.
+
+    Where nothing is borne the surface comes back by itself: there (1 + sum s) F_e = -Z.
+    """
+    load, loads = vector(own.load, own.lines), matrix(own.loads, MOST, own.lines)
+    elastic = max((force - load[line]) / own.gain, 0.0)
+    load[line] = 0.0
+    for b in range(own.count):
+        decay = own.decay[b]
+        loads[b, line] = decay * loads[b, line] - (1.0 - decay) * own.rise[b] * elastic
+        load[line] += loads[b, line]
+
+
+def answer_to_speed(state: State) -> None:
+    """The rows bear what their branches do, too."""
+    own, branches = state.of(PIVOT), state.of(BRANCHES)
+    own.viscous, own.gain, own.load = True, branches.gain, branches.load
+
+
+@compiled
+def relax_lines(t: Any) -> None:
+    """Each row's branches move on; a row that the face does not cover bears nothing."""
+    own, branches = pivot_of(t), branches_of(t)
+    forces = vector(own.out, t.rows)
+    for row in range(t.rows):
+        move_on(branches, row, forces[row])
+
+
+@compiled
+def relax(t: Any) -> None:
     """The whole contact's branches move on."""
-    state.of(Branches).move_on(state.loads[0])
+    move_on(branches_of(t), 0, t.loads[0])
 
 
-def begin_lines(state: State) -> None:
-    """No branch yet, in any row."""
-    state.keep(Branches([], [], [], np.ones(state.n), np.zeros((state.skin.rows, state.n))))
-
-
-def give_lines(state: State) -> None:
-    """The bed, whatever its springs are, with branches in each line."""
-    own, bed = state.of(Branches), state.bed
-    kind = type(f"Viscous{type(bed).__name__}", (ViscousBed, type(bed)), {})
-    viscous: ViscousBed = object.__new__(kind)
-    viscous.__dict__.update(vars(bed), gain=own.gain, load=own.load)
-    state.bed = viscous
+@compiled
+def solve(t: Any) -> None:
+    """F = gain F_e + Z: the elastic law with its compliance scaled, about a load that is there
+    already. A contact never pulls: there F = 0."""
+    own = branches_of(t)
+    load = vector(own.load, 1)[0]
+    t.free[0] -= t.c[0] * load
+    t.c[0] *= own.gain
+    call(own.elastic, t.here)
+    force = t.found[0]
+    whole = own.gain * force + load
+    t.found[0] = whole if force > 0.0 and whole > 0.0 else 0.0

@@ -15,7 +15,7 @@ from edge.touch.track import TrackSettings
 from train.report import figures
 from train.report.tables import SCORE, Figure, Section, Table, score
 from train.simulate.assemble import make_plan
-from train.simulate.engine import kind_of, read_out, run_physics
+from train.simulate.engine import kind_of, run_physics
 from train.simulate.run import file_name, parts, recordings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
@@ -106,8 +106,8 @@ def measured(
     physics = run_physics(scenes[shown], trials, step_s, plan=plans[shown])
     found: dict[str, dict[str, FeatureSeries | None]] = {}
     for name, scene in scenes.items():
-        batch = recordings(read_out(physics, plans[name]), scene, step_s)
-        kept = {file: recording for file, recording in batch if file in wanted}
+        shown_so = recordings(physics, plans[name], scene, step_s)
+        kept = {file: recording for file, recording in shown_so if file in wanted}
         contacts = follow(list(kept.values()), layout, tracking, chain)
         found[name] = dict(zip(kept, contacts, strict=True))
     return found

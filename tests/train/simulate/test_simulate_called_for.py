@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from train.simulate import plan as plans
 from train.simulate import streams
 from train.simulate.assemble import make_plan
 from train.simulate.engine import READ_AT_ONCE, begin, kind_of, run_batch, values_of
-from train.simulate.motion import Mover
-from train.simulate.plan import STAGES
+from train.simulate.motion import MOVER
+from train.simulate.plan import PYTHON_STAGES, RUN_STAGES, STAGES
 from train.simulate.required_effects import required_effects
 from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
+from train.simulate.trial import SLOTS
 
 ROOT = Path(__file__).parents[3]
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
@@ -100,40 +100,46 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
 
 
 OWN = {
-    "sliding": {"Mover"},
-    "tipping": {"Tipping"},
-    "turning": {"Turning"},
-    "stribeck": {"Stribeck"},
-    "tilt": {"Tilt"},
-    "inertia": {"Momentum", "Branches"},
-    "friction": {"Shear"},
-    "relaxation": {"Branches"},
-    "stems": {"Stems"},
+    "lateral": {"lateral"},
+    "cover": {"cover"},
+    "pop": {"pop"},
+    "stems": {"stems"},
+    "tilt": {"tilt"},
+    "relaxation": {"viscous"},
+    "inertia": {"inertia", "viscous"},
+    "friction": {"friction"},
+    "sliding": {"motion"},
+    "turning": {"turning"},
+    "stribeck": {"stribeck"},
+    "tipping": {"tipping"},
+}
+
+
+BASE_ARRAYS = {
+    *("row_z", "weight", "line_gap", "line_depth", "gaps", "stiffness"),
+    *("column_gaps", "reach", "law_gaps", "slopes", "intercepts", "image"),
 }
 
 
 def test_3_only_the_called_effects_state_exists():
-    one = scene(
-        "tilt",
-        "inertia",
-        "noise",
-        "dead_taxels",
-        "jitter",
-        "dropped_frames",
-        objects=[*everything()],
-    )
+    called = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
+    one = scene(*called, objects=everything())
     for i, kind in enumerate([*kinds(one)]):
         batch = batch_of(one, i)[0]
         expected = set().union(*(OWN.get(name, set()) for name in kind.effects))
-        assert {own.__name__ for own in batch.state.own} == expected, kind.effects
+        assert {SLOTS[part.slot] for part in batch.state.own} == expected, kind.effects
+        for own in batch.state.trial.own:
+            assert {SLOTS[slot] for slot in np.flatnonzero(own)} == expected, kind.effects
         traces = {"sliding": "slide_m", "turning": "turn_rad"}
         called = {name for effect, name in traces.items() if effect in kind.effects}
         assert set(batch.traces) == {"depth_m", *called}
-        assert ("BubbleBed" in type(batch.state.bed).__name__) is ("pop" in kind.effects)
+        assert ("alive" in batch.state.arrays) is ("pop" in kind.effects)
         assert batch.kept is not None
         assert batch.valid is not None
     bare = batch_of(scene(), 0)[0]
     assert (bare.state.own, set(bare.traces)) == ({}, {"depth_m"})
+    assert not bare.state.trial.own.any()
+    assert set(bare.state.arrays) == BASE_ARRAYS
     assert bare.times is bare.kept is bare.valid is None
 
 
@@ -172,7 +178,7 @@ def test_4_streams_go_by_name_not_by_place():
 def test_5_the_number_of_functions_is_exact():
     bare = make_plan(scene(), ())
     assert {s: len(getattr(bare, s)) for s in STAGES} == {
-        "setup": 6,
+        "setup": 7,
         "frame": 1,
         "step": 3,
         "sample": 3,
@@ -180,10 +186,7 @@ def test_5_the_number_of_functions_is_exact():
         "sensor": 0,
     }
     implied = ("foundation", "lateral", "bottoming", "relaxation", "pop", "stems")
-    one = scene(
-        *[n for n in EFFECTS if n not in implied],
-        objects=everything(),
-    )
+    one = scene(*[n for n in EFFECTS if n not in implied], objects=everything())
     seen = set()
     for kind in kinds(one):
         plan = make_plan(one, kind.effects)
@@ -243,16 +246,14 @@ def test_leaving_out_what_is_implied():
 
 def test_the_plan_is_flat():
     plan = make_plan(scene("tilt"), ("tilt", "sliding"))
-    state = begin(
-        scene("tilt"),
-        plan,
-        t := tuple(list(kinds(scene("tilt")).values())[1]),
-        0.01,
-        values_of(scene("tilt"), t),
-    )
-    assert all(callable(f) for stage in STAGES for f in getattr(plan, stage))
-    assert state.of(Mover).slide.shape == (3,)
-    assert plans.STAGES == STAGES
+    trials = tuple(list(kinds(scene("tilt")).values())[1])
+    state = begin(scene("tilt"), plan, trials, 0.01, values_of(scene("tilt"), trials))
+    assert all(callable(f) for stage in PYTHON_STAGES for f in getattr(plan, stage))
+    found = [address for stage in RUN_STAGES for address in plan.addresses(stage)]
+    assert all(found)
+    assert len(set(found)) == len(found) == len(plan) - len(plan.setup)
+    assert state.of(MOVER).slide.shape == (3,)
+    assert set(STAGES) == {*PYTHON_STAGES, *RUN_STAGES}
 
 
 def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():

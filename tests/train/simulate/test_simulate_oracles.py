@@ -12,10 +12,11 @@ from scipy.integrate import solve_ivp
 from edge.touch.arm import Chain
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import arm, base
+from train.simulate.compiled import each
 from train.simulate.effects import friction, tilt
-from train.simulate.effects.friction import Shear
-from train.simulate.effects.tipping import Tipping
-from train.simulate.motion import GRAVITY, Mover
+from train.simulate.effects.friction import SHEAR
+from train.simulate.effects.tipping import TIPPING
+from train.simulate.motion import GRAVITY, MOVER
 from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, load
 
 ARM_K = 115.0
@@ -167,7 +168,7 @@ class TestSliding:
                 width_m=0.05,
             )
             batch = run(make(thing))
-            assert bool(batch.state.of(Tipping).tips[0]) is tips
+            assert bool(batch.state.of(TIPPING).tips[0]) is tips
             start = int(np.argmax(batch.traces["slide_m"][0] > 0.0))
             hold = min(mu, 0.36 / (2 * height)) * GRAVITY
             assert batch.force[0, start - 1] <= hold
@@ -255,17 +256,17 @@ class TestFriction:
         mu = 0.4
         plain = run(make(one_object(width_m=0.05)))
         held = run(make(one_object(width_m=0.05, skin_friction=mu)))
-        shear = held.state.of(Shear)
+        shear = held.state.of(SHEAR)
         force = held.force[0, -1]
         assert abs(shear.pull[0]) == pytest.approx(mu * force, rel=0.02)
-        c_nn, c_nt = held.state.compliance[0][0], shear.coupled[0][0]
+        c_nn, c_nt = held.state.trial.compliance[0, 0], shear.coupled[0, 0]
         want = plain.force[0, -1] * c_nn / (c_nn + mu * np.sign(shear.pull[0]) * c_nt)
         assert force == pytest.approx(want, rel=0.05)
         assert force < 0.95 * plain.force[0, -1]
 
     def test_a_face_that_sticks_holds_the_skin_where_it_touched(self):
         held = run(make(one_object(width_m=0.05, skin_friction=5.0)))
-        shear = held.state.of(Shear)
+        shear = held.state.of(SHEAR)
         assert abs(shear.pull[0]) < 5.0 * held.force[0, -1]
         # What the skin has moved along the face is the stretch of its own spring.
         assert abs(shear.stretch[0]) == pytest.approx(abs(shear.pull[0]) / 1e4, rel=0.05)
@@ -273,13 +274,14 @@ class TestFriction:
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         box = {"mass_kg": 0.05, "friction_static": 0.5, "friction_kinetic": 0.5, "width_m": 0.2}
         held = run(make(one_object(conditions=["movable"], skin_friction=0.5, **box)))
-        state = held.state
-        state.of(Shear).pull = 5.0 / state.along_face[2]
-        friction.weigh(state)
-        assert state.of(Mover).weight.tolist() == [0.0, 0.0]
-        state.of(Shear).pull = -state.of(Shear).pull
-        friction.weigh(state)
-        np.testing.assert_allclose(state.of(Mover).weight, 0.05 * GRAVITY + 5.0)
+        shear, mover = held.state.of(SHEAR), held.state.of(MOVER)
+        weigh = np.array([friction.weigh.address])
+        shear.pull = 5.0 / held.state.along_face[2]
+        each(weigh, held.state.trial.here)
+        assert mover.weight.tolist() == [0.0, 0.0]
+        shear.pull = -shear.pull
+        each(weigh, held.state.trial.here)
+        np.testing.assert_allclose(mover.weight, 0.05 * GRAVITY + 5.0)
 
     def test_the_shear_presses_a_pushed_box_to_the_floor(self):
         box = {"mass_kg": 1.0, "friction_static": 0.56, "friction_kinetic": 0.5, "width_m": 0.2}
@@ -288,7 +290,7 @@ class TestFriction:
             for more in ({}, {"skin_friction": 0.5})
         )
         assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
-        shear, mover = held.state.of(Shear), held.state.of(Mover)
+        shear, mover = held.state.of(SHEAR), held.state.of(MOVER)
         assert mover.weight[0] == pytest.approx(
             GRAVITY - shear.pull[0] * held.state.along_face[2, 0], rel=0.01
         )
@@ -298,26 +300,23 @@ class TestFriction:
 class TestTilt:
     def test_depth_and_tilt_follow_the_joints_as_their_jacobians_say(self):
         state = run(make(one_object(width_m=0.05), "tilt")).state
-        tilt.pivot(state)
-        (depth, angle), jacobian, lever = state.y_frame, state.jacobian, state.of(tilt.Tilt).lever
+        t, lever, pivot = state.trial, state.arrays["lever"], np.array([tilt.pivot.address])
+        each(pivot, t.here)
+        before, jacobian, middle = t.y_frame.copy(), t.jacobian.copy(), lever[:, 0].copy()
         for j in range(4):
-            step = np.zeros_like(state.q)
-            step[j] = 1e-6
-            state.q = state.q + step
-            tilt.pivot(state)
+            t.q[:, j] += 1e-6
+            each(pivot, t.here)
             # The point of the forearm that is looked at moves along it; the Jacobian's does not.
-            along = angle * (lever - state.of(tilt.Tilt).lever)[0]
-            for now, then, slope in zip(
-                state.y_frame, (depth + along, angle), jacobian, strict=True
-            ):
-                np.testing.assert_allclose((now - then) / 1e-6, slope[j], atol=2e-5)
-            state.q = state.q - step
+            moved = t.y_frame - before
+            moved[:, 0] -= before[:, 1] * (middle - lever[:, 0])
+            np.testing.assert_allclose(moved / 1e-6, jacobian[:, :, j], atol=2e-5)
+            t.q[:, j] -= 1e-6
 
     def test_the_skin_bears_what_goes_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05), "tilt"))
-        askew = batch.state.depth[1]
+        askew = batch.state.trial.depth[:, 1]
         assert (np.abs(askew) > 0.1).all()
-        want = batch.state.loads[0] * np.cos(np.arcsin(askew))
+        want = batch.state.trial.loads[:, 0] * np.cos(np.arcsin(askew))
         np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-12)
 
     def test_leaving_tilt_out_costs_a_part_of_a_fixed_boxs_force(self):

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from train.simulate.effects.tipping import Tipping
+from train.simulate.effects.tipping import TIPPING
 from train.simulate.engine import run_batch
-from train.simulate.motion import GRAVITY, Mover
+from train.simulate.motion import GRAVITY, MOVER
 from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 
@@ -67,7 +67,7 @@ class TestTurning:
         aside, radius = 0.06, 0.12
         felt = 1.0 / (1.0 / MASS + aside**2 / (0.5 * MASS * radius**2))
         batch = push(aside_m=aside, foot_m=2.0 * radius)
-        assert batch.state.of(Mover).inertia[0] == pytest.approx(felt, rel=1e-12)
+        assert batch.state.of(MOVER).inertia[0] == pytest.approx(felt, rel=1e-12)
 
     def test_in_the_middle_it_is_as_if_it_could_not_turn(self):
         assert push(aside_m=0.0, foot_m=0.2).counts.tobytes() == push().counts.tobytes()
@@ -93,12 +93,12 @@ class TestToppling:
         # m (b^2 + (2 h)^2) / 3 about an edge, felt at the height h.
         batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
         felt = 0.8 * (0.08**2 + 0.8**2) / 3.0 / 0.4**2
-        assert batch.state.of(Mover).inertia[0] == pytest.approx(felt, rel=1e-12)
+        assert batch.state.of(MOVER).inertia[0] == pytest.approx(felt, rel=1e-12)
 
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as it is.
         batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
-        own, mover = batch.state.of(Tipping), batch.state.of(Mover)
+        own, mover = batch.state.of(TIPPING), batch.state.of(MOVER)
         travel, lies = own.travel[0], own.lies[0]
         slide, force = batch.traces["slide_m"][0], batch.force[0]
         speed = np.gradient(slide, batch.t)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate import scene as scenes
+from train.simulate.arm import JOINTS
 from train.simulate.run import simulate
 from train.simulate.scene import CODY_DAMPING, CODY_STIFFNESS, from_dict
 from train.simulate.schema import EFFECTS
@@ -100,6 +101,7 @@ def test_values_ranges_and_defaults():
             "the arm's stroke ends after 0.05 s",
         ),
         (("skin", "threshold_counts"), 1.5, "skin.threshold_counts must be a whole number"),
+        (("spread", "place_m"), 0.05, "spread.place_m must be at most 0.0322, not 0.05: some"),
         (("spread", "yaw_deg"), 50, "spread.yaw_deg must be a number from 0 to 30, not 50"),
         (
             ("motion",),
@@ -311,6 +313,28 @@ def test_an_arm_that_slides_is_refused(tmp_path):
     arm = {"chain": "arm.urdf", "base": "a", "tip": "b"}
     with pytest.raises(InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"):
         from_dict({**GOOD, "arm": arm}, str(tmp_path / "scene.toml"))
+
+
+@pytest.mark.parametrize("dof", [JOINTS, JOINTS + 1])
+def test_an_arm_of_more_joints_than_a_trials_record_has_room_for_is_refused(tmp_path, dof):
+    joints = "".join(
+        f'[[joint]]\nname = "j{i}"\ntype = "revolute"\naxis = [0.0, 0.0, 1.0]\n'
+        f"translate = [{0.02 * (i > 0)}, 0.0, 0.0]\n"
+        for i in range(dof)
+    )
+    (tmp_path / "arm.toml").write_text(f'base = "a"\ntip = "b"\n{joints}')
+    gains = {"stiffness_nm_rad": [30.0] * dof, "damping_nms_rad": [0.5] * dof}
+    motion = {"start_deg": [0.0] * dof, "rate_deg_s": [20.0, *[0.0] * (dof - 1)]}
+    arm = {"chain": "arm.toml", **gains}
+    box = {"name": "box", "family": "rigid", "conditions": ["fixed"], "width_m": 0.03}
+    table = {"step_s": {"base": 0.01}, "arm": arm, "motion": motion, "object": [box]}
+    where = str(tmp_path / "scene.toml")
+    if dof <= JOINTS:
+        _, trial = next(simulate(from_dict(table, where)))
+        assert trial.joints.shape[1] == dof
+        return
+    with pytest.raises(InputError, match=r"arm\.chain: the arm has 17 joints .* at most 16"):
+        from_dict(table, where)
 
 
 def test_an_arm_may_come_from_a_urdf(tmp_path):

@@ -12,6 +12,7 @@ from scipy.linalg import solve, toeplitz
 
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import base, contact
+from train.simulate.compiled import each
 from train.simulate.effects import lateral
 from train.simulate.reader import Value
 
@@ -42,11 +43,12 @@ class TestRelaxation:
         rng = np.random.default_rng(8)
         gaps = np.sort(rng.uniform(0.0, 0.02, (6, 40)), axis=0)
         gaps[0] = 0.0
-        slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
+        gaps, slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
         rig = tools.Rig(
             h=0.01,
             arm_k=1e12,
             speed=0.0,
+            gaps=gaps,
             slopes=slopes,
             intercepts=intercepts,
             effects=("relaxation",),
@@ -62,7 +64,7 @@ class TestRelaxation:
         least = np.zeros(40)
         before = force = np.zeros(40)
         for place in np.vstack([np.linspace(0.0, 0.005, 50)[:, None] + np.zeros(40), depth]):
-            rig.state.start = place[None]
+            rig.state.trial.start[:, 0] = place
             now = rig.run(1).force[0]
             assert (now >= 0.0).all()
             taken += 0.5 * (force + now) * (place - before)
@@ -78,13 +80,13 @@ class TestBed:
         pitch = RADIUS * 2.0 * math.pi / columns
         row_pitch = 0.173 / rows
         z = (np.arange(rows) - (rows - 1) / 2.0)[:, None] * row_pitch
-        angles = (np.arange(columns) + 0.5)[:, None] * (2.0 * math.pi / columns)
+        angles = (np.arange(columns) + 0.5) * (2.0 * math.pi / columns)
         away = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
         stiffness = np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
         gaps = RADIUS * (1.0 - np.cos(away))
         state = SimpleNamespace(values={"radius_m": np.array([curve or 1e6])})
-        depths = depth - base.curve_gap(z, state)
-        loads = contact.spring_loads(depths, gaps, stiffness, np.ones((rows, 1)))
+        depths, loads = (depth - base.curve_gap(z, state))[:, 0], np.zeros((rows, columns))
+        contact.spring_loads(depths, gaps, stiffness, np.ones(rows), loads)
         return loads.sum(), (loads > 0.0).sum() * pitch * row_pitch, rows * row_pitch
 
     @staticmethod
@@ -123,22 +125,19 @@ class TestBed:
         from fractions import Fraction
 
         rng = np.random.default_rng(11)
-        for _ in range(60):
+        for furthest in [50, 4000] * 60:
             gaps = np.sort(rng.integers(0, 50, 5)) / 1024.0
             k = 2.0 ** rng.integers(-3, 30, 5)
             c = float(2.0 ** rng.integers(-12, 2))
-            free = float(rng.integers(1, 4000)) / 1024.0
-            slopes, intercepts = contact.sort_bed(gaps[:, None], k[:, None])
-            (force,) = contact.closed_form(
-                slopes, intercepts, (np.array([free]),), (np.array([c]),)
-            )
+            free = float(rng.integers(1, furthest)) / 1024.0
+            force = contact.closed_form(*contact.sort_bed(gaps, k), free, c)
             best = Fraction(0)
             total_k = total_b = Fraction(0)
             for g, s in zip(gaps, k, strict=True):
                 total_k += Fraction(float(s))
                 total_b += Fraction(float(s)) * Fraction(float(g))
                 best = max(best, (total_k * Fraction(free) - total_b) / (1 + Fraction(c) * total_k))
-            assert force[0] == pytest.approx(float(best), rel=1e-14, abs=1e-300)
+            assert force == pytest.approx(float(best), rel=1e-14, abs=1e-300)
 
 
 def layer_solution(half_width, step=1 / 200):
@@ -183,7 +182,7 @@ class TestLateral:
         widths = np.array([layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)])
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
-        length = batch.state.skin.row_pitch_m * batch.state.bed.weight[:, 0].sum()
+        length = batch.state.skin.row_pitch_m * batch.state.arrays["weight"][0].sum()
         assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
 
 
@@ -213,19 +212,20 @@ class TestAskew:
         state = run(make(foam)).state
         slope, pitch = np.tan(np.radians(degrees)), state.skin.row_pitch_m
         # The face covers the skin's rows but the first and the last.
-        depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5)[:, None] * pitch
-        state.bed.weight = np.ones((16, 1))
-        state.bed.weight[[0, -1]] = 0.0
-        state.line_depth, state.force = depth, np.array([force])
+        depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
+        state.arrays["weight"][:] = np.pad(np.ones(14), 1)
+        state.arrays["line_depth"][:], state.trial.force = depth, force
         # Half a column from the nearest on either side, as in the block's sum over taxels.
         away = (np.arange(len(state.columns)) - len(state.columns) // 2 + 0.5) * 0.26166
         state.column_gaps = state.skin.radius_m * (1.0 - np.cos(away))[:, None]
         lateral.narrow(state)
-        lateral.image(state)
-        found = state.image.sum(axis=1)[1:7, 0]
+        state.arrays["column_gaps"][:] = state.column_gaps.T
+        each(np.array([lateral.image.address]), state.trial.here)
+        image = state.arrays["image"][0]
+        found = image.sum(axis=1)[1:7]
         assert found.sum() == pytest.approx(sum(rows), rel=0.06)
         assert found == pytest.approx(rows, abs=0.16 * max(rows))
-        assert state.image.max() == pytest.approx(peak, rel=0.1)
+        assert image.max() == pytest.approx(peak, rel=0.1)
 
 
 def test_foam_pressed_flat_is_as_hard_as_the_skin():
@@ -276,21 +276,21 @@ class TestBubbles:
 
     def test_burst_ones_leave_their_backing(self):
         batch = self.wrap(pop_n=0.5)
-        bed = batch.state.bed
-        alive = bed.alive.reshape(len(bed.alive), 4, -1, batch.state.n)
-        burst = alive[:, 3] == 1.0
+        alive = batch.state.arrays["alive"]
+        alive = np.moveaxis(alive.reshape(*alive.shape[:2], 4, -1), 2, 0)
+        burst = alive[3] == 1.0
         assert burst.any()
         assert not burst.all()
-        assert (alive[:, :3].swapaxes(0, 1)[:, burst] == 0.0).all()
-        assert (alive[:, :3].swapaxes(0, 1)[:, ~burst] == 1.0).all()
+        assert (alive[:3, burst] == 0.0).all()
+        assert (alive[:3, ~burst] == 1.0).all()
         # Nothing bears there until it is pressed through the bubble's height.
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
 
 
 def test_stems_bent_too_far_have_slipped_off():
     batch = run(make(one_object(family="foliage", stem_slip_m=0.03, stem_spread_m=0.5)))
-    bed = batch.state.bed
-    bent = batch.state.depth[0] - bed.line_gap
+    weight, line_gap = batch.state.arrays["weight"], batch.state.arrays["line_gap"]
+    bent = batch.state.trial.depth[:, :1] - line_gap
     assert (bent > 0.03).any()
-    assert (bed.weight[bent > 0.03] == 0.0).all()
-    assert (bed.weight[bent <= 0.03] > 0.0).any()
+    assert (weight[bent > 0.03] == 0.0).all()
+    assert (weight[bent <= 0.03] > 0.0).any()

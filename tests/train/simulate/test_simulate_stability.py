@@ -7,9 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from edge.errors import EdgeError
-from train.simulate import contact, pivot_solver
-from train.simulate.effects import tilt
+from train.simulate import contact
 from train.simulate.motion import GRAVITY
 
 MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
@@ -123,10 +121,11 @@ class TestGrid:
         gaps = np.sort(rng.uniform(0.0, 0.05, (9, n)), axis=0)
         gaps[0] = 0.0
         k = 10.0 ** rng.uniform(0, 6, (9, n))
-        slopes, intercepts = contact.sort_bed(gaps, k)
+        gaps, slopes, intercepts = contact.sort_bed(gaps, k)
         mass = 10.0 ** rng.uniform(-3, 1, n)
         rig = tools.Rig(
             h=10.0 ** rng.uniform(-3, -1, n),
+            gaps=gaps,
             slopes=slopes,
             intercepts=intercepts,
             effects=("sliding",),
@@ -235,30 +234,10 @@ class TestTraps:
         gaps = np.sort(rng.uniform(0.0, 1e-3, (7, n)), axis=0)
         gaps[0] = 0.0
         k = np.full((7, n), stiff)
-        slopes, intercepts = contact.sort_bed(gaps, k)
-        rig = tools.Rig(h=0.01, slopes=slopes, intercepts=intercepts)
-        trace = rig.run(50)
-        force, depth = trace.force[-1], trace.depth[-1]
-        loads = contact.spring_loads(depth[None], gaps, k, np.ones((1, n)))
-        naive = np.abs(loads.sum(axis=(0, 1)) / force - 1.0).max()
-        assert naive > 1e-4
-        shared = contact.share_out(force, loads.copy()).sum(axis=(0, 1))
-        held = loads.sum(axis=(0, 1)) > 0.0
+        force, naive, shared = taxel_forces(tools.Rig, gaps, k, 50)
+        assert np.abs(naive / force - 1.0).max() > 1e-4
+        held = naive > 0.0
         np.testing.assert_allclose(shared[held], force[held], rtol=1e-14)
-
-    def test_newton_on_the_tilt_needs_its_line_search(self):
-        beds, free, c = tilt_cases(600, seed=1)
-        left = tilt_error(beds, free, c, tilt_loads(beds, free, c))
-        assert left.max() < 1e-9
-        without = tilt_error(beds, free, c, tilt_loads(beds, free, c, guarded_rounds=0))
-        assert (without > 1e-6).sum() >= 1
-
-    def test_a_tilt_that_is_not_found_is_refused(self, monkeypatch):
-        springs, free, c = tilt_cases(600, seed=1)
-        monkeypatch.setattr(tilt, "GUARDED_ROUNDS", 0)
-        nothing = np.zeros(600)
-        with pytest.raises(EdgeError, match=r"forearm tilts was not found for \d+ contacts"):
-            tilt.search(springs, (nothing, nothing), free, c)
 
     def test_backward_euler_at_10_ms_loses_stick_slip_and_1_ms_keeps_it(self, tools):
         mass, mu_s, mu_k, speed = 1.0, 0.6, 0.3, 0.02
@@ -337,51 +316,16 @@ def lugre(h, *, explicit, v=0.2, sigma=1e5, hold=1.0):
     return worst
 
 
-def tilt_cases(n, seed):
-    """Forearms of 16 rows and 7 columns against faces, from soft to very stiff."""
-    rng = np.random.default_rng(seed)
-    angles = np.radians(15.0 * np.arange(-3, 4))[:, None]
-    lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
-    c00 = 10.0 ** rng.uniform(-3, 0, n)
-    c11 = 10.0 ** rng.uniform(-2, 0.5, n)
-    gaps = 0.046 * (1.0 - np.cos(angles)) + np.zeros(n)
-    stiffness = 10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1))
-    springs = contact.sorted_springs(gaps, stiffness)._replace(
-        line_gap=lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
-        weight=np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
-        lever=lever,
-    )
-    free = (rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n))
-    c = (c00, rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11), c11)
-    return springs, free, c
-
-
-def tilt_loads(springs, free, c, guarded_rounds=tilt.GUARDED_ROUNDS):
-    """The simulator's loads, searched for from none."""
-    nothing = np.zeros_like(free[0])
-    return pivot_solver.search(springs, (nothing, nothing), free, c, guarded_rounds)[:2]
-
-
-def tilt_error(springs, free, c, loads):
-    """Distance from the one answer, metres at the skin: the step that exact Newton would take.
-
-    The energy is strictly convex, so a point with no step left is its minimum.
-    """
-    y0 = free[0] - (c[0] * loads[0] + c[1] * loads[1])
-    y1 = free[1] - (c[1] * loads[0] + c[2] * loads[1])
-    inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps.T
-    held = (inside > 0.0) * springs.stiffness.T * springs.weight[:, None]
-    force, k = (inside * held).sum(axis=1), held.sum(axis=1)
-    whole = k.sum(axis=0)
-    mean = (k * springs.lever).sum(axis=0) / np.where(whole > 0.0, whole, 1.0)
-    spread = (k * (springs.lever - mean) ** 2).sum(axis=0)
-    r0 = c[0] * (force.sum(axis=0) - loads[0]) + c[1] * ((force * springs.lever).sum(0) - loads[1])
-    r1 = c[1] * (force.sum(axis=0) - loads[0]) + c[2] * ((force * springs.lever).sum(0) - loads[1])
-    # (I + C H) p = r, about the mean lever, where H is diagonal.
-    c01 = c[1] + mean * c[2]
-    c00 = c[0] + mean * (c[1] + c01)
-    r0 = r0 + mean * r1
-    det = 1.0 + c00 * whole + c[2] * spread + (c00 * c[2] - c01 * c01) * whole * spread
-    p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r1) / det
-    p1 = ((1.0 + c00 * whole) * r1 - c01 * whole * r0) / det
-    return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)
+def taxel_forces(rig, gaps, k, steps):
+    """What presses beds of springs (S, n) on a rig in the end, and what all their taxels bear of
+    it: as stiffness times depth, and shared out."""
+    law = dict(zip(("gaps", "slopes", "intercepts"), contact.sort_bed(gaps, k), strict=True))
+    trace = rig(h=0.01, **law).run(steps)
+    force, sums = trace.force[-1], []
+    for i, one in enumerate(force):
+        loads = np.zeros((1, len(gaps)))
+        contact.spring_loads(trace.depth[-1:, i], gaps[:, i], k[:, i], np.ones(1), loads)
+        whole = loads.sum()
+        contact.share_out(one, loads)
+        sums.append((whole, loads.sum()))
+    return force, *np.transpose(sums)

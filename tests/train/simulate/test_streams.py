@@ -36,13 +36,16 @@ def test_a_trial_s_draw_does_not_hang_on_the_trials_beside_it(kind):
 
 
 def test_noise_is_normal_and_each_number_takes_two_bytes():
-    values = streams.drawn(np.random.default_rng(0), streams.quantiles(), (1000, 200))
-    assert values.dtype == np.float32
+    values = np.zeros((1000, 200), dtype=np.float32)
+    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), values)
     assert abs(float(values.mean())) < 4 / np.sqrt(values.size)
     assert float(values.std()) == pytest.approx(1.0, abs=0.01)
     assert float(np.abs(values).max()) < 4.4
     again = np.random.default_rng(0)
     again.bytes(2 * values.size)
     fresh = np.random.default_rng(0)
-    streams.drawn(fresh, streams.quantiles(), (1000, 200))
+    before = np.full_like(values, 7.0)
+    after = before.copy()
+    streams.add_drawn(fresh, streams.quantiles(), after)
     assert fresh.random() == again.random()
+    np.testing.assert_array_equal(after, before + values)

@@ -12,24 +12,20 @@ second order were no better there (they ring, or damp as this does): only shorte
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from train.simulate import base, viscous
-from train.simulate.arm import dot
-from train.simulate.contact import Array
+from train.simulate.arm import JOINTS
+from train.simulate.compiled import vectors
 from train.simulate.plan import Build
 from train.simulate.state import State
+from train.simulate.trial import Part, compiled
 
-
-@dataclass
-class Momentum:
-    """The joints' speed (dof, n), and (dof, 1) what it counts for in a step: I / h."""
-
-    speed: Array
-    weight: Array
-    before: Array
+MOMENTUM = Part("inertia", *vectors(JOINTS, "speed", "weight", "before"))
+"""The joints' speed, what it counts for in a step (I / h), and where they were before it."""
+momentum_of = MOMENTUM.of
 
 
 def add(build: Build) -> None:
@@ -39,7 +35,7 @@ def add(build: Build) -> None:
     def damp(state: State) -> None:
         """The dashpot beside the skin's springs is a branch that forgets at once."""
         ones = np.ones(state.n)
-        state.of(viscous.Branches).grow(0.0 * ones, loss_s / state.h * ones)
+        viscous.grow(state.of(viscous.BRANCHES), 0.0 * ones, loss_s / state.h * ones)
 
     build.put("setup", base.SWING + 1, gather)
     build.put("step", base.PREDICT + 2, coast)
@@ -54,27 +50,29 @@ def gather(state: State) -> None:
     held = inertia / state.h**2
     state.held = state.held + held
     state.give = 1.0 / (state.held + state.joint_k)
-    state.keep(
-        Momentum(
-            speed=np.broadcast_to(state.rate, state.q.shape),
-            weight=inertia / state.h,
-            before=state.q,
-        )
-    )
+    own = state.begin(MOMENTUM)
+    own.speed[:, : len(inertia)] = state.rate.T
+    own.weight[:, : len(inertia)] = (inertia / state.h).T
 
 
-def coast(state: State) -> None:
+@compiled
+def coast(t: Any) -> None:
     """Where the arm would be without load, with its speed."""
-    own = state.of(Momentum)
-    further = own.weight * own.speed * state.give
-    own.before = state.q
-    state.q_free = state.q_free + further
-    state.y = tuple(
-        y + dot(jacobian, further) for y, jacobian in zip(state.y, state.jacobian, strict=True)
-    )
+    own = momentum_of(t)
+    first, second = 0.0, 0.0
+    for j in range(t.joints):
+        further = own.weight[j] * own.speed[j] * t.give[j]
+        own.before[j] = t.q[j]
+        t.q_free[j] += further
+        first += t.jacobian[0, j] * further
+        second += t.jacobian[1, j] * further
+    t.y[0] += first
+    t.y[1] += second
 
 
-def move(state: State) -> None:
+@compiled
+def move(t: Any) -> None:
     """The speed with which the step ended."""
-    own = state.of(Momentum)
-    own.speed = (state.q - own.before) / state.h
+    own = momentum_of(t)
+    for j in range(t.joints):
+        own.speed[j] = (t.q[j] - own.before[j]) / t.h

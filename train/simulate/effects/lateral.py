@@ -18,12 +18,18 @@ and piecewise linear. The pressure is close to a half ellipse at any a / H up to
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from typing import Any
 
-from train.simulate import base
-from train.simulate.contact import Array, share_out, total
+import numpy as np
+from numba import njit
+
+from train.simulate import base, base_steps
+from train.simulate.compiled import Array, matrix, vector, whole
+from train.simulate.contact import share_out
 from train.simulate.plan import Build
 from train.simulate.state import State
+from train.simulate.trial import Part, compiled
 
 MARGIN = 0.19
 """What the flat strip bears beyond the foundation under it, as a width over H."""
@@ -31,11 +37,17 @@ SPREAD = 0.55
 """The same of the load at first touch, which goes with a^2 as on a half space."""
 
 
+LATERAL = Part("lateral", "depth_m", "nearest", *whole("bears", "wide", "ends"))
+"""The layer's thickness and the depth at which its first column is touched, in metres; room for
+three numbers a row."""
+lateral_of = LATERAL.of
+
+
 def add(build: Build) -> None:
     """Let the columns feel each other."""
     build.put("setup", base.WINDOW + 5, narrow)
     build.put("setup", base.BED + 3, margin)
-    build.replace(base.image, image)
+    build.replace(base_steps.image, image)
 
 
 def delay(x: Array, depth: Array) -> Array:
@@ -52,6 +64,13 @@ def narrow(state: State) -> None:
     gaps = np.minimum(state.column_gaps, radius)
     x = np.sqrt(gaps * (2.0 * radius - gaps))
     state.column_gaps = state.column_gaps + delay(x, depth) / radius
+    none = np.zeros((state.skin.rows, state.n))
+    state.begin(
+        LATERAL,
+        depth_m=depth,
+        nearest=state.column_gaps.min(axis=0),
+        **{name: state.lend(f"lateral_{name}", none) for name in ("bears", "wide", "ends")},
+    )
 
 
 def margin(state: State) -> None:
@@ -64,27 +83,27 @@ def margin(state: State) -> None:
     bed.stiffness = np.insert(bed.stiffness, middle, more, axis=0)
 
 
-def image(state: State) -> None:
-    """The force shared out among the rows as each bears, and within a row as a half ellipse: as
-    the root of each column's depth past its touch."""
-    bed = state.bed
-    depth = np.broadcast_to(state.line_depth, bed.weight.shape)
-    # A touch so slight that it falls between the columns is the nearest one's.
-    inside = np.maximum(depth[:, None] - (state.column_gaps - state.column_gaps.min(axis=0)), 0.0)
-    loads = np.sqrt(inside) * state.reach
-    ellipse = along_columns(loads)
-    borne = row_loads(state, depth, along_columns((inside > 0.0) * state.reach))
-    loads *= (borne / np.where(ellipse > 0.0, ellipse, 1.0))[:, None]
-    state.image = share_out(state.force, loads)
+@njit(error_model="numpy")
+def askew_at(depth: Array, weight: Array, row: int, pitch_m: float) -> float:
+    """How steeply the forearm dips into the face's ends in a row, as far as these lie there.
+
+    A face that covers the skin's first or last row whole goes on beyond the skin.
+    """
+    last, askew = len(depth) - 1, 0.0
+    if row < last:
+        before = weight[row - 1] if row > 0 else math.floor(weight[0])
+        falls = max(-(depth[row + 1] - depth[row]) / pitch_m, 0.0)
+        askew += max(weight[row] - before, 0.0) * falls
+    if row > 0:
+        after = weight[row + 1] if row < last else math.floor(weight[last])
+        rises = max((depth[row] - depth[row - 1]) / pitch_m, 0.0)
+        askew += max(weight[row] - after, 0.0) * rises
+    return askew
 
 
-def along_columns(values: Array) -> Array:
-    """(L, n) the sums over the columns of (L, C, n), one term after the other."""
-    return total(np.moveaxis(values, 1, 0))
-
-
-def row_loads(state: State, depth: Array, wide: Array) -> Array:
-    """(L, n) what each row bears, up to a factor, at the depths (L, n) and `wide` columns (L, n).
+@njit(error_model="numpy")
+def share_rows(t: Any, borne: Array, wide: Array) -> None:
+    """What each row bears, up to a factor, `wide` columns (rows,) of it: into `borne` (rows,).
 
     Across the forearm a row bears as a layer does; along it the rows feel each other as a
     stretched foundation does whose length is the margin (Pasternak's; Kerr, J. Applied Mechanics
@@ -93,34 +112,50 @@ def row_loads(state: State, depth: Array, wide: Array) -> Array:
     hardly touched. Against an elastic block by finite elements, askew by 10 and 17 degrees, the
     highest load of a taxel is within 10 %.
     """
-    bed = state.bed
-    inside = np.maximum(depth[:, None] - bed.gaps, 0.0)
-    borne = along_columns(inside * bed.stiffness) * bed.weight
-    if len(state.line_depth) < 2:
-        return borne
-    margin, pitch = MARGIN * state.values["depth_m"], state.skin.row_pitch_m
-    slope = (depth[1:] - depth[:-1]) / pitch
-    ends = face_ends(bed.weight)
-    askew = np.zeros_like(depth)
-    askew[:-1] += ends[0][:-1] * np.maximum(-slope, 0.0)
-    askew[1:] += ends[1][1:] * np.maximum(slope, 0.0)
-    least = margin * total(askew)
-    touched = np.clip(depth / np.where(least > 0.0, least, np.inf) - 0.5, 0.0, 1.0)
-    edge = state.taxel_k * margin * margin / pitch * askew * wide
-    loads: Array = borne * np.where(least > 0.0, touched, 1.0) + edge
-    return loads
+    depth, weight = vector(t.line_depth, t.rows), vector(t.weight, t.rows)
+    gaps, stiffness = vector(t.gaps, t.springs), vector(t.stiffness, t.springs)
+    margin = MARGIN * lateral_of(t).depth_m
+    askew = 0.0
+    for row in range(t.rows):
+        whole = 0.0
+        for s in range(t.springs if depth[row] > 0.0 else 0):
+            inside = depth[row] - gaps[s]
+            if inside > 0.0:
+                whole += inside * stiffness[s]
+        borne[row] = whole * weight[row]
+        askew += askew_at(depth, weight, row, t.row_pitch_m)
+    least = margin * askew
+    if not least > 0.0:
+        return
+    edge = t.taxel_k * margin * margin / t.row_pitch_m
+    for row in range(t.rows):
+        touched = min(max(depth[row] / least - 0.5, 0.0), 1.0)
+        slope = askew_at(depth, weight, row, t.row_pitch_m)
+        borne[row] = borne[row] * touched + edge * slope * wide[row]
 
 
-def face_ends(weight: Array) -> tuple[Array, Array]:
-    """(L, n) twice: which part of the face's first end lies in each row, and of its last.
-
-    Args:
-        weight: (L, n) which part of each row the face covers; one that covers the skin's first or
-            last row whole goes on beyond the skin.
-    """
-    first, last = np.copy(weight), np.copy(weight)
-    first[1:] -= weight[:-1]
-    last[:-1] -= weight[1:]
-    first[0] -= np.floor(weight[0])
-    last[-1] -= np.floor(weight[-1])
-    return np.maximum(first, 0.0), np.maximum(last, 0.0)
+@compiled
+def image(t: Any) -> None:
+    """The force shared out among the rows as each bears, and within a row as a half ellipse: as
+    the root of each column's depth past its touch."""
+    own = lateral_of(t)
+    depth, gaps = vector(t.line_depth, t.rows), vector(t.column_gaps, t.columns)
+    loads, reach = matrix(t.image, t.rows, t.columns), vector(t.reach, t.columns)
+    borne, wide = vector(own.bears, t.rows), vector(own.wide, t.rows)
+    ellipse = vector(own.ends, t.rows)
+    for row in range(t.rows):
+        for column in range(t.columns):
+            # A touch so slight that it falls between the columns is the nearest one's.
+            inside = depth[row] - (gaps[column] - own.nearest)
+            loads[row, column] = math.sqrt(max(inside, 0.0)) * reach[column]
+        wide[row] = ellipse[row] = 0.0
+        for column in range(t.columns if depth[row] > 0.0 else 0):
+            if depth[row] > gaps[column] - own.nearest:
+                wide[row] += reach[column]
+            ellipse[row] += loads[row, column]
+    share_rows(t, borne, wide)
+    for row in range(t.rows):
+        part = borne[row] / (ellipse[row] if ellipse[row] > 0.0 else 1.0)
+        for column in range(t.columns):
+            loads[row, column] *= part
+    share_out(t.force, loads)

@@ -17,8 +17,8 @@ def add(build: Build) -> None:
         """Counts + size * N(0, 1)."""
         counts, seed = readings.counts, readings.seed
         table = streams.quantiles() * size
-        for i, trial in enumerate(readings.trials):
+        for one, trial in zip(counts, readings.trials, strict=True):
             generator = streams.stream(seed, "noise", trial.key, trial.number)
-            counts[i] += streams.drawn(generator, table, counts.shape[1:])
+            streams.add_drawn(generator, table, one)
 
     build.read("sensor", 40, hiss)

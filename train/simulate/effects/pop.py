@@ -7,22 +7,17 @@ A burst bubble leaves the hard backing, b further on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import njit
 
-from train.simulate import base
-from train.simulate.contact import (
-    Array,
-    Springs,
-    bed_law,
-    share_out,
-    spring_loads,
-    total,
-)
+from train.simulate import base, base_steps
+from train.simulate.compiled import indices, matrix, vector, whole
+from train.simulate.contact import add_up, share_out, sort_bed, spring_loads
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
+from train.simulate.trial import Part, compiled
 
 SLOPES = (1.0, 4.0, 16.0)
 """Slopes of the tangents, as multiples of k0."""
@@ -31,36 +26,41 @@ BREAKS = (1.0 / 3.0, 2.0 / 3.0)
 SEGMENTS = len(SLOPES) + 1
 
 
-@dataclass
-class BubbleBed(Bed):
-    """A bed of which some springs are gone: those of burst bubbles.
-
-    Attributes:
-        alive: (rows, SEGMENTS * C, n) 1 where a spring bears, 0 where it is gone or still to come.
-        order: of all rows' springs by their gaps, where the law asks for it.
-    """
-
-    alive: Array
-    order: NDArray[np.intp] = field(init=False)
-
-    def lines_of(self, springs: Springs, lever: Array) -> Springs:
-        """The bed's springs, without those that are gone."""
-        return super().lines_of(springs, lever)._replace(alive=self.alive)
-
-
-def bubbles(state: State) -> BubbleBed:
-    """The bed, which is one of bubbles here."""
-    assert isinstance(state.bed, BubbleBed)
-    return state.bed
+POP = Part("pop", "pop_n", ("in_order", "?"), *whole("order", "bears", "loads"))
+"""The newtons that burst a bubble; whether the bed's law is asked for, as no pivoting forearm's
+solver asks the rows themselves; of all rows' springs by their gaps; room for a number of each,
+twice."""
+pop_of = POP.of
 
 
 def add(build: Build) -> None:
     """Bubbles between skin and backing."""
+    in_order = "tilt" not in build.effects
+
+    def begin(state: State) -> None:
+        """Every bubble is whole."""
+        bed = state.bed
+        rows, (springs, n) = len(bed.weight), bed.gaps.shape
+        alive = np.ones((rows, springs, n))
+        alive[:, springs // SEGMENTS * (SEGMENTS - 1) :] = 0.0
+        gaps = (bed.line_gap[:, None] + np.broadcast_to(bed.gaps, alive.shape)).reshape(-1, n)
+        order = np.argsort(gaps, axis=0, kind="stable")
+        stiffness = bed.weight[:, None] * (bed.stiffness[None] * alive)
+        bed.law_gaps, bed.slopes, bed.intercepts = sort_bed(gaps, stiffness.reshape(-1, n))
+        state.trial.alive = state.lend("alive", alive)
+        state.begin(
+            POP,
+            pop_n=state.values["pop_n"],
+            in_order=in_order,
+            order=state.lend("pop_order", order.astype(np.int64)),
+            bears=state.lend("pop_bears", np.zeros_like(gaps)),
+            loads=state.lend("pop_loads", alive),
+        )
+
     build.put("setup", base.BED + 5, inflate)
-    build.replace(base.order_bed, order)
-    build.replace(base.image, image)
-    # A pivoting forearm's solver asks the lines themselves.
-    build.put("sample", base.IMAGE + 20, burst if "tilt" in build.effects else burst_in_order)
+    build.replace(base.order_bed, begin)
+    build.replace(base_steps.image, image)
+    build.put("sample", base.IMAGE + 20, burst)
 
 
 def inflate(state: State) -> None:
@@ -71,10 +71,7 @@ def inflate(state: State) -> None:
     first = k0 * height * BREAKS[0] / slopes[0]
     second = first + k0 * SLOPES[1] * height * (BREAKS[1] - BREAKS[0]) / slopes[1]
     gaps, reach = state.column_gaps, state.reach
-    rows, (columns, n) = len(state.bed.weight), gaps.shape
-    alive = np.zeros((rows, SEGMENTS, columns, n))
-    alive[:, :-1] = 1.0
-    state.bed = BubbleBed(
+    state.bed = Bed(
         gaps=np.concatenate([gaps, gaps + first, gaps + second, gaps + height]),
         stiffness=np.concatenate(
             [
@@ -86,60 +83,66 @@ def inflate(state: State) -> None:
         ),
         weight=state.bed.weight,
         line_gap=state.bed.line_gap,
-        alive=alive.reshape(rows, SEGMENTS * columns, n),
     )
 
 
-def order(state: State) -> None:
-    """The bed's law as lines K a - B, over the bubbles that are whole."""
-    bed = bubbles(state)
-    bed.order = np.argsort(all_gaps(bed), axis=0, kind="stable")
-    law(state)
-
-
-def all_gaps(bed: BubbleBed) -> Array:
-    """(E, n) of every row's springs."""
-    gaps = bed.line_gap[:, None] + np.broadcast_to(bed.gaps, bed.alive.shape)
-    return gaps.reshape(-1, gaps.shape[-1])
-
-
-def law(state: State) -> None:
+@njit(error_model="numpy")
+def law(t: Any) -> None:
     """The law of the springs that are there."""
-    bed = bubbles(state)
-    stiffness = bed.weight[:, None] * (bed.stiffness[None] * bed.alive)
-    bed.slopes, bed.intercepts = bed_law(all_gaps(bed), stiffness.reshape(-1, state.n), bed.order)
+    own = pop_of(t)
+    if not own.in_order:
+        return
+    weight, stiffness = vector(t.weight, t.rows), vector(t.stiffness, t.springs)
+    alive, order = matrix(t.alive, t.rows, t.springs), indices(own.order, t.law_lines)
+    bears = vector(own.bears, t.law_lines)
+    for e in range(t.law_lines):
+        row, spring = order[e] // t.springs, order[e] % t.springs
+        bears[e] = weight[row] * (stiffness[spring] * alive[row, spring])
+    add_up(
+        vector(t.law_gaps, t.law_lines),
+        bears,
+        vector(t.slopes, t.law_lines),
+        vector(t.intercepts, t.law_lines),
+    )
 
 
-def image(state: State) -> None:
+@compiled
+def image(t: Any) -> None:
     """The force shared out among springs, then the four springs of each taxel together."""
-    bed = bubbles(state)
-    rows, n = bed.weight.shape
-    depth = np.broadcast_to(state.line_depth, (rows, n))
-    loads = spring_loads(depth, bed.gaps, bed.stiffness, bed.weight)
-    loads *= bed.alive
-    shared = share_out(state.force, loads).reshape(rows, SEGMENTS, -1, n)
-    state.image = total(np.moveaxis(shared, 1, 0))
+    own = pop_of(t)
+    loads, alive = matrix(own.loads, t.rows, t.springs), matrix(t.alive, t.rows, t.springs)
+    seen = matrix(t.image, t.rows, t.columns)
+    spring_loads(
+        vector(t.line_depth, t.rows),
+        vector(t.gaps, t.springs),
+        vector(t.stiffness, t.springs),
+        vector(t.weight, t.rows),
+        loads,
+    )
+    for row in range(t.rows):
+        for s in range(t.springs):
+            loads[row, s] *= alive[row, s]
+    share_out(t.force, loads)
+    for row in range(t.rows):
+        for column in range(t.columns):
+            whole = 0.0
+            for s in range(column, t.springs, t.columns):
+                whole += loads[row, s]
+            seen[row, column] = whole
 
 
-def burst(state: State) -> None:
-    """Bubbles under more than they hold are gone from the next frame on."""
-    gone = state.image > state.values["pop_n"]
-    if gone.any():
-        take_away(bubbles(state), gone)
-
-
-def burst_in_order(state: State) -> None:
-    """The same, and the law without them."""
-    gone = state.image > state.values["pop_n"]
-    if gone.any():
-        take_away(bubbles(state), gone)
-        law(state)
-
-
-def take_away(bed: BubbleBed, gone: NDArray[np.bool_]) -> None:
-    """Leave the backing where bubbles (rows, columns, n) are gone."""
-    rows, _, n = bed.alive.shape
-    bed.alive = np.copy(bed.alive)
-    alive = bed.alive.reshape(rows, SEGMENTS, -1, n)
-    alive[:, :-1] *= ~gone[:, None]
-    alive[:, -1] = np.maximum(alive[:, -1], gone)
+@compiled
+def burst(t: Any) -> None:
+    """Bubbles under more than they hold are gone from the next frame on, and leave the backing."""
+    own, seen = pop_of(t), matrix(t.image, t.rows, t.columns)
+    alive, gone = matrix(t.alive, t.rows, t.springs), False
+    for row in range(t.rows):
+        for column in range(t.columns):
+            if seen[row, column] > own.pop_n:
+                gone = True
+                backing = t.springs - t.columns + column
+                for s in range(column, backing, t.columns):
+                    alive[row, s] = 0.0
+                alive[row, backing] = 1.0
+    if gone:
+        law(t)

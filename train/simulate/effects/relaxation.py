@@ -21,4 +21,4 @@ def relax(state: State) -> None:
     values = state.values
     part = state.h / values["relax_s"]
     rise = values["relax_ratio"] * (-np.expm1(-part) / part)
-    state.of(viscous.Branches).grow(np.exp(-part), rise)
+    viscous.grow(state.of(viscous.BRANCHES), np.exp(-part), rise)

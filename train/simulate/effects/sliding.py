@@ -2,46 +2,56 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from train.simulate import base
-from train.simulate.motion import GRAVITY, Mover, advance, give_way
+from train.simulate import base, base_steps
+from train.simulate.base_steps import press_at_rest
+from train.simulate.motion import GRAVITY, MOVER, advance, give_way, mover_of
 from train.simulate.plan import Build
 from train.simulate.state import State
+from train.simulate.trial import compiled
 
 
 def add(build: Build) -> None:
     """Let the object move."""
     build.put("setup", base.ORDER + 10, stand)
     build.put("step", base.PREDICT + 10, withdraw)
-    build.put("step", base.PRESS + 20, slip)
-    build.trace("slide_m", lambda state: state.of(Mover).slide)
+    build.replace(base_steps.press, slip)
+    build.trace("slide_m", MOVER, "slide")
 
 
 def stand(state: State) -> None:
     """At rest, with what holds it and what drags on it."""
     values = state.values
-    state.keep(
-        Mover(
-            inertia=values["mass_kg"],
-            static=values["friction_static"],
-            kinetic=values["friction_kinetic"],
-            weight=values["mass_kg"] * GRAVITY,
-            speed=np.zeros(state.n),
-            slide=np.zeros(state.n),
-        )
+    state.begin(
+        MOVER,
+        inertia=values["mass_kg"],
+        static=values["friction_static"],
+        kinetic=values["friction_kinetic"],
+        weight=values["mass_kg"] * GRAVITY,
     )
 
 
-def withdraw(state: State) -> None:
+@compiled
+def withdraw(t: Any) -> None:
     """The object is where it has moved to."""
-    y = state.y
-    state.y = (y[0] - state.of(Mover).slide, *y[1:])
+    t.y[0] -= mover_of(t).slide
 
 
-def slip(state: State) -> None:
+@compiled
+def slip(t: Any) -> None:
     """Stick first; where the push is more than that holds, slide; stop at rest, exactly."""
-    mover = state.of(Mover)
-    moving = (mover.speed > 0.0) | (state.loads[0] > mover.hold)
-    speed, loads = give_way(state, mover, mover.drag, mover.inertia)
-    advance(state, mover, moving & (speed > 0.0), speed, loads)
+    mover = mover_of(t)
+    drag, speed = mover.kinetic * mover.weight, 0.0
+    if mover.speed > 0.0:
+        speed = give_way(t, drag)
+        if not speed > 0.0:
+            press_at_rest(t)
+    else:
+        press_at_rest(t)
+        if t.loads[0] > mover.static * mover.weight:
+            speed = give_way(t, drag)
+    if speed > 0.0:
+        advance(t, speed)
+    else:
+        mover.speed = 0.0

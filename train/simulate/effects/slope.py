@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate import base
-from train.simulate.motion import Mover
+from train.simulate.motion import MOVER
 from train.simulate.plan import Build
 from train.simulate.state import State
 
@@ -19,6 +19,6 @@ def add(build: Build) -> None:
 def lean(state: State) -> None:
     """The slope as a coefficient of friction more; a thing does not set off by itself."""
     angle = np.radians(state.values["slope_deg"])
-    mover = state.of(Mover)
+    mover = state.of(MOVER)
     mover.static = np.maximum(mover.static * np.cos(angle) + np.sin(angle), 0.0)
     mover.kinetic = np.maximum(mover.kinetic * np.cos(angle) + np.sin(angle), 0.0)

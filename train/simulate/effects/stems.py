@@ -3,43 +3,36 @@ number here), damp, and slip off the forearm once bent too far, for good."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import njit
 
-from train.simulate import base, streams
-from train.simulate.contact import Array, bed_law, share_out
+from train.simulate import base, base_steps, streams
+from train.simulate.compiled import indices, vector, whole
+from train.simulate.contact import add_up, sort_bed
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
+from train.simulate.trial import Part, compiled
 
-
-@dataclass
-class Stems:
-    """The stems, (stems, n) each.
-
-    Attributes:
-        taxel, following: positions in the window's image of the two rows a stem lies between.
-        part: of its load that the second row bears.
-        order: of the stems by depth.
-        damping: N s/m; 0 once a stem has slipped off.
-        slopes, intercepts: the law of those still held, without damping.
-    """
-
-    taxel: NDArray[np.int64]
-    following: NDArray[np.int64]
-    part: Array
-    order: NDArray[np.intp] = field(init=False)
-    damping: Array = field(init=False)
-    slopes: Array = field(init=False)
-    intercepts: Array = field(init=False)
+STEMS = Part(
+    "stems",
+    "slip_m",
+    *whole("taxel", "following", "part", "order", "damping"),
+    *whole("slopes", "intercepts", "sorted", "loads"),
+)
+"""The bend in metres at which a stem slips off; of each stem: the positions in the window's image
+of the two rows it lies between, and the part of its load that the second bears; which stem is the
+first, second and so on by depth; N s/m, 0 once it has slipped off; the law of those still held,
+without damping; room for two numbers."""
+stems_of = STEMS.of
 
 
 def add(build: Build) -> None:
     """Stems in place of the bed's rows."""
     build.replace(base.lay_bed, plant)
     build.replace(base.order_bed, stand)
-    build.replace(base.image, draw)
+    build.replace(base_steps.image, draw)
     build.put("step", base.SETTLE + 10, bend)
 
 
@@ -71,53 +64,86 @@ def plant(state: State) -> None:
     window = state.columns.shape[0]
     column = (window // 2 + around).astype(np.int64)
     low = np.floor(row).astype(np.int64)
-    taxel = (low * window + column) * n + np.arange(n)
-    beside = window * n if rows > 1 else 0
-    state.keep(Stems(taxel=taxel, following=taxel + beside, part=row - low))
+    taxel = low * window + column
+    beside = window if rows > 1 else 0
+    state.begin(
+        STEMS,
+        taxel=state.lend("stem_taxel", taxel),
+        following=state.lend("stem_following", taxel + beside),
+        part=state.lend("stem_part", row - low),
+    )
 
 
 def stand(state: State) -> None:
-    """The stems' law as lines K a - B, and what each damps: 2 zeta sqrt(k m)."""
-    values, bed, own = state.values, state.bed, state.of(Stems)
+    """The stems by depth, and what each damps: 2 zeta sqrt(k m)."""
+    values, bed, own = state.values, state.bed, state.of(STEMS)
     stiffness = bed.weight * bed.stiffness
-    own.order = np.argsort(bed.line_gap, axis=0, kind="stable")
-    own.damping = (2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])) * (
+    order = np.argsort(bed.line_gap, axis=0, kind="stable")
+    damping = (2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])) * (
         bed.weight > 0.0
     )
-    law(bed, own)
-    bed.slopes, bed.intercepts = own.slopes, own.intercepts
+    bed.law_gaps, bed.slopes, bed.intercepts = sort_bed(bed.line_gap, stiffness)
+    own.slip_m = values["stem_slip_m"]
+    own.order = state.lend("stem_order", order.astype(np.int64))
+    own.damping = state.lend("stem_damping", damping)
+    own.slopes = state.lend("stem_slopes", bed.slopes)
+    own.intercepts = state.lend("stem_intercepts", bed.intercepts)
+    own.sorted = state.lend("stem_sorted", stiffness)
+    own.loads = state.lend("stem_loads", stiffness)
 
 
-def law(bed: Bed, own: Stems) -> None:
+@njit(error_model="numpy")
+def law(t: Any) -> None:
     """Slopes and intercepts of the stems that are still held."""
-    stiffness = bed.weight * bed.stiffness
-    own.slopes, own.intercepts = bed_law(bed.line_gap, stiffness, own.order)
+    own, stiffness = stems_of(t), vector(t.stiffness, 1)[0]
+    order, weight = indices(own.order, t.lines), vector(t.weight, t.lines)
+    in_order = vector(own.sorted, t.lines)
+    for s in range(t.lines):
+        in_order[s] = weight[order[s]] * stiffness
+    add_up(
+        vector(t.law_gaps, t.lines),
+        in_order,
+        vector(own.slopes, t.lines),
+        vector(own.intercepts, t.lines),
+    )
 
 
-def bend(state: State) -> None:
+@compiled
+def bend(t: Any) -> None:
     """Let go of stems bent too far; damp those that bend, implicitly, in the next step."""
-    bed, own = state.bed, state.of(Stems)
-    bent = state.depth[0] - bed.line_gap
-    gone = (bent > state.values["stem_slip_m"]) & (bed.weight > 0.0)
-    if gone.any():
-        bed.weight = np.where(gone, 0.0, bed.weight)
-        own.damping = np.where(gone, 0.0, own.damping)
-        law(bed, own)
-    drag = np.add.accumulate(np.where(bent > 0.0, own.damping, 0.0), axis=0)[-1]
-    drag = drag / state.h
-    bed.slopes = own.slopes + drag
-    bed.intercepts = own.intercepts + drag * state.depth[0]
+    own = stems_of(t)
+    weight, line_gap = vector(t.weight, t.lines), vector(t.line_gap, t.lines)
+    damping = vector(own.damping, t.lines)
+    gone, drag = False, 0.0
+    for stem in range(t.lines):
+        bent = t.depth[0] - line_gap[stem]
+        if bent > own.slip_m and weight[stem] > 0.0:
+            gone, weight[stem], damping[stem] = True, 0.0, 0.0
+        if bent > 0.0:
+            drag += damping[stem]
+    if gone:
+        law(t)
+    drag /= t.h
+    slopes, intercepts = vector(t.slopes, t.lines), vector(t.intercepts, t.lines)
+    held_slopes, held_intercepts = vector(own.slopes, t.lines), vector(own.intercepts, t.lines)
+    for s in range(t.lines):
+        slopes[s] = held_slopes[s] + drag
+        intercepts[s] = held_intercepts[s] + drag * t.depth[0]
 
 
-def draw(state: State) -> None:
+@compiled
+def draw(t: Any) -> None:
     """Each stem's load on the two rows it lies between."""
-    bed, own = state.bed, state.of(Stems)
-    bent = np.maximum(state.depth[0] - bed.line_gap, 0.0)
-    loads = (bent * bed.weight * bed.stiffness)[:, None]
-    loads = share_out(state.force, loads)[:, 0]
-    rows, window = state.skin.rows, state.columns.shape[0]
-    cells = np.stack([own.taxel, own.following], axis=1)
-    parts = np.stack([loads * (1.0 - own.part), loads * own.part], axis=1)
-    image = np.zeros_like(parts, shape=rows * window * state.n)
-    np.add.at(image, cells, parts)
-    state.image = image.reshape(rows, window, state.n)
+    own, stiffness = stems_of(t), vector(t.stiffness, 1)[0]
+    weight, line_gap = vector(t.weight, t.lines), vector(t.line_gap, t.lines)
+    taxel, following = indices(own.taxel, t.lines), indices(own.following, t.lines)
+    part, loads = vector(own.part, t.lines), vector(own.loads, t.lines)
+    image, whole = vector(t.image, t.rows * t.columns), 0.0
+    for stem in range(t.lines):
+        loads[stem] = max(t.depth[0] - line_gap[stem], 0.0) * weight[stem] * stiffness
+        whole += loads[stem]
+    image[:] = 0.0
+    for stem in range(t.lines):
+        load = loads[stem] * (t.force / (whole if whole > 0.0 else 1.0))
+        image[taxel[stem]] += load * (1.0 - part[stem])
+        image[following[stem]] += load * part[stem]

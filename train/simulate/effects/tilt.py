@@ -6,146 +6,131 @@ Rows then press to different depths, a + lever * tilt, and the loads are a force
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import Any
 
 import numpy as np
 
-from edge.errors import EdgeError
-from train.simulate import base, pivot_solver
-from train.simulate.arm import cross, dot
-from train.simulate.contact import Array, Coordinates, Springs, sorted_springs
-from train.simulate.pivot_solver import GUARDED_ROUNDS
+from train.simulate import base, base_steps
+from train.simulate.base_steps import crossed, deepest, pose
+from train.simulate.compiled import vector
+from train.simulate.pivot_solver import GUARDED_ROUNDS, PIVOT, pivot_of, search
 from train.simulate.plan import Build
 from train.simulate.state import State
-
-
-@dataclass
-class Tilt:
-    """The pivoting forearm's own state.
-
-    Attributes:
-        guess: loads with which the next step's search begins.
-        settled: loads of the step before.
-        springs: the bed's, by depth.
-        lever: (L, n) metres along the forearm from the face's middle to each line.
-    """
-
-    guess: Coordinates
-    settled: Coordinates
-    springs: Springs
-    lever: Array
+from train.simulate.trial import compiled
 
 
 def add(build: Build) -> None:
     """Take the place of the base's geometry, solver and line depths."""
-    build.replace(base.locate, pivot)
-    build.replace(base.bear, bear)
+    bursts = "pop" in build.effects
+
+    def upright(state: State) -> None:
+        """No load yet."""
+        gaps, stiffness = state.bed.gaps, state.bed.stiffness
+        column = np.argsort(gaps, axis=0, kind="stable")
+        none = np.zeros((state.skin.rows, state.n))
+        state.trial.coordinates = 2
+        state.begin(
+            PIVOT,
+            springs=len(gaps),
+            gaps=state.lend("pivot_gaps", np.take_along_axis(gaps, column, axis=0)),
+            stiffness=state.lend("pivot_stiffness", np.take_along_axis(stiffness, column, axis=0)),
+            column=state.lend("pivot_column", column.astype(np.int64)),
+            alive=state.trial.alive,
+            bursts=bursts,
+            rows=state.skin.rows,
+            **{name: state.lend(name, none) for name in ("lever", "held", "out")},
+            gain=1.0,
+            guarded_rounds=GUARDED_ROUNDS,
+        )
+
+    def lay(state: State) -> None:
+        """The rows are those of the bed."""
+        own = state.of(PIVOT)
+        own.weight, own.line_gap = state.trial.weight, state.trial.line_gap
+
+    build.replace(base_steps.locate, pivot)
+    build.replace(base_steps.bear, bear)
     build.put("setup", base.ORDER + 2, upright)
+    build.put("setup", base.HAND_OVER + 2, lay)
     build.put("step", base.SETTLE + 20, remember)
     build.wrap(solve)
 
 
-def upright(state: State) -> None:
-    """No load yet."""
-    state.loads = (np.zeros(state.n), np.zeros(state.n))
-    springs = sorted_springs(state.bed.gaps, state.bed.stiffness)
-    state.keep(Tilt(state.loads, state.loads, springs, np.zeros((1, state.n))))
-
-
-def pivot(state: State) -> None:
+@compiled
+def pivot(t: Any) -> None:
     """Depth and tilt against the object's face at the frame's joint angles, with their
     Jacobians; which rows the face covers, and their levers about its middle."""
-    skin = state.skin
-    pose = state.kinematics.pose(state.q)
-    state.pose = pose
-    along, normal = pose.rotation[:, 2], state.normal
-    row_z = state.row_z
-    away = pose.origin - state.face
-    z = np.clip(-dot(away, along), row_z.min(axis=0), row_z.max(axis=0))
-    tilt = dot(normal, along)
-    upright = np.sqrt(1.0 - tilt * tilt)
-    on_face = dot(away, state.along_face) + row_z * dot(along, state.along_face)
-    state.bed.weight = base.covered(on_face, state)
-    state.bed.line_gap = base.curve_gap(on_face, state)
-    state.of(Tilt).lever = row_z - z
-    state.point = pose.origin + along * z
-    depth = dot(away + along * z, normal) + skin.radius_m * upright
-    crossed = cross(normal[:, None], pose.axes)
-    turn = dot(along[:, None], crossed)
-    push = dot(state.point[:, None] - pose.origins, crossed)
-    push = push - (skin.radius_m * tilt / upright) * turn
-    give = state.give
-    state.q_frame = state.q
-    state.jacobian = (push, turn)
-    state.y_frame = (depth, tilt)
-    state.compliance = (
-        dot(push * push, give),
-        dot(push * turn, give),
-        dot(turn * turn, give),
-    )
+    pose(t)
+    own = pivot_of(t)
+    row_z, lever = vector(t.row_z, t.rows), vector(own.lever, t.rows)
+    weight, line_gap = vector(t.weight, t.rows), vector(t.line_gap, t.rows)
+    radius, turned = t.skin_radius_m, t.rotation
+    z, tilt, from_middle, across = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        away = t.origin[i] - t.face[i]
+        z -= away * turned[i, 2]
+        tilt += t.normal[i] * turned[i, 2]
+        from_middle += away * t.along_face[i]
+        across += turned[i, 2] * t.along_face[i]
+    z = min(max(z, row_z[t.rows - 1]), row_z[0])
+    upright = math.sqrt(1.0 - tilt * tilt)
+    half = 0.5 * max(t.width_m, t.row_pitch_m)
+    for row in range(t.rows):
+        on_face = from_middle + row_z[row] * across
+        inside = (half + 0.5 * t.row_pitch_m - abs(on_face)) / t.row_pitch_m
+        weight[row] = min(max(inside, 0.0), 1.0)
+        line_gap[row] = on_face * on_face / (2.0 * t.face_radius_m)
+        lever[row] = row_z[row] - z
+    depth = 0.0
+    for i in range(3):
+        t.point[i] = t.origin[i] + turned[i, 2] * z
+        depth += (t.origin[i] - t.face[i] + turned[i, 2] * z) * t.normal[i]
+    t.compliance[0], t.compliance[1], t.compliance[2] = 0.0, 0.0, 0.0
+    for j in range(t.joints):
+        push, turn = 0.0, 0.0
+        cross = crossed(t.normal, t.axes, j)
+        for i in range(3):
+            turn += turned[i, 2] * cross[i]
+            push += (t.point[i] - t.origins[i, j]) * cross[i]
+        push -= radius * tilt / upright * turn
+        t.jacobian[0, j], t.jacobian[1, j] = push, turn
+        t.compliance[0] += push * push * t.give[j]
+        t.compliance[1] += push * turn * t.give[j]
+        t.compliance[2] += turn * turn * t.give[j]
+        t.q_frame[j] = t.q[j]
+    t.y_frame[0], t.y_frame[1] = depth + radius * upright, tilt
 
 
-def line_depths(state: State) -> Array:
-    """(L, n) each line's depth."""
-    depth, tilt = state.depth
-    depths: Array = depth + state.of(Tilt).lever * tilt - state.bed.line_gap
-    return depths
-
-
-def bear(state: State) -> None:
+@compiled
+def bear(t: Any) -> None:
     """The force that the skin bears, which is what of the push goes along its own normal, and each
     line's depth."""
-    tilt = state.depth[1]
-    state.force = state.loads[0] * np.sqrt(np.maximum(1.0 - tilt * tilt, 0.0))
-    state.line_depth = line_depths(state)
+    tilt = t.depth[1]
+    t.force = t.loads[0] * math.sqrt(max(1.0 - tilt * tilt, 0.0))
+    lever = vector(pivot_of(t).lever, t.rows)
+    line_depth, line_gap = vector(t.line_depth, t.rows), vector(t.line_gap, t.rows)
+    for row in range(t.rows):
+        line_depth[row] = t.depth[0] + lever[row] * tilt - line_gap[row]
+    deepest(t)
 
 
-def remember(state: State) -> None:
+@compiled
+def remember(t: Any) -> None:
     """The next step's loads will go on as these did."""
-    own, loads = state.of(Tilt), state.loads
-    own.guess = tuple(2.0 * new - old for new, old in zip(loads, own.settled, strict=True))
-    own.settled = loads
+    own = pivot_of(t)
+    for i in range(2):
+        own.guess[i] = 2.0 * t.loads[i] - own.settled[i]
+        own.settled[i] = t.loads[i]
 
 
-def solve(state: State, free: Coordinates, c: Coordinates) -> Coordinates:
+@compiled
+def solve(t: Any) -> None:
     """The loads (F, M) at which arm and bed agree."""
-    own = state.of(Tilt)
-    springs = state.bed.lines_of(own.springs, own.lever)
-    return search(springs, own.guess, free, c, where=state.scene.name)
-
-
-def search(
-    springs: Springs, guess: Coordinates, free: Coordinates, c: Coordinates, where: str = "tilt"
-) -> Coordinates:
-    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them; `where` names
-    the scene in errors.
-
-    Raises:
-        EdgeError: they were not found.
-    """
-    tape = getattr(free[0], "tape", None)
-    if tape is None:
-        force, moment, lost = pivot_solver.search(springs, guess, free, c, GUARDED_ROUNDS)
-    else:
-        given = (*springs, *guess, *free, *c)
-        sizes = (free[0].shape,) * 3
-        force, moment, lost = tape.call(pivot_solver.taped_search, given, sizes)
-    if lost.any():
-        count = np.count_nonzero(np.asarray(lost))
-        raise EdgeError(
-            f"{where}: how far the forearm tilts was not found for {count} contacts; "
-            "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
-        )
-    return force, moment
-
-
-def line_forces(state: State) -> Array:
-    """(L, n) newtons that each line bears."""
-    own = state.of(Tilt)
-    springs = state.bed.lines_of(own.springs, own.lever)
-    tape = getattr(state.depth[0], "tape", None)
-    if tape is None:
-        return np.asarray(pivot_solver.line_forces(springs, state.depth))
-    given = (*springs, *state.depth)
-    forces: Array = tape.call(pivot_solver.taped_line_forces, given, (springs.weight.shape,))[0]
-    return forces
+    own = pivot_of(t)
+    own.free0, own.free1 = t.free[0], t.free[1]
+    own.c00, own.c01, own.c11 = t.c[0], t.c[1], t.c[2]
+    search(own)
+    t.found[0], t.found[1] = own.force, own.moment
+    if own.lost:
+        t.lost = 1.0

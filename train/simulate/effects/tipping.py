@@ -10,28 +10,22 @@ makes no energy) and the rest implicitly.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate import base
-from train.simulate.contact import Array
+from train.simulate.base_steps import press_at_rest
 from train.simulate.effects import sliding
-from train.simulate.motion import GRAVITY, Mover, advance, give_way
+from train.simulate.motion import GRAVITY, MOVER, advance, give_way, mover_of
 from train.simulate.plan import Build
 from train.simulate.state import State
+from train.simulate.trial import Part, compiled
 
-
-@dataclass
-class Tipping:
-    """Which trials' objects tip, the push that starts it, the travel until they fall, and the
-    travel until they lie."""
-
-    tips: NDArray[np.bool_]
-    force: Array
-    travel: Array
-    lies: Array
+TIPPING = Part("tipping", ("tips", "?"), "force", "travel", "lies")
+"""Whether the trial's object tips, the push that starts it, the travel until it falls, and the
+travel until it lies."""
+tipping_of = TIPPING.of
 
 
 def add(build: Build) -> None:
@@ -46,30 +40,44 @@ def balance(state: State) -> None:
     The object is taken for a box twice as high as the contact: its moment of inertia about the
     edge is m (base^2 + 4 height^2) / 3, felt at the contact as that over height^2.
     """
-    values, mover = state.values, state.of(Mover)
+    values, mover = state.values, state.of(MOVER)
     foot, height = values["base_m"], values["height_m"]
-    own = Tipping(
+    own = state.begin(
+        TIPPING,
         tips=mover.static > foot / (2.0 * height),
         force=values["mass_kg"] * GRAVITY * foot / (2.0 * height),
         travel=height * np.arctan2(foot, 2.0 * height),
         lies=0.5 * math.pi * height,
     )
-    state.keep(own)
     turned = values["mass_kg"] * (foot * foot / (height * height) + 4.0) / 3.0
     mover.inertia = np.where(own.tips, turned, mover.inertia)
 
 
-def topple(state: State) -> None:
+@compiled
+def topple(t: Any) -> None:
     """As `sliding.slip`, but a leaning object moves either way and rests on its foot alone."""
-    own, mover = state.of(Tipping), state.of(Mover)
-    slide = mover.slide
-    hold = np.where(own.tips, own.force, mover.hold)
-    leans = own.tips & (slide > 0.0)
-    moving = leans | (mover.speed > 0.0) | (state.loads[0] > hold)
-    left = 1.0 - slide / own.travel
-    drag = np.where(own.tips, own.force * left, mover.drag)
-    speed, loads = give_way(state, mover, drag, mover.inertia)
-    lands = leans & (slide + state.h * speed <= 0.0)
-    falls = leans & (slide + state.h * speed >= own.lies)
-    advance(state, mover, moving & ((speed > 0.0) | leans) & ~lands & ~falls, speed, loads)
-    mover.slide = np.where(lands, 0.0, np.where(falls, own.lies, mover.slide))
+    own, mover = tipping_of(t), mover_of(t)
+    leans = own.tips and mover.slide > 0.0
+    hold, drag = mover.static * mover.weight, mover.kinetic * mover.weight
+    if own.tips:
+        hold, drag = own.force, own.force * (1.0 - mover.slide / own.travel)
+    moving = leans or mover.speed > 0.0
+    if not moving:
+        press_at_rest(t)
+        moving = t.loads[0] > hold
+    speed, moves, rests_at = 0.0, False, mover.slide
+    if moving:
+        speed = give_way(t, drag)
+        moves = leans or speed > 0.0
+        if leans:
+            ends = mover.slide + t.h * speed
+            if ends <= 0.0:
+                moves, rests_at = False, 0.0
+            elif ends >= own.lies:
+                moves, rests_at = False, own.lies
+    if moves:
+        advance(t, speed)
+    else:
+        if leans or mover.speed > 0.0:
+            press_at_rest(t)
+        mover.speed, mover.slide = 0.0, rests_at

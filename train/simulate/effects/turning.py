@@ -11,41 +11,31 @@ do the columns of the forearm that touch it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate import base
-from train.simulate.contact import Array
-from train.simulate.motion import Mover
+from train.simulate.compiled import matrix, whole
+from train.simulate.motion import MOVER, mover_of
 from train.simulate.plan import Build
 from train.simulate.state import State
+from train.simulate.trial import Part, compiled
 
 LEVER = 2.0 / 3.0
 """Of a disc's radius: what its friction's moment is over its friction."""
 
-
-@dataclass
-class Turning:
-    """How a thing turns, and where its image goes.
-
-    Attributes:
-        per_metre: (n,) radians for each metre that it moves at the contact.
-        first: (rows, 1, n) places in a flat image of each row's first column.
-        column: (columns, 1) which of the window's each is.
-    """
-
-    per_metre: Array
-    first: NDArray[np.int64]
-    column: NDArray[np.int64]
+TURNING = Part("turning", "per_metre", "columns_per_radian", "turned", *whole("moved"))
+"""Radians for each metre that it moves at the contact; columns of the whole skin in a radian;
+radians that it has turned; room for an image."""
+turning_of = TURNING.of
 
 
 def add(build: Build) -> None:
     """Let it turn."""
     build.put("setup", base.ORDER + 12, balance)
     build.put("sample", base.IMAGE + 25, follow)
-    build.trace("turn_rad", turned)
+    build.trace("turn_rad", TURNING, "turned")
 
 
 def balance(state: State) -> None:
@@ -53,34 +43,39 @@ def balance(state: State) -> None:
     aside, radius = state.values["aside_m"], 0.5 * state.values["foot_m"]
     lever = LEVER * radius
     away = aside * aside / (lever * lever)
-    mover = state.of(Mover)
+    mover = state.of(MOVER)
     easier = 1.0 / np.sqrt(1.0 + away)
     mover.static = mover.static * easier
     mover.kinetic = mover.kinetic * easier
     # A disc's own moment of inertia is m R^2 / 2.
     mover.inertia = mover.inertia / (1.0 + 2.0 * aside * aside / (radius * radius))
-    window, n = state.columns.shape
-    first = np.arange(state.skin.rows)[:, None, None] * window * n + np.arange(n)
-    state.keep(Turning(aside / (lever * lever + aside * aside), first, np.arange(window)[:, None]))
+    state.begin(
+        TURNING,
+        per_metre=aside / (lever * lever + aside * aside),
+        columns_per_radian=state.skin.cols / (2.0 * math.pi),
+        moved=state.lend("turned", np.zeros((state.skin.rows, *state.columns.shape))),
+    )
 
 
-def turned(state: State) -> Array:
-    """(n,) radians that each thing has turned."""
-    return state.of(Turning).per_metre * state.of(Mover).slide
-
-
-def follow(state: State) -> None:
+@compiled
+def follow(t: Any) -> None:
     """The image moves around the forearm with the face; a load between two columns is theirs in
     parts, and one beyond the window is its last column's."""
-    own, image = state.of(Turning), state.image
-    turned_columns = turned(state) * (state.skin.cols / (2.0 * math.pi))
-    if not turned_columns.any():
+    own = turning_of(t)
+    own.turned = own.per_metre * mover_of(t).slide
+    columns = own.turned * own.columns_per_radian
+    if columns == 0.0:
         return
-    whole = np.floor(turned_columns)
-    part = turned_columns - whole
-    here = own.column + whole.astype(np.int64)
-    moved = np.zeros_like(image)
-    for column, share in ((here, 1.0 - part), (here + 1, part)):
-        to = np.clip(column, 0, len(state.columns) - 1)
-        np.add.at(moved.reshape(-1), own.first + to * state.n, image * share)
-    state.image = moved
+    whole = math.floor(columns)
+    part, further = columns - whole, int(whole)
+    image, moved = matrix(t.image, t.rows, t.columns), matrix(own.moved, t.rows, t.columns)
+    moved[:] = 0.0
+    for beyond in range(2):
+        share = part if beyond else 1.0 - part
+        for row in range(t.rows):
+            for column in range(t.columns):
+                load = image[row, column]
+                if load > 0.0:
+                    to = min(max(column + further + beyond, 0), t.columns - 1)
+                    moved[row, to] += load * share
+    image[:] = moved

@@ -1,0 +1,103 @@
+"""The loads on a pivoting forearm are the one minimum of a convex energy, or are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numba import njit
+
+from edge.errors import EdgeError
+from tests.train.simulate.scenes import make, one_object, run
+from train.simulate.compiled import addresses
+from train.simulate.effects import tilt
+from train.simulate.pivot_solver import GUARDED_ROUNDS, PIVOT, search
+from train.simulate.reader import Value
+
+
+def test_newton_on_the_tilt_needs_its_line_search():
+    beds, free, c = tilt_cases(600, seed=1)
+    found = tilt_loads(beds, free, c)
+    assert tilt_error(beds, free, c, found).max() < 1e-9
+    assert not found.lost.any()
+    loads = tilt_loads(beds, free, c, guarded_rounds=0)
+    wrong = tilt_error(beds, free, c, loads) > 1e-6
+    assert wrong.sum() >= 1
+    assert loads.lost[wrong].all()
+
+
+def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
+    hard = replace(make(one_object(width_m=0.05), "tilt"), taxel_n_m=Value(1e8, 1e8))
+    assert run(hard).force.max() > 0.0
+    monkeypatch.setattr(tilt, "GUARDED_ROUNDS", 0)
+    with pytest.raises(EdgeError, match="forearm tilts was not found in 2 trials"):
+        run(hard)
+
+
+def tilt_cases(n, seed):
+    """Forearms of 16 rows and 7 columns against faces, from soft to very stiff."""
+    rng = np.random.default_rng(seed)
+    angles = np.radians(15.0 * np.arange(-3, 4))[:, None]
+    lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
+    c00 = 10.0 ** rng.uniform(-3, 0, n)
+    c11 = 10.0 ** rng.uniform(-2, 0.5, n)
+    springs = SimpleNamespace(
+        gaps=np.sort(0.046 * (1.0 - np.cos(angles)), axis=0) + np.zeros(n),
+        stiffness=10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1)),
+        line_gap=lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
+        weight=np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
+        lever=lever,
+    )
+    free = (rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n))
+    c = (c00, rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11), c11)
+    return springs, free, c
+
+
+@njit(error_model="numpy")
+def search_each(contacts):
+    """The simulator's search, contact by contact."""
+    for i in range(len(contacts)):
+        search(contacts[i])
+
+
+def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
+    """The simulator's answers, searched for from no load."""
+    at = PIVOT.rows(len(free[0]))
+    own = {name: values.T.copy() for name, values in vars(springs).items()}
+    own |= {name: np.zeros_like(own["lever"]) for name in ("held", "out")}
+    for name, values in own.items():
+        at[name] = addresses(values)
+    at.springs, at.rows = len(springs.gaps), len(springs.lever)
+    at.free0, at.free1 = free
+    at.c00, at.c01, at.c11 = c
+    at.guarded_rounds = guarded_rounds
+    search_each(at.view(np.ndarray))
+    return at
+
+
+def tilt_error(springs, free, c, loads):
+    """Distance from the one answer, metres at the skin: the step that exact Newton would take.
+
+    The energy is strictly convex, so a point with no step left is its minimum.
+    """
+    y0 = free[0] - (c[0] * loads.force + c[1] * loads.moment)
+    y1 = free[1] - (c[1] * loads.force + c[2] * loads.moment)
+    inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
+    held = (inside > 0.0) * springs.stiffness * springs.weight[:, None]
+    force, k = (inside * held).sum(axis=1), held.sum(axis=1)
+    whole = k.sum(axis=0)
+    mean = (k * springs.lever).sum(axis=0) / np.where(whole > 0.0, whole, 1.0)
+    spread = (k * (springs.lever - mean) ** 2).sum(axis=0)
+    left = force.sum(axis=0) - loads.force
+    turning = (force * springs.lever).sum(axis=0) - loads.moment
+    r0, r1 = c[0] * left + c[1] * turning, c[1] * left + c[2] * turning
+    # (I + C H) p = r, about the mean lever, where H is diagonal.
+    c01 = c[1] + mean * c[2]
+    c00 = c[0] + mean * (c[1] + c01)
+    r0 = r0 + mean * r1
+    det = 1.0 + c00 * whole + c[2] * spread + (c00 * c[2] - c01 * c01) * whole * spread
+    p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r1) / det
+    p1 = ((1.0 + c00 * whole) * r1 - c01 * whole * r0) / det
+    return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)

@@ -1,0 +1,86 @@
+"""A trial from its first step to its last: the record that every compiled function takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import from_dtype, njit
+
+from train.simulate import compiled as tools
+from train.simulate.arm import JOINTS
+from train.simulate.compiled import record, vectors, whole
+from train.simulate.schema import EFFECTS
+
+SLOTS = ("motion", "viscous", *EFFECTS)
+"""Whose parts a trial may have."""
+
+POSE = (("rotation", 3), ("axes", JOINTS), ("origins", JOINTS))
+TRIAL = record(
+    # Itself, for a function that calls another; the solver; each part's address.
+    *whole("here", "solve"),
+    ("own", "i8", (len(SLOTS),)),
+    # Its step, its time in seconds and how many frames have ended.
+    *("h", "t", "frame", "rate_hz"),
+    # The arm: the table of `arm.Kinematics`, and of each joint: the equilibrium point's start,
+    # speed and time; what damping holds, the compliance of the whole and the spring in a step; its
+    # angle now, after the step without load, and at the frame.
+    *whole("joints", "chain"),
+    *vectors(JOINTS, "start", "rate", "travel_s"),
+    *vectors(JOINTS, "held", "give", "joint_k"),
+    *vectors(JOINTS, "q", "q_free", "q_frame"),
+    # Its pose, as of `arm.Pose`.
+    *vectors(3, "origin"),
+    *((name, "f8", (3, size)) for name, size in POSE),
+    # The point on the forearm's axis beside the middle of the contact; the object's face: its
+    # normal, a point, the direction along the forearm; where on the skin it is met, and its shape.
+    *vectors(3, "point", "normal", "face", "along_face"),
+    *("z", "width_m", "face_radius_m", "skin_radius_m", "row_pitch_m"),
+    # The contact's coordinates (`contact`): how many, where they are with no load in the step, at
+    # the frame, and loaded; the loads; what they take off; the joints' part in them.
+    *whole("coordinates"),
+    *vectors(2, "y", "y_frame", "depth", "loads"),
+    *vectors(3, "compliance"),
+    ("jacobian", "f8", (2, JOINTS)),
+    # What the solver is asked, and what it answers; 1 where it found no answer.
+    *vectors(2, "free", "found"),
+    *vectors(3, "c"),
+    "lost",
+    # The bed: lines of springs, of which the first are the columns that can touch; its law, lines
+    # K a - B by their gaps (`state.Bed`); a taxel's stiffness with what is in series with it.
+    *whole("rows", "lines", "columns", "springs", "law_lines"),
+    *whole("row_z", "weight", "line_gap", "line_depth"),
+    *whole("gaps", "stiffness", "alive", "column_gaps", "reach"),
+    *whole("law_gaps", "slopes", "intercepts"),
+    "taxel_k",
+    # What a frame shows: the newtons borne, its deepest line, and (rows, columns) newtons a taxel.
+    *("force", "deepest"),
+    *whole("image"),
+)
+"""A trial. Whole numbers but those that count things are addresses of what has another length in
+each scene; `compiled.vector` and its like read it."""
+
+
+class Part:
+    """What an effect keeps of each trial, in a record of its own."""
+
+    def __init__(self, slot: str, *fields: Any) -> None:
+        """Fields as for `compiled.record`."""
+        self.slot = SLOTS.index(slot)
+        self.dtype = record(*fields)
+        at, number = tools.reads(from_dtype(self.dtype)), self.slot
+
+        @njit(error_model="numpy")
+        def of(trial: Any) -> Any:
+            return at(trial.own[number])
+
+        self.of = of
+        """For compiled functions: a trial's own."""
+
+    def rows(self, n: int) -> np.recarray[Any, Any]:
+        """n records of zeros."""
+        return np.zeros(n, dtype=self.dtype).view(np.recarray)
+
+
+compiled = tools.compiled(TRIAL)
+"""Decorates a function of a trial."""
