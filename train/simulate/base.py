@@ -224,7 +224,7 @@ def hand_over(state: State) -> None:
         **{name: getattr(state, name).T for name in ("normal", "face", "along_face")},
         **{name: state.lend(name, array) for name, array in of_rows.items()},
     }
-    trial = state.trial.view(np.ndarray)
+    trial = state.records
     for name, value in numbers.items():
         trial[name] = value
     for name in ("start", "rate", "travel_s", "held", "give", "joint_k", "q"):

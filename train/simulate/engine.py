@@ -215,7 +215,7 @@ def run_physics(
     joints, force = np.empty((n, frames, dof)), np.zeros((n, frames))
     traces = np.zeros((len(plan.traces), n, frames))
     run_frames(
-        state.trial.view(np.ndarray),
+        state.records,
         tuple(plan.addresses(stage) for stage in RUN_STAGES),
         substeps,
         joints,

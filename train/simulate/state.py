@@ -51,7 +51,8 @@ class State:
         h: seconds, the step.
         values: {name: (n,)} of what was drawn for each trial.
         solve: address of the compiled function that answers for the contact.
-        trial: (n,) of `TRIAL`; its `here`, `own` and `solve` are set from the beginning.
+        records: (n,) of `TRIAL`; `here`, `own` and `solve` are set from the beginning.
+        trial: the same, with its fields as attributes.
         own: {part: (n,) of its records}, the called effects' own state.
         arrays: {name: (n, ...)} what the records hold addresses of, trial by trial.
         start, rate: (dof, n) and (dof, 1), the equilibrium point at t = 0 and its speed.
@@ -80,6 +81,7 @@ class State:
     solve: int
     own: dict[Part, Rows] = field(default_factory=dict)
     arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
+    records: NDArray[Any] = field(init=False)
     trial: Rows = field(init=False)
 
     travel_s: Array = field(init=False)
@@ -106,9 +108,10 @@ class State:
 
     def __post_init__(self) -> None:
         """The records, which know where they are."""
-        self.trial = np.zeros(self.n, dtype=TRIAL).view(np.recarray)
-        self.trial.here = addresses(self.trial)
-        self.trial.solve = self.solve
+        self.records = np.zeros(self.n, dtype=TRIAL)
+        self.records["here"] = addresses(self.records)
+        self.records["solve"] = self.solve
+        self.trial = self.records.view(np.recarray)
 
     def of(self, part: Part) -> Rows:
         """An effect's own state (n,)."""
@@ -118,7 +121,7 @@ class State:
         """An effect's own state, zero but for these values (n,); `of` finds it, and so does what
         is compiled."""
         rows = self.own[part] = part.rows(self.n)
-        self.trial.own[:, part.slot] = addresses(rows)
+        self.records["own"][:, part.slot] = addresses(rows)
         for name, value in values.items():
             rows[name] = value
         return rows

@@ -77,8 +77,8 @@ class Part:
         self.of = of
         """For compiled functions: a trial's own."""
 
-    def rows(self, n: int) -> np.recarray[Any, Any]:
-        """n records of zeros."""
+    def rows(self, n: int) -> Any:
+        """(n,) records of zeros, their fields as attributes (`np.recarray`)."""
         return np.zeros(n, dtype=self.dtype).view(np.recarray)
 
 

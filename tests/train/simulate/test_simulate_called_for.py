@@ -270,3 +270,15 @@ def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():
     for key, needed in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
         with pytest.raises(InputError, match=f"spread.{key} .*: give a movable object {needed}"):
             from_dict({"object": [boxes[1]], "spread": {key: 1e-3}})
+
+
+@pytest.mark.parametrize("band", [10.0, 30.0])
+def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band, monkeypatch):
+    one = scene("noise", "dead_band")
+    one.settings.update(noise={"counts": 5.0}, dead_band={"counts": band})
+    seen = batch_of(one)[0].counts
+    add = streams.add_drawn
+    monkeypatch.setattr(streams, "add_drawn", lambda *given: add(*given[:3]))
+    assert seen.tobytes() == batch_of(one)[0].counts.tobytes()
+    noisy = (seen[:, 0] > 0).any()
+    assert noisy if band < 21.0 else not noisy

@@ -49,3 +49,11 @@ def test_noise_is_normal_and_each_number_takes_two_bytes():
     streams.add_drawn(fresh, streams.quantiles(), after)
     assert fresh.random() == again.random()
     np.testing.assert_array_equal(after, before + values)
+
+
+def test_zeros_can_be_left_alone_without_a_change_in_the_other_numbers():
+    numbers = np.arange(10, dtype=np.float32) % 3
+    every, some = numbers.copy(), numbers.copy()
+    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), every)
+    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), some, but_to_zeros=True)
+    np.testing.assert_array_equal(some, np.where(numbers == 0.0, numbers, every))

@@ -37,9 +37,10 @@ SPREAD = 0.55
 """The same of the load at first touch, which goes with a^2 as on a half space."""
 
 
-LATERAL = Part("lateral", "depth_m", "nearest", *whole("bears", "wide", "ends"))
+ROOM = ("borne", "wide", "ellipse", "askew")
+LATERAL = Part("lateral", "depth_m", "nearest", *whole(*ROOM))
 """The layer's thickness and the depth at which its first column is touched, in metres; room for
-three numbers a row."""
+four numbers a row."""
 lateral_of = LATERAL.of
 
 
@@ -69,7 +70,10 @@ def narrow(state: State) -> None:
         LATERAL,
         depth_m=depth,
         nearest=state.column_gaps.min(axis=0),
-        **{name: state.lend(f"lateral_{name}", none) for name in ("bears", "wide", "ends")},
+        **{
+            name: state.lend(f"lateral_{name}", none)
+            for name in ("borne", "wide", "ellipse", "askew")
+        },
     )
 
 
@@ -114,8 +118,8 @@ def share_rows(t: Any, borne: Array, wide: Array) -> None:
     """
     depth, weight = vector(t.line_depth, t.rows), vector(t.weight, t.rows)
     gaps, stiffness = vector(t.gaps, t.springs), vector(t.stiffness, t.springs)
-    margin = MARGIN * lateral_of(t).depth_m
-    askew = 0.0
+    own, all_askew = lateral_of(t), 0.0
+    margin, askew = MARGIN * own.depth_m, vector(own.askew, t.rows)
     for row in range(t.rows):
         whole = 0.0
         for s in range(t.springs if depth[row] > 0.0 else 0):
@@ -123,15 +127,15 @@ def share_rows(t: Any, borne: Array, wide: Array) -> None:
             if inside > 0.0:
                 whole += inside * stiffness[s]
         borne[row] = whole * weight[row]
-        askew += askew_at(depth, weight, row, t.row_pitch_m)
-    least = margin * askew
+        askew[row] = askew_at(depth, weight, row, t.row_pitch_m)
+        all_askew += askew[row]
+    least = margin * all_askew
     if not least > 0.0:
         return
     edge = t.taxel_k * margin * margin / t.row_pitch_m
     for row in range(t.rows):
         touched = min(max(depth[row] / least - 0.5, 0.0), 1.0)
-        slope = askew_at(depth, weight, row, t.row_pitch_m)
-        borne[row] = borne[row] * touched + edge * slope * wide[row]
+        borne[row] = borne[row] * touched + edge * askew[row] * wide[row]
 
 
 @compiled
@@ -141,18 +145,18 @@ def image(t: Any) -> None:
     own = lateral_of(t)
     depth, gaps = vector(t.line_depth, t.rows), vector(t.column_gaps, t.columns)
     loads, reach = matrix(t.image, t.rows, t.columns), vector(t.reach, t.columns)
-    borne, wide = vector(own.bears, t.rows), vector(own.wide, t.rows)
-    ellipse = vector(own.ends, t.rows)
+    borne, wide = vector(own.borne, t.rows), vector(own.wide, t.rows)
+    ellipse = vector(own.ellipse, t.rows)
     for row in range(t.rows):
-        for column in range(t.columns):
+        wide[row] = ellipse[row] = 0.0
+        loads[row, :] = 0.0
+        for column in range(t.columns if depth[row] > 0.0 else 0):
             # A touch so slight that it falls between the columns is the nearest one's.
             inside = depth[row] - (gaps[column] - own.nearest)
-            loads[row, column] = math.sqrt(max(inside, 0.0)) * reach[column]
-        wide[row] = ellipse[row] = 0.0
-        for column in range(t.columns if depth[row] > 0.0 else 0):
-            if depth[row] > gaps[column] - own.nearest:
+            if inside > 0.0:
+                loads[row, column] = math.sqrt(inside) * reach[column]
                 wide[row] += reach[column]
-            ellipse[row] += loads[row, column]
+                ellipse[row] += loads[row, column]
     share_rows(t, borne, wide)
     for row in range(t.rows):
         part = borne[row] / (ellipse[row] if ellipse[row] > 0.0 else 1.0)
