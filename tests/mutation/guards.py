@@ -473,8 +473,8 @@ GUARDS = (
     Guard(
         "what was compiled with older sources is not found",
         "train/simulate/compiled.py:record",
-        'np.dtype([*named, (f"of_{SOURCES}", "i8")])',
-        "np.dtype(named)",
+        'np.dtype((np.record, [*named, (f"of_{SOURCES}", "i8")]))',
+        "np.dtype((np.record, named))",
     ),
     Guard(
         "an arm of more joints than a record has room for is refused",
@@ -490,8 +490,8 @@ GUARDS = (
     ),
     Guard(
         "energy out of nothing is refused",
-        "train/simulate/engine.py:check_energy",
-        "if made.any(): ...",
+        "train/simulate/energy.py:check_energy",
+        "if i >= 0: ...",
         "if False: ...",
         beside=ENERGY,
     ),

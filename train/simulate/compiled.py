@@ -43,7 +43,8 @@ SOURCES = digest()
 def record(*fields: Any) -> np.dtype[Any]:
     """A record's type: of names (one float each), or (name, kind) and (name, kind, shape)."""
     named = [(field, "f8") if isinstance(field, str) else field for field in fields]
-    return np.dtype([*named, (f"of_{SOURCES}", "i8")])
+    # As numpy's own record type, whose fields are attributes too.
+    return np.dtype((np.record, [*named, (f"of_{SOURCES}", "i8")]))
 
 
 def whole(*names: str) -> list[tuple[str, str]]:
@@ -116,8 +117,7 @@ def compiled(dtype: np.dtype[Any]) -> Callable[[Callable[[Any], None]], Any]:
 def addresses(array: NDArray[Any]) -> NDArray[np.int64]:
     """(n,) of an array's parts along its first axis, whose numbers lie side by side."""
     assert array.flags.c_contiguous
-    first: int = array.__array_interface__["data"][0]
-    return first + array.strides[0] * np.arange(len(array))
+    return array.ctypes.data + array.strides[0] * np.arange(len(array))
 
 
 @njit(cache=True, error_model="numpy")

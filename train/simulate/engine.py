@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
+from edge.touch.arm import Chain
 from train.simulate import streams
 from train.simulate.arm import Kinematics
 from train.simulate.assemble import make_plan
-from train.simulate.base import equilibrium
 from train.simulate.compiled import Array, each
+from train.simulate.energy import check_energy
 from train.simulate.plan import RUN_STAGES, Plan
 from train.simulate.required_effects import required_effects
 from train.simulate.run_frames import run_frames
@@ -118,6 +120,12 @@ def frame_count(scene: Scene) -> int:
     return round(duration * scene.trials["rate_hz"]) + 1
 
 
+@lru_cache(maxsize=8)
+def kinematics_of(arm: Chain) -> Kinematics:
+    """An arm's; a scene's batches all have the same."""
+    return Kinematics(arm)
+
+
 def whole_steps(scene: Scene, step_s: float) -> int:
     """Steps of about this length that make a frame."""
     return max(1, round(1.0 / (scene.trials["rate_hz"] * step_s)))
@@ -134,7 +142,7 @@ def begin(
         n=len(trials),
         h=step_s,
         values=values,
-        kinematics=Kinematics(scene.arm),
+        kinematics=kinematics_of(scene.arm),
         solve=plan.solve.address,
     )
     for function in plan.setup:
@@ -228,7 +236,7 @@ def run_physics(
     )
     check_found(state)
     t = np.arange(frames) / rate_hz
-    check_energy(scene, state, joints.transpose(1, 2, 0), t)
+    check_energy(state, joints, t)
     kept = dict(zip(plan.traces, traces, strict=True))
     return PhysicsRun(frames=seen, t=t, joints=joints, force=force, traces=kept, state=state)
 
@@ -245,10 +253,6 @@ def check_found(state: State) -> None:
             f"{np.count_nonzero(state.trial.lost)} trials; "
             "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
         )
-
-
-ENERGY_MADE = 0.01
-"""Share of the work put in that the arm may hold beyond it: what sampling at frames leaves open."""
 
 
 def check_start(state: State, plan: Plan) -> None:
@@ -269,41 +273,6 @@ def check_start(state: State, plan: Plan) -> None:
             f"{state.scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
             f"trial {trial.number} of {trial.key}, where the face is turned by {yaw:.0f} degrees; "
             "give spread.yaw_deg or the object's width_m less, or trials.lead_s more time"
-        )
-
-
-def check_energy(scene: Scene, state: State, joints: Array, t: Array) -> None:
-    """Refuse a batch in which energy came out of nothing.
-
-    The equilibrium point's motion is all that puts energy in, W = int k (q_eq - q) dq_eq, and the
-    joints' damping takes at least d (dq)^2 / dt of it in each frame; so the arm's springs hold at
-    most what is left, and what the arm brought as speed. What a contact has taken it may give back,
-    but no more. A step that makes energy breaks the bound at once.
-
-    Args:
-        joints: (frames, dof, n) radians.
-        t: (frames,) seconds.
-
-    Raises:
-        EdgeError: names the first trial that broke it.
-    """
-    target = equilibrium(state, t[:, None, None])
-    torque = state.joint_k * (target - joints)
-    stored = 0.5 * (torque * (target - joints)).sum(axis=1)
-    put_in = (0.5 * (torque[1:] + torque[:-1]) * np.diff(target, axis=0)).sum(axis=1)
-    damping = np.array(scene.damping)[:, None]
-    lost = (damping * np.diff(joints, axis=0) ** 2).sum(axis=1) / np.diff(t)[:, None]
-    held = stored[1:] + np.cumsum(lost, axis=0)
-    moving = 0.5 * sum(i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False))
-    work = stored[0] + moving + np.cumsum(put_in, axis=0)
-    made = ~(held <= work + ENERGY_MADE * np.cumsum(np.abs(put_in), axis=0) + 1e-9)
-    if made.any():
-        i = int(np.argmax(made.any(axis=0)))
-        k = int(np.argmax(made[:, i]))
-        raise EdgeError(
-            f"{scene.name}: trial {state.trials[i].number} of {state.trials[i].key} makes energy: "
-            f"at {t[k + 1]:g} s the arm holds or has lost {held[k, i]:.3g} J, and {work[k, i]:.3g} "
-            "J have been put in; give [step_s] a smaller step, or the object less extreme values"
         )
 
 
