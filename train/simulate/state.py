@@ -128,6 +128,7 @@ class State:
 
     def lend(self, name: str, values: NDArray[Any]) -> NDArray[np.int64]:
         """(n,) addresses of values (..., n), laid out trial by trial; `arrays` has them."""
+        assert name not in self.arrays, f"{name} is lent already: its address would be lost"
         by_trial = values.T if values.ndim == 2 else np.moveaxis(values, -1, 0)
         own = self.arrays[name] = np.array(by_trial, order="C")
         return addresses(own)

@@ -217,9 +217,9 @@ class TestAskew:
         state.arrays["line_depth"][:], state.trial.force = depth, force
         # Half a column from the nearest on either side, as in the block's sum over taxels.
         away = (np.arange(len(state.columns)) - len(state.columns) // 2 + 0.5) * 0.26166
-        state.column_gaps = state.skin.radius_m * (1.0 - np.cos(away))[:, None]
-        lateral.narrow(state)
-        state.arrays["column_gaps"][:] = state.column_gaps.T
+        radius = state.skin.radius_m
+        gaps = lateral.touched_at(radius * (1.0 - np.cos(away)), radius, 0.1)
+        state.arrays["column_gaps"][:], state.of(lateral.LATERAL).nearest = gaps, gaps.min()
         each(np.array([lateral.image.address]), state.trial.here)
         image = state.arrays["image"][0]
         found = image.sum(axis=1)[1:7]

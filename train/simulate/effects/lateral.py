@@ -58,13 +58,17 @@ def delay(x: Array, depth: Array) -> Array:
     return np.asarray((SPREAD - MARGIN) * depth * (x - beside * np.log1p(x / beside)))
 
 
+def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
+    """The depths at which columns are touched that lie `gaps` R (1 - cos theta) back."""
+    # From the cylinder's own gap its x = R sin theta.
+    near = np.minimum(gaps, radius)
+    return gaps + delay(np.sqrt(near * (2.0 * radius - near)), depth) / radius
+
+
 def narrow(state: State) -> None:
     """Columns are touched later."""
-    radius, depth = state.skin.radius_m, state.values["depth_m"]
-    # From the cylinder's own gap R (1 - cos theta) its x = R sin theta.
-    gaps = np.minimum(state.column_gaps, radius)
-    x = np.sqrt(gaps * (2.0 * radius - gaps))
-    state.column_gaps = state.column_gaps + delay(x, depth) / radius
+    depth = state.values["depth_m"]
+    state.column_gaps = touched_at(state.column_gaps, state.skin.radius_m, depth)
     none = np.zeros((state.skin.rows, state.n))
     state.begin(
         LATERAL,
