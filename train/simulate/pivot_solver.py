@@ -22,6 +22,8 @@ CLOSE_M, CLOSE_RAD = 1e-14, 1e-13
 CUTS = 40
 GUARDED_ROUNDS = 5000
 """A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
+NONE_LEFT = 1e-9
+"""A determinant of C of so small a part of its terms has too few digits to divide by."""
 
 
 Answer = tuple[float, float, float, float, float]
@@ -98,16 +100,31 @@ def answer(at: Any, y0: float, y1: float) -> Answer:
 
 
 @njit(error_model="numpy")
+def determinant(at: Any) -> float:
+    """Of C; 0 where it is rounding: an arm of one joint pushes and tilts in one, and C has no
+    inverse."""
+    det: float = at.c00 * at.c11 - at.c01 * at.c01
+    return det if det > NONE_LEFT * at.c00 * at.c11 else 0.0
+
+
+@njit(error_model="numpy")
 def newton_step(at: Any, y0: float, y1: float, found: Answer) -> tuple[float, float]:
     """p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean lever, where
     H is diagonal and the determinant a sum of positive terms: no digits are lost at 1e15 N/m."""
     force, moment, whole, mean, spread = found
     r0 = y0 - at.free0 + (at.c00 * force + at.c01 * moment)
     r1 = y1 - at.free1 + (at.c01 * force + at.c11 * moment)
+    det_c = determinant(at)
+    if det_c == 0.0 and at.c00 > 0.0:
+        # One way to go, and a stiffness along it.
+        lean = at.c01 / at.c00
+        reach = 1.0 + lean * mean
+        p0 = r0 / (1.0 + at.c00 * (reach * reach * whole + lean * lean * spread))
+        return p0, lean * p0
     c01 = at.c01 + mean * at.c11
     c00 = at.c00 + mean * (at.c01 + c01)
     r0 = r0 + mean * r1
-    det = 1.0 + c00 * whole + at.c11 * spread + (c00 * at.c11 - c01 * c01) * whole * spread
+    det = 1.0 + c00 * whole + at.c11 * spread + det_c * whole * spread
     p0 = ((1.0 + at.c11 * spread) * r0 - c01 * spread * r1) / det
     p1 = ((1.0 + c00 * whole) * r1 - c01 * whole * r0) / det
     return p0 - mean * p1, p1
@@ -116,8 +133,11 @@ def newton_step(at: Any, y0: float, y1: float, found: Answer) -> tuple[float, fl
 @njit(error_model="numpy")
 def slope(at: Any, y0: float, y1: float, found: Answer, p0: float, p1: float) -> float:
     """Of the energy at y along -p."""
-    det = at.c00 * at.c11 - at.c01 * at.c01
+    det = determinant(at)
     d0, d1 = y0 - at.free0, y1 - at.free1
+    if det == 0.0:
+        only: float = -(p0 * (d0 / at.c00 + found[0]) + p1 * found[1])
+        return only
     g0 = (at.c11 * d0 - at.c01 * d1) / det + found[0]
     g1 = (at.c00 * d1 - at.c01 * d0) / det + found[1]
     along: float = -(p0 * g0 + p1 * g1)
@@ -129,11 +149,13 @@ def agree(at: Any, y0: float, y1: float, found: Answer) -> tuple[float, float]:
     """The loads at the solution, from the side that has more digits: a stiff bed's depth is
     all rounding, while what the arm has given way is not."""
     force, moment, stiffness = found[0], found[1], found[2]
-    det = at.c00 * at.c11 - at.c01 * at.c01
-    if at.c00 * stiffness > 1.0 and det > 0.0 and force > 0.0:
-        d0, d1 = at.free0 - y0, at.free1 - y1
-        force = (at.c11 * d0 - at.c01 * d1) / det
-        moment = (at.c00 * d1 - at.c01 * d0) / det
+    if at.c00 * stiffness > 1.0 and force > 0.0:
+        det, d0, d1 = determinant(at), at.free0 - y0, at.free1 - y1
+        if det > 0.0:
+            force = (at.c11 * d0 - at.c01 * d1) / det
+            moment = (at.c00 * d1 - at.c01 * d0) / det
+        else:
+            force = (d0 - at.c01 * moment) / at.c00
     if force > 0.0:
         return force, moment
     return 0.0, 0.0

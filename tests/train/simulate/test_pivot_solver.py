@@ -36,6 +36,39 @@ def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
         run(hard)
 
 
+def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
+    # Its push and its tilt go together, as on an arm of 20 cm and more, and C has no inverse.
+    beds, free, (c00, *_) = tilt_cases(600, seed=2)
+    lean = np.linspace(-5.0, 5.0, 600)
+    c01 = lean * c00
+    found = tilt_loads(beds, free, (c00, c01, lean * c01))
+    assert not found.lost.any()
+    way = c00 * found.force + c01 * found.moment
+
+    def missing(way):
+        force, moment = bed_loads(beds, free[0] - way, free[1] - lean * way)
+        return way - (c00 * force + c01 * moment)
+
+    high = np.abs(missing(0.0))
+    low = -high
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low = np.where(missing(middle) < 0.0, middle, low)
+        high = np.where(missing(middle) < 0.0, high, middle)
+    np.testing.assert_allclose(way, 0.5 * (low + high), rtol=0.0, atol=1e-12)
+    force, moment = bed_loads(beds, free[0] - way, free[1] - lean * way)
+    soft = beds.stiffness[0] < 1e6
+    np.testing.assert_allclose(found.force[soft], force[soft], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.moment[soft], moment[soft], rtol=1e-6, atol=1e-6)
+
+
+def bed_loads(springs, y0, y1):
+    """Force and moment of beds at a depth and a tilt."""
+    inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
+    force = (np.maximum(inside, 0.0) * springs.stiffness * springs.weight[:, None]).sum(axis=1)
+    return force.sum(axis=0), (force * springs.lever).sum(axis=0)
+
+
 def tilt_cases(n, seed):
     """Forearms of 16 rows and 7 columns against faces, from soft to very stiff."""
     rng = np.random.default_rng(seed)
