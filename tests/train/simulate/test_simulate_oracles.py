@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -249,6 +250,11 @@ class TestInertia:
         assert aloft[1] == 0
 
 
+def pose_of(state, q):
+    """Of the arms at joint angles (n, 16)."""
+    return state.kinematics.pose(q[:, : state.kinematics.chain.dof].T)
+
+
 class TestFriction:
     def test_a_sliding_skin_bears_less_by_the_arms_compliance(self):
         # Quasi-static and stiff: a = c_nn F + c_nt T with T = mu F, so F falls by
@@ -270,6 +276,44 @@ class TestFriction:
         assert abs(shear.pull[0]) < 5.0 * held.force[0, -1]
         # What the skin has moved along the face is the stretch of its own spring.
         assert abs(shear.stretch[0]) == pytest.approx(abs(shear.pull[0]) / 1e4, rel=0.05)
+
+    def test_the_skin_moves_along_the_face_as_its_jacobian_says(self):
+        state = run(make(one_object(width_m=0.05, skin_friction=0.4))).state
+        t, along = state.trial, state.along_face
+        skin = (t.point + RADIUS * t.normal - t.origin).T
+        local = np.einsum("ikn,in->kn", pose_of(state, t.q_frame).rotation, skin)
+        for j in range(4):
+            moved = []
+            for turned in (-1e-6, 1e-6):
+                pose = pose_of(state, t.q_frame + turned * np.eye(16)[j])
+                point = pose.origin + np.einsum("ikn,kn->in", pose.rotation, local)
+                moved.append((point * along).sum(axis=0))
+            want = state.of(SHEAR).jacobian[:, j]
+            np.testing.assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
+
+    def test_a_face_that_sticks_pulls_as_the_skin_is_stretched_when_all_is_at_rest(self):
+        stuck = make(one_object(width_m=0.05, skin_friction=5.0), "tilt", after_s=4.0)
+        shear = run(replace(stuck, travel_s=0.6)).state.of(SHEAR)
+        assert (np.abs(shear.pull) > 0.5).all()
+        np.testing.assert_allclose(1e4 * shear.stretch, shear.pull, rtol=1e-3)
+
+    def test_what_is_soft_and_smooth_presses_along_the_forearms_own_normal(self):
+        foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
+        t = (state := run(make(foam, "tilt")).state).trial
+        push = t.loads[:, 0] * state.normal + state.of(SHEAR).pull * state.along_face
+        forearm = t.rotation[:, :, 2].T
+        askew = (state.normal * forearm).sum(axis=0)
+        assert (np.abs(askew) > 0.03).all()
+        np.testing.assert_allclose((push * forearm).sum(axis=0) / t.loads[:, 0], 0.0, atol=0.01)
+
+    def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
+        batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
+        state, t = batch.state, batch.state.trial
+        push = t.loads[:, 0] * state.normal + state.of(SHEAR).pull * state.along_face
+        forearm = pose_of(state, t.q).rotation[:, 2]
+        own = state.normal - forearm * (state.normal * forearm).sum(axis=0)
+        own /= np.sqrt((own * own).sum(axis=0))
+        np.testing.assert_allclose(batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3)
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         box = {"mass_kg": 0.05, "friction_static": 0.5, "friction_kinetic": 0.5, "width_m": 0.2}
@@ -311,6 +355,14 @@ class TestTilt:
             moved[:, 0] -= before[:, 1] * (middle - lever[:, 0])
             np.testing.assert_allclose(moved / 1e-6, jacobian[:, :, j], atol=2e-5)
             t.q[:, j] -= 1e-6
+
+    def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
+        scene = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
+        t = run(scene, 0.0025).state.trial
+        turned = t.q - t.q_frame
+        moved = (t.jacobian * turned[:, None]).sum(axis=2)
+        assert (np.abs(moved) > 1e-9).all()
+        np.testing.assert_allclose(t.depth, t.y_frame + moved, rtol=0.0, atol=1e-13)
 
     def test_the_skin_bears_what_goes_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05), "tilt"))

@@ -294,3 +294,29 @@ def test_stems_bent_too_far_have_slipped_off():
     assert (bent > 0.03).any()
     assert (weight[bent > 0.03] == 0.0).all()
     assert (weight[bent <= 0.03] > 0.0).any()
+
+
+def test_the_stems_that_are_held_bear_by_their_own_bends():
+    keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
+    batch = run(make(one_object(family="foliage", **keys)))
+    weight, line_gap = batch.state.arrays["weight"], batch.state.arrays["line_gap"]
+    assert (weight == 0.0).any()
+    bent = np.maximum(batch.state.trial.depth[:, :1] - line_gap, 0.0)
+    want = (weight * 15.0 * bent).sum(axis=1)
+    assert (want > 0.1).all()
+    np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-9)
+    # Between two rows, each stem's load is nearer to the one that it stands nearer to.
+    arrays, columns = batch.state.arrays, batch.state.columns.shape[0]
+    row = arrays["stem_taxel"] // columns + arrays["stem_part"]
+    middle = (row * weight * bent).sum(axis=1) / (weight * bent).sum(axis=1)
+    seen = batch.counts[:, -1].sum(axis=2, dtype=float)
+    found = (seen * np.arange(16)).sum(axis=1) / seen.sum(axis=1)
+    np.testing.assert_allclose(found, middle, atol=0.01)
+
+
+def test_stems_that_have_slipped_off_damp_no_more():
+    keys = {"stem_slip_m": 0.02, "stem_spread_m": 0.02, "stem_damping": 1.0}
+    batch = run(make(one_object(family="foliage", **keys)))
+    assert (batch.force.max(axis=1) > 0.5).all()
+    assert (batch.state.arrays["weight"] == 0.0).all()
+    assert (batch.force[:, -1] == 0.0).all()
