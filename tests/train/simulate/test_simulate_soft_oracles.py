@@ -15,6 +15,7 @@ from train.simulate import base, contact
 from train.simulate.compiled import each
 from train.simulate.effects import lateral
 from train.simulate.reader import Value
+from train.simulate.viscous import BRANCHES
 
 RADIUS = 0.04604
 
@@ -320,3 +321,35 @@ def test_stems_that_have_slipped_off_damp_no_more():
     assert (batch.force.max(axis=1) > 0.5).all()
     assert (batch.state.arrays["weight"] == 0.0).all()
     assert (batch.force[:, -1] == 0.0).all()
+
+
+def test_no_row_that_the_face_does_not_cover_is_the_deepest():
+    keys = {"family": "bubbles", "pop_n": 1e6, "bubble_n_m": 300.0, "bubble_m": 0.05}
+    batch = run(make(one_object(width_m=0.02, **keys), "tilt"))
+    arrays = batch.state.arrays
+    covered, depth = arrays["weight"] > 0.0, arrays["line_depth"]
+    assert (np.where(covered, depth, 0.0).max(axis=1) < depth.max(axis=1)).all()
+    want = np.where(covered, depth, 0.0).max(axis=1)
+    np.testing.assert_array_equal(batch.traces["depth_m"][:, -1], want)
+
+
+def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
+    foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
+    state = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).state
+    arrays, rise = state.arrays, state.of(BRANCHES).rise[:, :1]
+    inside = np.maximum(arrays["line_depth"][:, :, None] - arrays["gaps"][:, None], 0.0)
+    elastic = arrays["weight"] * (inside * arrays["stiffness"][:, None]).sum(axis=2)
+    assert (np.ptp(elastic, axis=1) > 0.1).all()
+    np.testing.assert_allclose(arrays["out"], elastic, atol=1e-3)
+    np.testing.assert_allclose(arrays["branch"], -rise * elastic, atol=1e-3)
+
+
+def test_under_a_pivoting_arm_the_springs_that_are_left_bear_what_they_are_pressed():
+    wrap = make(one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0)
+    batch = run(replace(wrap, travel_s=0.6))
+    arrays = batch.state.arrays
+    assert (np.ptp(arrays["alive"].sum(axis=2), axis=1) > 0.0).all()
+    inside = np.maximum(arrays["line_depth"][:, :, None] - arrays["gaps"][:, None], 0.0)
+    springs = inside * arrays["alive"] * arrays["stiffness"][:, None]
+    want = arrays["weight"] * springs.sum(axis=2)
+    np.testing.assert_allclose(arrays["out"], want, atol=1e-6)
