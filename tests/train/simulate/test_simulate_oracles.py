@@ -82,6 +82,11 @@ class TestArm:
         want = 1.0 - np.exp(-trace.t[:, 0] * k / d)
         np.testing.assert_allclose(trace.q[:, 0], want, atol=2e-3)
 
+    def test_a_frame_ends_at_its_own_time_and_not_at_the_sum_of_its_steps(self):
+        batch = run(make(one_object()))
+        assert batch.state.trial.t.tolist() == [batch.t[-1]] * 2
+        assert np.add.accumulate(np.full(len(batch.t) - 1, 0.01))[-1] != batch.t[-1]
+
     def test_contact_holds_the_arm_where_the_object_is(self):
         # A rigid, fixed object: the skin's point at the contact does not go on along the push.
         batch = run(make(one_object(width_m=0.05)))

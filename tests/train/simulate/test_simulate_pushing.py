@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from train.simulate.effects.tipping import TIPPING
+from train.simulate.compiled import each
+from train.simulate.effects.tipping import TIPPING, topple
 from train.simulate.engine import run_batch
 from train.simulate.motion import GRAVITY, MOVER
 from train.simulate.run import kinds
@@ -116,3 +117,11 @@ class TestToppling:
         fallen = slide >= lies - 1e-12
         assert fallen.any()
         assert (slide[np.argmax(fallen) :] == lies).all()
+
+    def test_let_go_it_falls_back_onto_its_foot(self):
+        state = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4).state
+        mover = state.of(MOVER)
+        mover.slide, mover.speed, state.trial.y = 1e-6, 0.0, -0.1
+        each(np.array([topple.address]), state.trial.here)
+        assert (mover.slide.tolist(), mover.speed.tolist()) == ([0.0], [0.0])
+        assert (state.trial.loads == 0.0).all()
