@@ -200,6 +200,17 @@ class TestAskew:
     """Over the end of a foam block of 8 kPa, 0.1 m thick, against an elastic block of that size by
     finite elements (linear bricks of 8 mm, bonded behind, no friction, Poisson's ratio 0.1)."""
 
+    def test_a_face_that_goes_on_beyond_the_skin_has_no_end_there(self):
+        rising, falling = np.arange(4.0), -np.arange(4.0)
+        covered, begins, ends = np.ones(4), np.array([0.0, 1, 1, 1]), np.array([1.0, 1, 1, 0])
+
+        def askew(depth, weight):
+            return [lateral.askew_at(depth, weight, row, 0.5) for row in range(4)]
+
+        assert askew(rising, covered) == askew(falling, covered) == [0.0] * 4
+        assert (askew(rising, begins), askew(falling, begins)) == ([0.0] * 4, [0.0, 2.0, 0.0, 0.0])
+        assert (askew(rising, ends), askew(falling, ends)) == ([0.0, 0.0, 2.0, 0.0], [0.0] * 4)
+
     @pytest.mark.parametrize(
         ("degrees", "force", "depth_mm", "peak", "rows"),
         [
@@ -286,6 +297,15 @@ class TestBubbles:
         assert (alive[:3, ~burst] == 1.0).all()
         # Nothing bears there until it is pressed through the bubble's height.
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
+
+    def test_the_bed_s_law_is_of_the_springs_that_are_left(self):
+        state = self.wrap(pop_n=0.5, width_m=0.05).state
+        alive, weight = state.arrays["alive"][0], state.arrays["weight"][0]
+        assert sorted(set(weight.tolist()))[0] == 0.0
+        left = weight[:, None] * alive * state.arrays["stiffness"][0]
+        law = [state.arrays[name][0, -1] for name in ("slopes", "intercepts")]
+        want = [left.sum(), (left * state.arrays["gaps"][0]).sum()]
+        assert law == pytest.approx(want, rel=1e-12)
 
 
 def test_stems_bent_too_far_have_slipped_off():
