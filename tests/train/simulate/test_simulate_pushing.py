@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from train.simulate.compiled import each
+from train.simulate.effects import stribeck
 from train.simulate.effects.tipping import TIPPING, topple
 from train.simulate.engine import run_batch
 from train.simulate.motion import GRAVITY, MOVER
@@ -87,6 +88,13 @@ class TestSlope:
         angle = math.radians(1.0)
         force = MASS * GRAVITY * (0.2 * math.cos(angle) + math.sin(angle))
         assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.1)
+
+    def test_friction_falls_with_the_square_of_the_speed(self):
+        state = push(friction_static=0.6, friction_kinetic=0.2, stribeck_m_s=0.05).state
+        mover = state.of(MOVER)
+        mover.speed = 0.1
+        each(np.array([stribeck.ease.address]), state.trial.here)
+        assert mover.kinetic[0] == pytest.approx(0.2 + 0.4 * math.exp(-4.0), rel=1e-12)
 
 
 class TestToppling:

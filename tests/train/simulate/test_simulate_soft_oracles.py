@@ -13,7 +13,7 @@ from scipy.linalg import solve, toeplitz
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import base, contact
 from train.simulate.compiled import each
-from train.simulate.effects import lateral
+from train.simulate.effects import cover, lateral
 from train.simulate.reader import Value
 from train.simulate.viscous import BRANCHES
 
@@ -265,6 +265,17 @@ def test_a_sleeve_spreads_the_load_and_loses_none():
         total = batch.counts[0].sum(axis=(1, 2)) / 1000.0
         np.testing.assert_allclose(total, batch.force[0], atol=0.05)
     assert (covered.counts[0, -1] > 0).sum() > (plain.counts[0, -1] > 0).sum()
+
+
+def test_a_sleeve_gives_each_of_four_neighbours_its_part():
+    state = run(make(one_object(cover_n_m=2500.0, cover_spread=0.1))).state
+    image = state.arrays["image"][0]
+    image[:] = 0.0
+    image[5, 3] = 1.0
+    each(np.array([cover.spread.address]), state.trial.here[:1])
+    want = np.zeros_like(image)
+    want[5, 3], want[[4, 6], 3], want[5, [2, 4]] = 0.6, 0.1, 0.1
+    np.testing.assert_allclose(image, want, atol=1e-15)
 
 
 class TestBubbles:
