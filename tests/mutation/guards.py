@@ -6,53 +6,16 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from tests.mutation import runner, shapes
-
-
-@dataclass(frozen=True)
-class Guard:
-    """A guard and what is left without it.
-
-    Attributes:
-        keeps: what it keeps from happening.
-        stood: `file:function` where it stood when this was written; a hint, no condition.
-        shape: its code, as `shapes.find` takes it.
-        without: what takes its place.
-        case: a `-k` expression of the hard cases to ask first.
-        beside: a module whose tests are to be asked first.
-    """
-
-    keeps: str
-    stood: str
-    shape: str
-    without: str
-    case: str = ""
-    beside: str = ""
-
-    def job(self) -> runner.Job:
-        """The change, and the tests that are asked about it.
-
-        Raises:
-            LookupError: the guard is not found.
-        """
-        match = shapes.find(self.shape, self.stood)
-        first: list[tuple[str, ...]] = [(runner.HARD, "-k", self.case)] if self.case else []
-        if self.beside and (shapes.ROOT / runner.mirror(self.beside)).exists():
-            first.append((runner.mirror(self.beside),))
-        text = shapes.without(match, self.without)
-        return runner.Job(self.keeps, match.file, text, runner.stages(match.file, first))
-
+from tests.mutation import runner
+from tests.mutation.guard import Guard
+from tests.mutation.simulator_guards import SIMULATOR
 
 CONTACT, GRID = "edge/touch/contact.py", "edge/touch/grid.py"
 PIPELINE, PROJECTION = "train/pipeline.py", "train/projection.py"
 SCALING = "train/scaling.py"
 GRAPH, TRACK = "export/graph.py", "edge/touch/track.py"
 CROSSVAL, FEATURES, REGION = "train/crossval.py", "edge/touch/features.py", "edge/touch/region.py"
-TILT = "train/simulate/pivot_solver.py"
-ENERGY = "train/simulate/simulate_energy.py"
-"""Has no such module: its tests are asked about every effect."""
 
 GUARDS = (
     Guard(
@@ -400,101 +363,7 @@ GUARDS = (
         "self._spend(*made, each=each)",
         "pass",
     ),
-    Guard(
-        "the tilt's Newton steps are cut back",
-        f"{TILT}:search",
-        "size *= min(max(begin / (begin - end), 0.1), 0.9)",
-        "pass",
-        "tilt",
-    ),
-    Guard(
-        "the tilt's loads come from the side with more digits",
-        f"{TILT}:agree",
-        "force = (at.c11 * d0 - at.c01 * d1) / det",
-        "force = found[0]",
-        "tilt",
-    ),
-    Guard(
-        "what answers to speed only takes",
-        "train/simulate/viscous.py:move_on",
-        "decay * loads[b, line] - (1.0 - decay) * own.rise[b] * elastic",
-        "decay * loads[b, line] + (1.0 - decay) * own.rise[b] * elastic",
-        beside=ENERGY,
-    ),
-    Guard(
-        "the arm is as fast as it moved",
-        "train/simulate/effects/inertia.py:move",
-        "own.speed[j] = (t.q[j] - own.before[j]) / t.h",
-        "own.speed[j] = 1.02 * (t.q[j] - own.before[j]) / t.h",
-        beside=ENERGY,
-    ),
-    Guard(
-        "friction's pull is against the slip, on the arm",
-        "train/simulate/effects/friction.py:hold",
-        "t.q_free[j] -= t.give[j] * own.jacobian[j] * own.pull",
-        "t.q_free[j] += t.give[j] * own.jacobian[j] * own.pull",
-        beside=ENERGY,
-    ),
-    Guard(
-        "friction holds no more than the load lets it",
-        "train/simulate/effects/friction.py:hold",
-        "own.pull = min(max(stuck, least), most)",
-        "own.pull = stuck",
-        beside=ENERGY,
-    ),
-    Guard(
-        "the skin's shear cannot lift more than a thing weighs",
-        "train/simulate/effects/friction.py:weigh",
-        "mover_of(t).weight = max(own.weight - own.pull * t.along_face[2], 0.0)",
-        "mover_of(t).weight = own.weight - own.pull * t.along_face[2]",
-        beside=ENERGY,
-    ),
-    Guard(
-        "what slides has the mass of its step",
-        "train/simulate/motion.py:give_way",
-        "mover.speed + t.h / mover.inertia * (t.found[0] - drag)",
-        "mover.speed + 1.1 * t.h / mover.inertia * (t.found[0] - drag)",
-        beside=ENERGY,
-    ),
-    Guard(
-        "a lean stores what it gives back",
-        "train/simulate/effects/tipping.py:topple",
-        "own.force * (1.0 - mover.slide / own.travel)",
-        "own.force * (1.0 - 2.0 * mover.slide / own.travel)",
-        beside=ENERGY,
-    ),
-    Guard(
-        "a stem's damping is about where it is",
-        "train/simulate/effects/stems.py:bend",
-        "intercepts[s] = held_intercepts[s] + drag * t.depth[0]",
-        "intercepts[s] = held_intercepts[s] - drag * t.depth[0]",
-        beside=ENERGY,
-    ),
-    Guard(
-        "what was compiled with older sources is not found",
-        "train/simulate/compiled.py:record",
-        'np.dtype((np.record, [*named, (f"of_{SOURCES}", "i8")]))',
-        "np.dtype((np.record, named))",
-    ),
-    Guard(
-        "an arm of more joints than a record has room for is refused",
-        "train/simulate/arm.py:__init__",
-        "if chain.dof > JOINTS: ...",
-        "if False: ...",
-    ),
-    Guard(
-        "an object inside the arm is refused",
-        "train/simulate/engine.py:check_start",
-        "if held.any(): ...",
-        "if False: ...",
-    ),
-    Guard(
-        "energy out of nothing is refused",
-        "train/simulate/energy.py:check_energy",
-        "if i >= 0: ...",
-        "if False: ...",
-        beside=ENERGY,
-    ),
+    *SIMULATOR,
 )
 
 

@@ -11,6 +11,7 @@ from numba import njit
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate.compiled import Array
+from train.simulate.contact import total
 
 
 class Pose(NamedTuple):
@@ -173,11 +174,7 @@ def poses(
 
 def dot(a: Array, b: Array) -> Array:
     """Sum over the first axis, one term after the other: the same bits in any batch."""
-    product = a * b
-    whole: Array = product[0]
-    for term in product[1:]:
-        whole = whole + term
-    return whole
+    return total(a * b)
 
 
 def cross(a: Array, b: Array) -> Array:

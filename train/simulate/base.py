@@ -12,8 +12,9 @@ from edge.touch.arm import Chain
 from train.simulate import base_steps
 from train.simulate.arm import cross, dot
 from train.simulate.compiled import Array, addresses
-from train.simulate.contact import sort_bed, total
+from train.simulate.contact import covered, curve_gap, sort_bed, total
 from train.simulate.plan import Build
+from train.simulate.scene_model import Cylinder
 from train.simulate.state import Bed, State
 
 # Ranks within the stages; effects put themselves between.
@@ -125,6 +126,11 @@ WINDOW_HALF = 6
 cylinder has no more surface to press."""
 
 
+def beside(skin: Cylinder) -> int:
+    """How many columns to either side of the one that meets the object can touch."""
+    return min(WINDOW_HALF, (skin.cols - 1) // 2)
+
+
 def window(state: State) -> None:
     """The columns that can touch: their gaps R (1 - cos theta) at zero depth."""
     skin = state.skin
@@ -132,16 +138,15 @@ def window(state: State) -> None:
     away = angles - state.meeting_angle
     away = np.abs(away - 2.0 * math.pi * np.round(away / (2.0 * math.pi)))
     nearest = np.argmin(away, axis=0)
-    beside = min(WINDOW_HALF, (skin.cols - 1) // 2)
-    state.columns = (nearest + np.arange(-beside, beside + 1)[:, None]) % skin.cols
+    away_by = np.arange(-beside(skin), beside(skin) + 1)[:, None]
+    state.columns = (nearest + away_by) % skin.cols
     away = np.take_along_axis(away, state.columns, axis=0)
     state.column_gaps = skin.radius_m * (1.0 - np.cos(away))
     reach = np.where(away < 0.5 * math.pi, 1.0, 0.0)
-    # A narrow face ends among the columns; no face is narrower than a taxel.
+    # A narrow face ends among the columns.
     pitch = skin.radius_m * 2.0 * math.pi / skin.cols
-    half = 0.5 * np.maximum(state.values["breadth_m"], pitch)
     across = skin.radius_m * np.sin(away)
-    state.reach = reach * np.clip((half + 0.5 * pitch - across) / pitch, 0.0, 1.0)
+    state.reach = reach * covered(across, state.values["breadth_m"], pitch)
 
 
 FLAT_M = 1e6
@@ -155,23 +160,9 @@ def lay_bed(state: State) -> None:
     state.bed = Bed(
         gaps=state.column_gaps,
         stiffness=state.reach * state.taxel_k,
-        weight=covered(offset, state),
-        line_gap=curve_gap(offset, state) if curved else np.zeros((1, 1)),
+        weight=covered(offset, state.values["width_m"], state.skin.row_pitch_m),
+        line_gap=curve_gap(offset, state.values["radius_m"]) if curved else np.zeros((1, 1)),
     )
-
-
-def covered(offset: Array, state: State) -> Array:
-    """(L, n) which part of each row, `offset` metres from the face's middle, the face covers."""
-    pitch = state.skin.row_pitch_m
-    half = 0.5 * np.maximum(state.values["width_m"], pitch)
-    part: Array = np.clip((half + 0.5 * pitch - np.abs(offset)) / pitch, 0.0, 1.0)
-    return part
-
-
-def curve_gap(offset: Array, state: State) -> Array:
-    """(L, n) how far a face curved along the forearm has drawn back: l^2 / (2 r)."""
-    gap: Array = offset * offset / (2.0 * state.values["radius_m"])
-    return gap
 
 
 def order_bed(state: State) -> None:

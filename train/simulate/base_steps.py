@@ -6,17 +6,16 @@ from typing import Any
 
 from numba import njit
 
-from train.simulate.arm import pose_of
+from train.simulate.arm import WIDTH, pose_of
 from train.simulate.compiled import Array, call, matrix, vector
-from train.simulate.contact import closed_form, share_out, spring_loads
+from train.simulate.contact import add_up, closed_form, share_out, spring_loads
 from train.simulate.trial import compiled
 
 
 @njit(error_model="numpy")
 def pose(t: Any) -> None:
     """The arm's pose at its joints."""
-    table = matrix(t.chain, t.joints + 1, 16)
-    pose_of(table, t.q, t.origin, t.rotation, t.axes, t.origins)
+    pose_of(matrix(t.chain, t.joints + 1, WIDTH), t.q, t.origin, t.rotation, t.axes, t.origins)
 
 
 @njit(error_model="numpy")
@@ -30,17 +29,12 @@ def crossed(a: Array, b: Array, j: int) -> tuple[float, float, float]:
 
 
 @njit(error_model="numpy")
-def solved(t: Any) -> None:
-    """Let the plan's solver answer for `free` and `c`, in `found`."""
-    call(t.solve, t.here)
-
-
-@njit(error_model="numpy")
 def ask(t: Any, y0: float, c00: float) -> None:
-    """The same, of the contact as it is but for its depth and what gives way to a push."""
+    """Let the plan's solver answer, in `found`, for the contact as it is but for its depth and what
+    gives way to a push."""
     t.free[0], t.free[1] = y0, t.y[1]
     t.c[0], t.c[1], t.c[2] = c00, t.compliance[1], t.compliance[2]
-    solved(t)
+    call(t.solve, t.here)
 
 
 @compiled
@@ -76,6 +70,13 @@ def locate(t: Any) -> None:
     t.compliance[0] = compliance
 
 
+@njit(error_model="numpy")
+def equilibrium(t: Any, j: int, time: float) -> float:
+    """Joint j's equilibrium angle."""
+    angle: float = t.start[j] + t.rate[j] * min(time, t.travel_s[j])
+    return angle
+
+
 @compiled
 def predict(t: Any) -> None:
     """Where the arm would be after the step with no load on it.
@@ -85,8 +86,8 @@ def predict(t: Any) -> None:
     t.t += t.h
     first, second = 0.0, 0.0
     for j in range(t.joints):
-        target = t.start[j] + t.rate[j] * min(t.t, t.travel_s[j])
-        t.q_free[j] = (t.held[j] * t.q[j] + t.joint_k[j] * target) * t.give[j]
+        pulled = t.joint_k[j] * equilibrium(t, j, t.t)
+        t.q_free[j] = (t.held[j] * t.q[j] + pulled) * t.give[j]
         moved = t.q_free[j] - t.q_frame[j]
         first += t.jacobian[0, j] * moved
         second += t.jacobian[1, j] * moved
@@ -150,15 +151,29 @@ def bear(t: Any) -> None:
     deepest(t)
 
 
+@njit(error_model="numpy")
+def lay_law(t: Any, stiffness: int, slopes: int, intercepts: int) -> None:
+    """The law of springs that are in order, from their stiffness; all given by their addresses."""
+    size = t.law_lines
+    add_up(
+        vector(t.law_gaps, size),
+        vector(stiffness, size),
+        vector(slopes, size),
+        vector(intercepts, size),
+    )
+
+
+@njit(error_model="numpy")
+def bed_loads(t: Any, springs: int, loads: Array) -> None:
+    """The load of the first so many of each row's springs, into (rows, springs)."""
+    gaps, stiffness = vector(t.gaps, springs), vector(t.stiffness, springs)
+    depth, weight = vector(t.line_depth, t.rows), vector(t.weight, t.rows)
+    spring_loads(depth, gaps, stiffness, weight, loads)
+
+
 @compiled
 def image(t: Any) -> None:
     """The force shared out among taxels: (rows, columns) newtons."""
     loads = matrix(t.image, t.rows, t.columns)
-    spring_loads(
-        vector(t.line_depth, t.rows),
-        vector(t.gaps, t.columns),
-        vector(t.stiffness, t.columns),
-        vector(t.weight, t.rows),
-        loads,
-    )
+    bed_loads(t, t.columns, loads)
     share_out(t.force, loads)

@@ -47,7 +47,7 @@ def record(*fields: Any) -> np.dtype[Any]:
     return np.dtype((np.record, [*named, (f"of_{SOURCES}", "i8")]))
 
 
-def whole(*names: str) -> list[tuple[str, str]]:
+def integers(*names: str) -> list[tuple[str, str]]:
     """Fields of a record that are whole numbers: of things, or addresses."""
     return [(name, "i8") for name in names]
 

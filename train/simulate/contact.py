@@ -11,10 +11,28 @@ or (F, M); C = (c00,) or (c00, c01, c11) is what a unit load takes off y within 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from train.simulate.compiled import Array
+
+
+@register_jitable
+def covered(offset: Any, width: Any, pitch: Any) -> Any:
+    """Which part of a taxel of this pitch is covered by a face of this width, from whose middle it
+    lies `offset` away; no face is narrower than a taxel. All in metres, arrays or numbers."""
+    half = 0.5 * np.maximum(width, pitch)
+    inside = (half + 0.5 * pitch - np.abs(offset)) / pitch
+    return np.minimum(np.maximum(inside, 0.0), 1.0)
+
+
+@register_jitable
+def curve_gap(offset: Any, radius: Any) -> Any:
+    """How far a face curved along the forearm has drawn back: l^2 / (2 r)."""
+    return offset * offset / (2.0 * radius)
 
 
 def total(values: Array) -> Array:

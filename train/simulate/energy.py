@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from edge.errors import EdgeError
+from train.simulate.base_steps import equilibrium
 from train.simulate.compiled import Array
 from train.simulate.state import State
 
@@ -60,11 +61,11 @@ def first_made(
         for k in range(len(times)):
             stored, put_in = 0.0, 0.0
             for j in range(t.joints):
-                target = t.start[j] + t.rate[j] * min(times[k], t.travel_s[j])
+                target = equilibrium(t, j, times[k])
                 torque = t.joint_k[j] * (target - joints[i, k, j])
                 stored += 0.5 * torque * (target - joints[i, k, j])
                 if k > 0:
-                    earlier = t.start[j] + t.rate[j] * min(times[k - 1], t.travel_s[j])
+                    earlier = equilibrium(t, j, times[k - 1])
                     before = t.joint_k[j] * (earlier - joints[i, k - 1, j])
                     put_in += 0.5 * (torque + before) * (target - earlier)
                     turned = joints[i, k, j] - joints[i, k - 1, j]

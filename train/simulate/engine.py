@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
-from edge.touch.arm import Chain
 from train.simulate import streams
-from train.simulate.arm import Kinematics
 from train.simulate.assemble import make_plan
 from train.simulate.compiled import Array, each
 from train.simulate.energy import check_energy
@@ -120,15 +117,11 @@ def frame_count(scene: Scene) -> int:
     return round(duration * scene.trials["rate_hz"]) + 1
 
 
-@lru_cache(maxsize=8)
-def kinematics_of(arm: Chain) -> Kinematics:
-    """An arm's; a scene's batches all have the same."""
-    return Kinematics(arm)
-
-
-def whole_steps(scene: Scene, step_s: float) -> int:
-    """Steps of about this length that make a frame."""
-    return max(1, round(1.0 / (scene.trials["rate_hz"] * step_s)))
+def whole_steps(scene: Scene, step_s: float) -> tuple[int, float]:
+    """How many steps of about this length make a frame, and how long each then is."""
+    rate_hz = scene.trials["rate_hz"]
+    count = max(1, round(1.0 / (rate_hz * step_s)))
+    return count, 1.0 / (rate_hz * count)
 
 
 def begin(
@@ -142,7 +135,7 @@ def begin(
         n=len(trials),
         h=step_s,
         values=values,
-        kinematics=kinematics_of(scene.arm),
+        kinematics=scene.kinematics,
         solve=plan.solve.address,
     )
     for function in plan.setup:
@@ -214,9 +207,8 @@ def run_physics(
     """The physics of `run_batch`, with the same arguments."""
     values = values_of(scene, trials) if values is None else values
     frames = frame_count(scene)
-    rate_hz = scene.trials["rate_hz"]
-    substeps = whole_steps(scene, step_s)
-    state = begin(scene, plan, trials, 1.0 / (rate_hz * substeps), values)
+    substeps, step_s = whole_steps(scene, step_s)
+    state = begin(scene, plan, trials, step_s, values)
     check_start(state, plan)
     n, dof = len(trials), len(scene.stiffness)
     seen = SensorFrames(scene, plan, state, frames if images else 0)
@@ -235,7 +227,7 @@ def run_physics(
         traces,
     )
     check_found(state)
-    t = np.arange(frames) / rate_hz
+    t = np.arange(frames) / scene.trials["rate_hz"]
     check_energy(state, joints, t)
     kept = dict(zip(plan.traces, traces, strict=True))
     return PhysicsRun(frames=seen, t=t, joints=joints, force=force, traces=kept, state=state)
@@ -293,7 +285,8 @@ def readings(
     """
     state, frames = physics.state, physics.frames
     which = np.arange(state.n) if which is None else which
-    for some in np.split(which, range(READ_AT_ONCE, len(which), READ_AT_ONCE)):
+    for first in range(0, len(which), READ_AT_ONCE):
+        some = which[first : first + READ_AT_ONCE]
         seen = Readings(
             seed=state.scene.seed,
             which=some,

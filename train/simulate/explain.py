@@ -64,7 +64,7 @@ def spent_in(
         stage: tuple(map(around, getattr(plan, stage))) for stage in PYTHON_STAGES
     }
     run_batch(scene, trials, step_s, plan=replace(plan, **stages))
-    substeps = whole_steps(scene, step_s)
+    substeps, step_s = whole_steps(scene, step_s)
     state = begin(scene, plan, trials, step_s, values_of(scene, trials))
     where = state.trial.here
     one = {f: np.array([f.address]) for stage in RUN_STAGES for f in getattr(plan, stage)}

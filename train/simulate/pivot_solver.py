@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import njit
 
-from train.simulate.compiled import indices, matrix, vector, vectors, whole
+from train.simulate.compiled import indices, integers, matrix, vector, vectors
 from train.simulate.trial import Part
 
 ROUNDS = 8
@@ -33,18 +33,18 @@ PIVOT = Part(
     "tilt",
     # The springs by depth: how many, metres at which each is touched, newtons a metre, which of
     # the bed's it is; (rows, springs) of the bed's, 1 where one is not gone, if some can be.
-    *whole("springs", "gaps", "stiffness", "column", "alive"),
+    *integers("springs", "gaps", "stiffness", "column", "alive"),
     ("bursts", "?"),
     # The rows: the part that the face covers, metres by which it draws back there, metres from
     # the contact's middle, what answers to speed, if anything does; each row's stiffness and force.
-    *whole("rows", "weight", "line_gap", "lever", "load", "held", "out"),
+    *integers("rows", "weight", "line_gap", "lever", "load", "held", "out"),
     ("viscous", "?"),
     "gain",
     # What the arm does within the step, y = free - C (F, M).
     *("free0", "free1", "c00", "c01", "c11"),
     # Loads to begin with, rounds beyond the plain ones; the loads, and whether they were not found.
     *vectors(2, "guess", "settled"),
-    *whole("guarded_rounds"),
+    *integers("guarded_rounds"),
     *("force", "moment"),
     ("lost", "?"),
 )

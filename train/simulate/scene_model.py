@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
+from train.simulate.arm import Kinematics
 from train.simulate.reader import Value
 
 
@@ -94,6 +96,11 @@ class Scene:
     add: tuple[str, ...]
     leave_out: tuple[str, ...]
     settings: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """The arm's."""
+        return Kinematics(self.arm)
 
     @property
     def cylinder(self) -> Cylinder:

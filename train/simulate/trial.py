@@ -9,7 +9,7 @@ from numba import from_dtype, njit
 
 from train.simulate import compiled as tools
 from train.simulate.arm import JOINTS
-from train.simulate.compiled import record, vectors, whole
+from train.simulate.compiled import integers, record, vectors
 from train.simulate.schema import EFFECTS
 
 SLOTS = ("motion", "viscous", *EFFECTS)
@@ -18,14 +18,14 @@ SLOTS = ("motion", "viscous", *EFFECTS)
 POSE = (("rotation", 3), ("axes", JOINTS), ("origins", JOINTS))
 TRIAL = record(
     # Itself, for a function that calls another; the solver; each part's address.
-    *whole("here", "solve"),
+    *integers("here", "solve"),
     ("own", "i8", (len(SLOTS),)),
     # Its step, its time in seconds and how many frames have ended.
     *("h", "t", "frame", "rate_hz"),
     # The arm: the table of `arm.Kinematics`, and of each joint: the equilibrium point's start,
     # speed and time; what damping holds, the compliance of the whole and the spring in a step; its
     # angle now, after the step without load, and at the frame.
-    *whole("joints", "chain"),
+    *integers("joints", "chain"),
     *vectors(JOINTS, "start", "rate", "travel_s"),
     *vectors(JOINTS, "held", "give", "joint_k"),
     *vectors(JOINTS, "q", "q_free", "q_frame"),
@@ -38,7 +38,7 @@ TRIAL = record(
     *("z", "width_m", "face_radius_m", "skin_radius_m", "row_pitch_m"),
     # The contact's coordinates (`contact`): how many, where they are with no load in the step, at
     # the frame, and loaded; the loads; what they take off; the joints' part in them.
-    *whole("coordinates"),
+    *integers("coordinates"),
     *vectors(2, "y", "y_frame", "depth", "loads"),
     *vectors(3, "compliance"),
     ("jacobian", "f8", (2, JOINTS)),
@@ -48,14 +48,14 @@ TRIAL = record(
     "lost",
     # The bed: lines of springs, of which the first are the columns that can touch; its law, lines
     # K a - B by their gaps (`state.Bed`); a taxel's stiffness with what is in series with it.
-    *whole("rows", "lines", "columns", "springs", "law_lines"),
-    *whole("row_z", "weight", "line_gap", "line_depth"),
-    *whole("gaps", "stiffness", "alive", "column_gaps", "reach"),
-    *whole("law_gaps", "slopes", "intercepts"),
+    *integers("rows", "lines", "columns", "springs", "law_lines"),
+    *integers("row_z", "weight", "line_gap", "line_depth"),
+    *integers("gaps", "stiffness", "alive", "column_gaps", "reach"),
+    *integers("law_gaps", "slopes", "intercepts"),
     "taxel_k",
     # What a frame shows: the newtons borne, its deepest line, and (rows, columns) newtons a taxel.
     *("force", "deepest"),
-    *whole("image"),
+    *integers("image"),
 )
 """A trial. Whole numbers but those that count things are addresses of what has another length in
 each scene; `compiled.vector` and its like read it."""

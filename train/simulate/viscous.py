@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from train.simulate import base
-from train.simulate.compiled import Array, call, matrix, vector, vectors, whole
+from train.simulate.compiled import Array, call, integers, matrix, vector, vectors
 from train.simulate.pivot_solver import PIVOT, pivot_of
 from train.simulate.plan import Build
 from train.simulate.state import Rows, State
@@ -28,10 +28,10 @@ MOST = 2
 """Branches of a contact."""
 BRANCHES = Part(
     "viscous",
-    *whole("elastic", "count", "lines"),
+    *integers("elastic", "count", "lines"),
     *vectors(MOST, "decay", "rise"),
     "gain",
-    *whole("loads", "load"),
+    *integers("loads", "load"),
 )
 """The branches of a trial: the elastic law's solver; how many there are, and of how many lines;
 e and s of each; 1 + sum s; each branch's part of Z (MOST, lines), and Z (lines,)."""
@@ -97,7 +97,8 @@ def answer_to_speed(state: State) -> None:
 
 @compiled
 def relax_lines(t: Any) -> None:
-    """Each row's branches move on; a row that the face does not cover bears nothing."""
+    """Each row's branches move on, under what the step's last answer has it bear; a row that the
+    face does not cover bears nothing."""
     own, branches = pivot_of(t), branches_of(t)
     forces = vector(own.out, t.rows)
     for row in range(t.rows):

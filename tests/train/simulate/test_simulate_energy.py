@@ -74,8 +74,8 @@ class Ledger:
     def run(self, trials, step_s, meddle=None):
         """(n, frames) newtons of trials that run as the engine runs them, with every step booked;
         `meddle` changes the state after each."""
-        substeps, rate_hz = engine.whole_steps(self.scene, step_s), self.scene.trials["rate_hz"]
-        values, h = engine.values_of(self.scene, trials), 1.0 / (rate_hz * substeps)
+        substeps, h = engine.whole_steps(self.scene, step_s)
+        values = engine.values_of(self.scene, trials)
         state = engine.begin(self.scene, self.plan, trials, h, values)
         frame, step, sample = (self.plan.addresses(stage) for stage in RUN_STAGES)
         self.q, self.slide = state.q, np.zeros(state.n)

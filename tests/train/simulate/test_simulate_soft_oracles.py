@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import solve, toeplitz
 
 from tests.train.simulate.scenes import make, one_object, run
-from train.simulate import base, contact
+from train.simulate import contact
 from train.simulate.compiled import each
 from train.simulate.effects import cover, lateral
 from train.simulate.reader import Value
@@ -85,8 +84,8 @@ class TestBed:
         away = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
         stiffness = np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
         gaps = RADIUS * (1.0 - np.cos(away))
-        state = SimpleNamespace(values={"radius_m": np.array([curve or 1e6])})
-        depths, loads = (depth - base.curve_gap(z, state))[:, 0], np.zeros((rows, columns))
+        gap = contact.curve_gap(z, curve or 1e6)
+        depths, loads = (depth - gap)[:, 0], np.zeros((rows, columns))
         contact.spring_loads(depths, gaps, stiffness, np.ones(rows), loads)
         return loads.sum(), (loads > 0.0).sum() * pitch * row_pitch, rows * row_pitch
 

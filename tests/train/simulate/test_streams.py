@@ -14,6 +14,14 @@ def test_a_stream_is_the_same_on_every_machine():
     assert first.tolist() == streams.stream(1, "noise", "soft", 0).integers(0, 1 << 32, 3).tolist()
 
 
+@pytest.mark.parametrize("seed", [0, 2012, 2**32 + 7, 2**63 - 1])
+def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
+    words = (*streams.key("noise"), *streams.key("soft"), 5)
+    sequence = np.random.SeedSequence(seed, spawn_key=words)
+    want = np.random.Generator(np.random.PCG64(sequence)).random(4)
+    np.testing.assert_array_equal(streams.stream(seed, "noise", "soft", 5).random(4), want)
+
+
 @pytest.mark.parametrize(
     "other", [(2, "noise", "soft", 0), (1, "drift", "soft", 0), (1, "noise", "hard", 0),
               (1, "noise", "soft", 1), (1, "noise", "soft", None), (1, "soft", "noise", 0)]

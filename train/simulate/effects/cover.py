@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from train.simulate import base
-from train.simulate.compiled import matrix, whole
+from train.simulate.compiled import integers, matrix
 from train.simulate.plan import Build
 from train.simulate.state import State
 from train.simulate.trial import Part, compiled
 
-COVER = Part("cover", "spread", *whole("moved"))
+COVER = Part("cover", "spread", *integers("moved"))
 """The part of a taxel's load that each neighbour takes, and room for an image."""
 cover_of = COVER.of
 
@@ -26,7 +26,7 @@ def add(build: Build) -> None:
 def soften(state: State) -> None:
     """The sleeve in series with what is there."""
     state.taxel_k = 1.0 / (1.0 / state.taxel_k + 1.0 / state.values["cover_n_m"])
-    columns = min(2 * base.WINDOW_HALF + 1, 2 * ((state.skin.cols - 1) // 2) + 1)
+    columns = 2 * base.beside(state.skin) + 1
     moved = state.lend("covered", np.zeros((state.skin.rows, columns, state.n)))
     state.begin(COVER, spread=state.values["cover_spread"], moved=moved)
 

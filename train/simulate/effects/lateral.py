@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 
 from train.simulate import base, base_steps
-from train.simulate.compiled import Array, matrix, vector, whole
+from train.simulate.compiled import Array, integers, matrix, vector
 from train.simulate.contact import share_out
 from train.simulate.plan import Build
 from train.simulate.state import State
@@ -36,9 +36,8 @@ MARGIN = 0.19
 SPREAD = 0.55
 """The same of the load at first touch, which goes with a^2 as on a half space."""
 
-
 ROOM = ("borne", "wide", "ellipse", "askew")
-LATERAL = Part("lateral", "depth_m", "nearest", *whole(*ROOM))
+LATERAL = Part("lateral", "depth_m", "nearest", *integers(*ROOM))
 """The layer's thickness and the depth at which its first column is touched, in metres; room for
 four numbers a row."""
 lateral_of = LATERAL.of
@@ -74,10 +73,7 @@ def narrow(state: State) -> None:
         LATERAL,
         depth_m=depth,
         nearest=state.column_gaps.min(axis=0),
-        **{
-            name: state.lend(f"lateral_{name}", none)
-            for name in ("borne", "wide", "ellipse", "askew")
-        },
+        **{name: state.lend(f"lateral_{name}", none) for name in ROOM},
     )
 
 

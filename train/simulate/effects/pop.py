@@ -13,8 +13,9 @@ import numpy as np
 from numba import njit
 
 from train.simulate import base, base_steps
-from train.simulate.compiled import indices, matrix, vector, whole
-from train.simulate.contact import add_up, share_out, sort_bed, spring_loads
+from train.simulate.base_steps import bed_loads, lay_law
+from train.simulate.compiled import indices, integers, matrix, vector
+from train.simulate.contact import share_out, sort_bed
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 from train.simulate.trial import Part, compiled
@@ -25,8 +26,7 @@ BREAKS = (1.0 / 3.0, 2.0 / 3.0)
 """Depths at which they cross, as multiples of b."""
 SEGMENTS = len(SLOPES) + 1
 
-
-POP = Part("pop", "pop_n", ("in_order", "?"), *whole("order", "bears", "loads"))
+POP = Part("pop", "pop_n", ("in_order", "?"), *integers("order", "bears", "loads"))
 """The newtons that burst a bubble; whether the bed's law is asked for, as no pivoting forearm's
 solver asks the rows themselves; of all rows' springs by their gaps; room for a number of each,
 twice."""
@@ -98,12 +98,7 @@ def law(t: Any) -> None:
     for e in range(t.law_lines):
         row, spring = order[e] // t.springs, order[e] % t.springs
         bears[e] = weight[row] * (stiffness[spring] * alive[row, spring])
-    add_up(
-        vector(t.law_gaps, t.law_lines),
-        bears,
-        vector(t.slopes, t.law_lines),
-        vector(t.intercepts, t.law_lines),
-    )
+    lay_law(t, own.bears, t.slopes, t.intercepts)
 
 
 @compiled
@@ -112,13 +107,7 @@ def image(t: Any) -> None:
     own = pop_of(t)
     loads, alive = matrix(own.loads, t.rows, t.springs), matrix(t.alive, t.rows, t.springs)
     seen = matrix(t.image, t.rows, t.columns)
-    spring_loads(
-        vector(t.line_depth, t.rows),
-        vector(t.gaps, t.springs),
-        vector(t.stiffness, t.springs),
-        vector(t.weight, t.rows),
-        loads,
-    )
+    bed_loads(t, t.springs, loads)
     for row in range(t.rows):
         for s in range(t.springs):
             loads[row, s] *= alive[row, s]

@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit
 
 from train.simulate import base, base_steps, streams
-from train.simulate.compiled import indices, vector, whole
-from train.simulate.contact import add_up, sort_bed
+from train.simulate.base_steps import lay_law
+from train.simulate.compiled import indices, integers, vector
+from train.simulate.contact import sort_bed
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 from train.simulate.trial import Part, compiled
@@ -18,8 +19,8 @@ from train.simulate.trial import Part, compiled
 STEMS = Part(
     "stems",
     "slip_m",
-    *whole("taxel", "following", "part", "order", "damping"),
-    *whole("slopes", "intercepts", "sorted", "loads"),
+    *integers("taxel", "following", "part", "order", "damping"),
+    *integers("slopes", "intercepts", "sorted", "loads"),
 )
 """The bend in metres at which a stem slips off; of each stem: the positions in the window's image
 of the two rows it lies between, and the part of its load that the second bears; which stem is the
@@ -100,12 +101,7 @@ def law(t: Any) -> None:
     in_order = vector(own.sorted, t.lines)
     for s in range(t.lines):
         in_order[s] = weight[order[s]] * stiffness
-    add_up(
-        vector(t.law_gaps, t.lines),
-        in_order,
-        vector(own.slopes, t.lines),
-        vector(own.intercepts, t.lines),
-    )
+    lay_law(t, own.sorted, own.slopes, own.intercepts)
 
 
 @compiled

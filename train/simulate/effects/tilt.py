@@ -14,6 +14,7 @@ import numpy as np
 from train.simulate import base, base_steps
 from train.simulate.base_steps import crossed, deepest, pose
 from train.simulate.compiled import vector
+from train.simulate.contact import covered, curve_gap
 from train.simulate.pivot_solver import GUARDED_ROUNDS, PIVOT, pivot_of, search
 from train.simulate.plan import Build
 from train.simulate.state import State
@@ -75,12 +76,10 @@ def pivot(t: Any) -> None:
         across += turned[i, 2] * t.along_face[i]
     z = min(max(z, row_z[t.rows - 1]), row_z[0])
     upright = math.sqrt(1.0 - tilt * tilt)
-    half = 0.5 * max(t.width_m, t.row_pitch_m)
     for row in range(t.rows):
         on_face = from_middle + row_z[row] * across
-        inside = (half + 0.5 * t.row_pitch_m - abs(on_face)) / t.row_pitch_m
-        weight[row] = min(max(inside, 0.0), 1.0)
-        line_gap[row] = on_face * on_face / (2.0 * t.face_radius_m)
+        weight[row] = covered(on_face, t.width_m, t.row_pitch_m)
+        line_gap[row] = curve_gap(on_face, t.face_radius_m)
         lever[row] = row_z[row] - z
     depth = 0.0
     for i in range(3):

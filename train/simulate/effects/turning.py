@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from train.simulate import base
-from train.simulate.compiled import matrix, whole
+from train.simulate.compiled import integers, matrix
 from train.simulate.motion import MOVER, mover_of
 from train.simulate.plan import Build
 from train.simulate.state import State
@@ -25,7 +25,7 @@ from train.simulate.trial import Part, compiled
 LEVER = 2.0 / 3.0
 """Of a disc's radius: what its friction's moment is over its friction."""
 
-TURNING = Part("turning", "per_metre", "columns_per_radian", "turned", *whole("moved"))
+TURNING = Part("turning", "per_metre", "columns_per_radian", "turned", *integers("moved"))
 """Radians for each metre that it moves at the contact; columns of the whole skin in a radian;
 radians that it has turned; room for an image."""
 turning_of = TURNING.of
