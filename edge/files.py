@@ -118,7 +118,7 @@ def check_writable(folder: str | os.PathLike[str]) -> None:
         raise InputError(f"{os.fspath(folder)}: cannot be written: {reason}") from None
 
 
-def _name_free(temporary: str, target: Path) -> None:
+def _name_free(temporary: Path, target: Path) -> None:
     """Give a file a name that nobody else has taken, not even at this moment.
 
     Raises:
@@ -165,26 +165,20 @@ def write_whole(
     taken = NameTaken(f"{target}: exists already; choose another name or remove it")
     if not overwrite and target.exists():
         raise taken
-    temporary: str | None = None
+    # Not after the target's name, which may be as long as a name can be.
+    temporary = target.parent / f".edge-classify-{os.urandom(8).hex()}"
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        import tempfile  # most commands write nothing
-
-        # Not after the target's name, which may be as long as a name can be.
-        handle, temporary = tempfile.mkstemp(prefix=".edge-classify-", dir=target.parent)
-        with os.fdopen(handle, "wb") as file:
+        if not target.parent.is_dir():
+            target.parent.mkdir(parents=True, exist_ok=True)
+        with open(temporary, "xb") as file:
             yield file
             file.flush()
             if lasting:
                 os.fsync(file.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
         if overwrite:
             os.replace(temporary, target)
         else:
             _name_free(temporary, target)
-        temporary = None
         if lasting:
             _sync_folder(target.parent)
     except FileExistsError as error:
@@ -194,5 +188,5 @@ def write_whole(
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
     finally:
-        if temporary is not None and os.path.exists(temporary):
+        with suppress(OSError):  # it has its name, or could not be made
             os.unlink(temporary)

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from edge import npz
 from edge.config import parse_json, shown
 from edge.errors import InputError
 from edge.files import open_regular, parsing, write_whole
@@ -188,7 +189,7 @@ def _check(path: str, recording: Recording) -> None:
         )
     if not np.isfinite(t).all():
         fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
-    back = np.flatnonzero(np.diff(t) < 0)
+    back = np.flatnonzero(t[1:] < t[:-1])
     if back.size:
         fail(f"time goes back at frame {int(back[0]) + 1}; sort the frames or split the recording")
     if joints is not None:
@@ -199,11 +200,12 @@ def _check(path: str, recording: Recording) -> None:
             )
         if joints.shape[1] == 0:
             fail("joints have no column; leave them out where the arm is unknown")
-        known = np.isfinite(joints).all(axis=1) | np.isnan(joints).all(axis=1)
-        if not known.all():
+        unknown = np.isnan(joints)
+        odd = np.isinf(joints) | (unknown != unknown[:, :1])
+        if odd.any():
             fail(
-                f"a joint angle of frame {int(np.argmin(known))} is not finite; where the pose was "
-                "not known, all angles of a frame must be NaN"
+                f"a joint angle of frame {int(np.argmax(odd.any(axis=1)))} is not finite; where "
+                "the pose was not known, all angles of a frame must be NaN"
             )
     if valid is not None and (
         valid.dtype != np.bool_ or valid.shape not in ((rows, cols), (n, rows, cols))
@@ -395,11 +397,14 @@ def save_arrays(
         text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{os.fspath(path)}: meta cannot be written as JSON: {error}") from None
+    arrays = {"meta": np.array(text), **arrays}
+    if sum(array.nbytes for array in arrays.values()) > npz.LARGEST_BYTES:
+        raise InputError(f"{os.fspath(path)}: more than {npz.LARGEST_BYTES} bytes; split it")
     with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
         if compress:
-            np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
         else:
-            np.savez(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+            file.writelines(npz.pieces(arrays))
 
 
 def find(paths: list[str]) -> list[Path]:

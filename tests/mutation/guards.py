@@ -334,7 +334,7 @@ GUARDS = (
     Guard(
         "a recording's joint angles are finite",
         "edge/recording.py:_check",
-        "if not finite.all(): ...",
+        "if odd.any(): ...",
         "if False: ...",
         "NaN",
     ),
