@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +15,11 @@ from train.simulate.assemble import make_plan
 from train.simulate.compiled import Array, each
 from train.simulate.energy import check_energy
 from train.simulate.plan import RUN_STAGES, Plan
+from train.simulate.reader import Value
 from train.simulate.required_effects import required_effects
 from train.simulate.run_frames import run_frames
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
-from train.simulate.schema import SPREAD, STIFFNESSES
+from train.simulate.schema import STIFFNESSES
 from train.simulate.sensor_frames import SensorFrames
 from train.simulate.state import Readings, State
 
@@ -67,6 +68,17 @@ class Batch:
     state: State
 
 
+SCALED = {
+    "stiffness": STIFFNESSES,
+    "friction": ("friction_static", "friction_kinetic"),
+    "mass": ("mass_kg",),
+    "cover": ("taxel_n_m", "cover_n_m"),
+}
+"""{spread: the values it is a part of}; any other is added to the value of its own name."""
+PLACED = dict.fromkeys(("place_m", "yaw_deg", "roll_deg"), Value(0.0, 0.0))
+"""What an object is not asked for."""
+
+
 def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
     """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
 
@@ -76,38 +88,37 @@ def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
     for i, trial in enumerate(trials):
         groups.setdefault((trial.key, trial.attempt), []).append(i)
     out: dict[str, Array] = {}
-    for (key, attempt), members in groups.items():
+    for members in groups.values():
         where = np.array(members)
-        numbers = np.array([trials[i].number for i in members], dtype=np.int64)
-        item = trials[members[0]].object
+        for name, drawn in _values(scene, [trials[i] for i in members]).items():
+            if name not in out:
+                out[name] = np.full(len(trials), np.nan)
+            out[name][where] = drawn
+    return out
 
-        def draw(name: str, kind: str, attempt: int = attempt, rest: Any = (key, numbers)) -> Array:
-            again = f".{attempt}" if attempt else ""
-            return streams.draws(scene.seed, name + again, rest[0], rest[1], kind)
 
-        def spread(name: str, draw: Callable[[str, str], Array] = draw) -> Any:
-            amount = scene.spread[name]
-            return 0.0 if amount == 0.0 else amount * draw(f"spread.{name}", "normal")
+def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
+    """Those of trials that share their streams: an object's in one condition, drawn as often."""
+    first, numbers = trials[0], np.array([trial.number for trial in trials])
+    values = {**first.object.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m, **PLACED}
+    out: dict[str, Any] = {name: value.low for name, value in values.items()}
 
-        own = {**item.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m}
-        for name, value in own.items():
-            drawn: Any = value.low
-            if value.varies:
-                drawn = value.low + (value.high - value.low) * draw(f"value.{name}", "uniform")
-            if name in STIFFNESSES:
-                drawn = drawn * np.exp(spread("stiffness"))
-            elif name in ("friction_static", "friction_kinetic"):
-                drawn = drawn * np.exp(spread("friction"))
-            elif name == "mass_kg":
-                drawn = drawn * np.exp(spread("mass"))
-            elif name in ("aside_m", "slope_deg"):
-                drawn = drawn + spread(name)
-            elif name in ("taxel_n_m", "cover_n_m"):
-                drawn = drawn * np.exp(spread("cover"))
-            out.setdefault(name, np.full(len(trials), np.nan))[where] = drawn
-        for name in SPREAD:
-            if name in ("place_m", "yaw_deg", "roll_deg"):
-                out.setdefault(name, np.full(len(trials), np.nan))[where] = spread(name)
+    def draws(what: str, names: list[str], kind: str) -> Iterator[tuple[str, Array]]:
+        again = f".{first.attempt}" if first.attempt else ""
+        streamed = [f"{what}.{name}{again}" for name in names]
+        found = streams.draws(scene.seed, streamed, first.key, numbers, kind)
+        return zip(names, found, strict=True)
+
+    for name, part in draws("value", [n for n, v in values.items() if v.varies], "uniform"):
+        out[name] = out[name] + (values[name].high - values[name].low) * part
+    spreads = [name for name, deviation in scene.spread.items() if deviation]
+    for spread, away in draws("spread", spreads, "normal"):
+        away *= scene.spread[spread]
+        if spread in out:
+            out[spread] = out[spread] + away
+        for name in SCALED.get(spread, ()):
+            if name in out:
+                out[name] = out[name] * np.exp(away)
     return out
 
 

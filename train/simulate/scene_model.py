@@ -22,7 +22,7 @@ class SceneObject:
     given: frozenset[str]
     """Keys that the file gives; the others are the family's."""
 
-    @property
+    @cached_property
     def slug(self) -> str:
         """The name, fit for a file."""
         return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())

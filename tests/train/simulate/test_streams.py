@@ -20,6 +20,9 @@ def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
     sequence = np.random.SeedSequence(seed, spawn_key=words)
     want = np.random.Generator(np.random.PCG64(sequence)).random(4)
     np.testing.assert_array_equal(streams.stream(seed, "noise", "soft", 5).random(4), want)
+    sequence = np.random.SeedSequence(seed, spawn_key=words[:-1])
+    want = np.random.Generator(np.random.PCG64(sequence)).random(4)
+    np.testing.assert_array_equal(streams.stream(seed, "noise", "soft").random(4), want)
 
 
 @pytest.mark.parametrize(
@@ -33,14 +36,18 @@ def test_seed_name_condition_and_trial_each_give_another_stream(other):
 
 @pytest.mark.parametrize("kind", ["uniform", "normal"])
 def test_a_trial_s_draw_does_not_hang_on_the_trials_beside_it(kind):
-    every = streams.draws(3, "place", "soft", np.arange(50), kind)
+    every = streams.draws(3, ["yaw", "place"], "soft", np.arange(50), kind)
     some = np.array([7, 2, 31])
-    np.testing.assert_array_equal(streams.draws(3, "place", "soft", some, kind), every[some])
+    alone = streams.draws(3, ["place"], "soft", some, kind)
+    np.testing.assert_array_equal(alone, every[1:, some])
     if kind == "uniform":
+        np.testing.assert_array_equal(every[0], streams.stream(3, "yaw", "soft").random(50))
         assert (every >= 0.0).all()
         assert (every < 1.0).all()
     else:
-        assert np.abs(streams.draws(3, "p", "s", np.arange(10_000), kind)).max() == 2.5
+        want = np.clip(streams.stream(3, "yaw", "soft").standard_normal(50), -2.5, 2.5)
+        np.testing.assert_array_equal(every[0], want)
+        assert np.abs(streams.draws(3, ["p"], "s", np.arange(10_000), kind)).max() == 2.5
 
 
 def test_noise_is_normal_and_each_number_takes_two_bytes():
