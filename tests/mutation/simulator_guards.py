@@ -26,8 +26,8 @@ SIMULATOR = (
     Guard(
         "what answers to speed only takes",
         "train/simulate/viscous.py:move_on",
-        "decay * loads[b, line] - (1.0 - decay) * own.rise[b] * elastic",
-        "decay * loads[b, line] + (1.0 - decay) * own.rise[b] * elastic",
+        "own.kept * given[line] + own.late * force[line] + own.let_go * elastic",
+        "own.kept * given[line] - own.late * force[line] - own.let_go * elastic",
         beside=ENERGY,
     ),
     Guard(

@@ -35,6 +35,7 @@ def add(build: Build) -> None:
     build.put("setup", BED, lay_bed)
     build.put("setup", ORDER, order_bed)
     build.put("setup", HAND_OVER, hand_over)
+    build.put("tune", LOCATE, base_steps.tune)
     build.put("frame", LOCATE, base_steps.locate)
     build.put("step", PREDICT, base_steps.predict)
     build.put("step", PRESS, base_steps.press)
@@ -76,9 +77,7 @@ def swing(state: State) -> None:
     moves = state.rate != 0.0
     reached = np.where(moves, way / np.where(moves, np.abs(state.rate), 1.0), np.inf)
     state.travel_s = np.minimum(scene.travel_s, reached)
-    state.held = d / state.h
-    state.give = 1.0 / (d / state.h + k)
-    state.joint_k = k
+    state.damping, state.joint_k = d, k
     state.lag = d / k * state.rate
     state.q = equilibrium(state, 0.0) - state.lag
 
@@ -182,6 +181,7 @@ def hand_over(state: State) -> None:
     """Give each trial's record what the setup has found; from here on it is the trial."""
     skin, bed, values, n = state.skin, state.bed, state.values, state.n
     dof, lines, columns = len(state.q), len(bed.weight), len(state.columns)
+    rate_hz = state.scene.trials["rate_hz"]
     of_rows = {
         "row_z": np.broadcast_to(state.row_z, (skin.rows, n)),
         "weight": bed.weight,
@@ -197,8 +197,9 @@ def hand_over(state: State) -> None:
         "image": np.zeros((skin.rows, columns, n)),
     }
     numbers = {
-        "h": state.h,
-        "rate_hz": state.scene.trials["rate_hz"],
+        "steps": state.steps,
+        "h": 1.0 / (rate_hz * state.steps),
+        "rate_hz": rate_hz,
         "joints": dof,
         "chain": addresses(state.kinematics.table)[0],
         "z": state.z,
@@ -218,6 +219,6 @@ def hand_over(state: State) -> None:
     trial = state.records
     for name, value in numbers.items():
         trial[name] = value
-    for name in ("start", "rate", "travel_s", "held", "give", "joint_k", "q"):
+    for name in ("start", "rate", "travel_s", "damping", "joint_k", "q"):
         trial[name][:, :dof] = np.broadcast_to(getattr(state, name), (dof, n)).T
     trial["coordinates"] = np.maximum(trial["coordinates"], 1)

@@ -50,6 +50,14 @@ def solve(t: Any) -> None:
 
 
 @compiled
+def tune(t: Any) -> None:
+    """What holds each joint in a step of this length."""
+    for j in range(t.joints):
+        t.held[j] = t.damping[j] / t.h
+        t.give[j] = 1.0 / (t.held[j] + t.joint_k[j])
+
+
+@compiled
 def locate(t: Any) -> None:
     """Depth, its Jacobian and what the step's loads take off it, at the frame's joint angles."""
     pose(t)

@@ -128,29 +128,23 @@ def frame_count(scene: Scene) -> int:
     return round(duration * scene.trials["rate_hz"]) + 1
 
 
-def whole_steps(scene: Scene, step_s: float) -> tuple[int, float]:
-    """How many steps of about this length make a frame, and how long each then is."""
-    rate_hz = scene.trials["rate_hz"]
-    count = max(1, round(1.0 / (rate_hz * step_s)))
-    return count, 1.0 / (rate_hz * count)
-
-
 def begin(
     scene: Scene, plan: Plan, trials: tuple[TrialSpec, ...], step_s: float, values: dict[str, Array]
 ) -> State:
-    """The state of a batch before its first step."""
+    """The state of a batch before its first step; a whole number of steps makes a frame."""
     state = State(
         scene=scene,
         skin=scene.cylinder,
         trials=trials,
         n=len(trials),
-        h=step_s,
+        steps=max(1, round(1.0 / (scene.trials["rate_hz"] * step_s))),
         values=values,
         kinematics=scene.kinematics,
         solve=plan.solve.address,
     )
     for function in plan.setup:
         function(state)
+    each(plan.addresses("tune"), state.trial.here)
     return state
 
 
@@ -218,7 +212,6 @@ def run_physics(
     """The physics of `run_batch`, with the same arguments."""
     values = values_of(scene, trials) if values is None else values
     frames = frame_count(scene)
-    substeps, step_s = whole_steps(scene, step_s)
     state = begin(scene, plan, trials, step_s, values)
     check_start(state, plan)
     n, dof = len(trials), len(scene.stiffness)
@@ -228,7 +221,6 @@ def run_physics(
     run_frames(
         state.records,
         tuple(plan.addresses(stage) for stage in RUN_STAGES),
-        substeps,
         joints,
         force,
         seen.window,

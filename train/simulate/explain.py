@@ -8,14 +8,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from train.simulate.assemble import make_plan
 from train.simulate.compiled import each
 from train.simulate.convergence import Convergence, measure
-from train.simulate.engine import begin, frame_count, kind_of, run_batch, values_of, whole_steps
-from train.simulate.plan import PYTHON_STAGES, RUN_STAGES, STAGES, Plan
+from train.simulate.engine import begin, frame_count, kind_of, run_batch, values_of
+from train.simulate.plan import PYTHON_STAGES, STAGES, Plan
 from train.simulate.required_effects import required_effects
 from train.simulate.run import kinds, steps
+from train.simulate.run_frames import set_paces
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
 
@@ -64,20 +66,28 @@ def spent_in(
         stage: tuple(map(around, getattr(plan, stage))) for stage in PYTHON_STAGES
     }
     run_batch(scene, trials, step_s, plan=replace(plan, **stages))
-    substeps, step_s = whole_steps(scene, step_s)
     state = begin(scene, plan, trials, step_s, values_of(scene, trials))
-    where = state.trial.here
-    one = {f: np.array([f.address]) for stage in RUN_STAGES for f in getattr(plan, stage)}
     solve = np.array([plan.solve.address])
-    for _ in range(1, frame_count(scene)):
-        for function in (*plan.frame, *substeps * plan.step, *plan.sample):
-            took = timed(each, one[function], where)
+    pace, tune = plan.addresses("pace"), plan.addresses("tune")
+
+    def charge(stage: str, some: NDArray[np.int64]) -> None:
+        for function in getattr(plan, stage):
+            took = timed(each, np.array([function.address]), some)
             if function is plan.press:
                 # It is the solver that takes the time, and once more does no harm.
-                solved = min(timed(each, solve, where), took)
+                solved = min(timed(each, solve, some), took)
                 spent[plan.owners[plan.solve]] += solved
                 took -= solved
             spent[plan.owners[function]] += took
+
+    for _ in range(1, frame_count(scene)):
+        for function in plan.pace:
+            spent[plan.owners[function]] += timed(set_paces, state.records, pace, tune)
+        where, in_frame = state.trial.here, state.trial.steps
+        charge("frame", where)
+        for k in range(in_frame.max()):
+            charge("step", where[in_frame > k])
+        charge("sample", where)
     return spent
 
 

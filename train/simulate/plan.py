@@ -21,8 +21,9 @@ Compiled = Any
 Trace = tuple[Part | None, str]
 """A field of an effect's own part of a trial, or of the trial itself."""
 
-RUN_STAGES = ("frame", "step", "sample")
-"""Compiled: once a frame before its steps; each step; once a frame after its steps."""
+RUN_STAGES = ("pace", "tune", "frame", "step", "sample")
+"""Compiled: what chooses a frame's steps; what depends on their length, whenever it changes; once a
+frame before its steps; each step; once a frame after its steps."""
 PHYSICS_STAGES = ("setup", *RUN_STAGES)
 """The setup runs once a batch."""
 SENSOR_STAGES = ("clock", "sensor")
@@ -37,6 +38,8 @@ class Plan:
 
     effects: tuple[str, ...]
     setup: tuple[SetupFunction, ...]
+    pace: tuple[Compiled, ...]
+    tune: tuple[Compiled, ...]
     frame: tuple[Compiled, ...]
     step: tuple[Compiled, ...]
     sample: tuple[Compiled, ...]
@@ -120,6 +123,8 @@ class Build:
         return Plan(
             effects=self.effects,
             setup=stage("setup"),
+            pace=stage("pace"),
+            tune=stage("tune"),
             frame=stage("frame"),
             step=stage("step"),
             sample=stage("sample"),

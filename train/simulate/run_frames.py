@@ -26,11 +26,29 @@ def show(t: Any, seen: NDArray[Any], scale: float, whole: bool) -> None:
             seen[row, column] = min(counts, FULL)
 
 
+@njit(error_model="numpy")
+def set_pace(t: Any, pace: NDArray[np.int64], tune: NDArray[np.int64]) -> None:
+    """Choose the steps of the trial's next frame."""
+    before = t.steps
+    for function in pace:
+        call(function, t.here)
+    if t.steps != before:
+        t.h = 1.0 / (t.rate_hz * t.steps)
+        for function in tune:
+            call(function, t.here)
+
+
+@njit(cache=True, error_model="numpy")
+def set_paces(trials: NDArray[Any], pace: NDArray[np.int64], tune: NDArray[np.int64]) -> None:
+    """The same of trials that run side by side."""
+    for i in range(len(trials)):
+        set_pace(trials[i], pace, tune)
+
+
 @njit(cache=True, error_model="numpy")
 def run_frames(
     trials: NDArray[Any],
     stages: tuple[NDArray[np.int64], ...],
-    substeps: int,
     joints: Array,
     force: Array,
     window: NDArray[Any],
@@ -43,7 +61,7 @@ def run_frames(
 
     Args:
         trials: (n,) records.
-        stages: addresses of the functions of a frame, of a step and of what follows the steps.
+        stages: addresses of the functions of each stage of `plan.RUN_STAGES`.
         joints, force: (n, frames, dof) and (n, frames), to be filled.
         window: (n, frames, rows, columns) counts, to be filled where a load is borne; of no
             frames, where no images are asked for.
@@ -52,15 +70,16 @@ def run_frames(
         traced: (quantities, n) addresses of what is kept of each frame, in `traces`
             (quantities, n, frames).
     """
-    frame, step, sample = stages
+    pace, tune, frame, step, sample = stages
     for i in range(len(trials)):
         t = trials[i]
         for j in range(t.joints):
             joints[i, 0, j] = t.q[j]
         for k in range(1, force.shape[1]):
+            set_pace(t, pace, tune)
             for function in frame:
                 call(function, t.here)
-            for _ in range(substeps):
+            for _ in range(t.steps):
                 for function in step:
                     call(function, t.here)
             for function in sample:

@@ -150,7 +150,7 @@ EFFECTS: dict[str, EffectInfo] = {
         "bubbles: the gas law, no stiffness after the burst", "contact", 2, families=(BUBBLES,)
     ),
     "stems": EffectInfo(
-        "foliage: stems that bend, damp and slip off", "contact", 1, families=(FOLIAGE,)
+        "foliage: stems that bend, damp and slip off", "contact", 2, families=(FOLIAGE,)
     ),
     "tilt": EffectInfo(
         "the forearm pivots about the contact",
@@ -162,7 +162,7 @@ EFFECTS: dict[str, EffectInfo] = {
     "inertia": EffectInfo(
         "the arm's inertia: it hits, lifts off and comes down again",
         "contact",
-        4,
+        7,
         {"loss_s": Field(0.0, 1.0, 0.0015, "the skin's dashpot, as a part of its stiffness")},
     ),
     "friction": EffectInfo(

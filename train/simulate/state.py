@@ -48,7 +48,7 @@ class State:
     is from its first step to its last stands in its record: `trial` has those of all.
 
     Attributes:
-        h: seconds, the step.
+        steps: of a frame.
         values: {name: (n,)} of what was drawn for each trial.
         solve: address of the compiled function that answers for the contact.
         records: (n,) of `TRIAL`; `here`, `own` and `solve` are set from the beginning.
@@ -58,8 +58,7 @@ class State:
         start, rate: (dof, n) and (dof, 1), the equilibrium point at t = 0 and its speed.
         lag: (dof, 1) radians by which a joint trails its equilibrium point in free motion.
         travel_s: (dof, n) seconds for which the equilibrium point moves.
-        held, give, joint_k: (dof, 1) of a joint's step: what damping holds, the compliance
-            of the whole, the spring.
+        damping, joint_k: (dof, 1) of each joint.
         q: (dof, n) radians, before the first step.
         row_z: (rows, 1) metres in the skin's link, of its rows.
         z: (n,) the same of what meets the object.
@@ -75,7 +74,7 @@ class State:
     skin: Cylinder
     trials: tuple[TrialSpec, ...]
     n: int
-    h: float | Array
+    steps: int
     values: dict[str, Array]
     kinematics: Kinematics
     solve: int
@@ -88,8 +87,7 @@ class State:
     start: Array = field(init=False)
     lag: Array = field(init=False)
     rate: Array = field(init=False)
-    held: Array = field(init=False)
-    give: Array = field(init=False)
+    damping: Array = field(init=False)
     joint_k: Array = field(init=False)
     q: Array = field(init=False)
 

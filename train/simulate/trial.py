@@ -20,14 +20,16 @@ TRIAL = record(
     # Itself, for a function that calls another; the solver; each part's address.
     *integers("here", "solve"),
     ("own", "i8", (len(SLOTS),)),
-    # Its step, its time in seconds and how many frames have ended.
+    # How many steps its frame has and how long each is, its time in seconds, and how many frames
+    # have ended.
+    *integers("steps"),
     *("h", "t", "frame", "rate_hz"),
     # The arm: the table of `arm.Kinematics`, and of each joint: the equilibrium point's start,
-    # speed and time; what damping holds, the compliance of the whole and the spring in a step; its
-    # angle now, after the step without load, and at the frame.
+    # speed and time; its damping and spring; what holds it in a step, and the compliance of all;
+    # its angle now, after the step without load, and at the frame.
     *integers("joints", "chain"),
     *vectors(JOINTS, "start", "rate", "travel_s"),
-    *vectors(JOINTS, "held", "give", "joint_k"),
+    *vectors(JOINTS, "damping", "joint_k", "held", "give"),
     *vectors(JOINTS, "q", "q_free", "q_frame"),
     # Its pose, as of `arm.Pose`.
     *vectors(3, "origin"),

@@ -1,121 +1,152 @@
-"""Forces that answer to speed: Maxwell elements beside the elastic law of a contact.
+"""Forces that answer to speed: a Maxwell element and a dashpot beside a contact's elastic law.
 
-Beside the elastic force F_e each branch b adds z_b with z_b' = -z_b / tau_b + r_b dF_e/dt. A
-step is the exact answer to a ramp of F_e within it, stable for any tau:
-z+ = e z + s (F_e+ - F_e) with e = exp(-h / tau) and s = r (1 - e) tau / h, so that
-F+ = (1 + sum s) F_e+ + Z with Z = sum(e z - s F_e). As F_e is never negative, neither is Z ever
-positive: the law stays convex, its solvers hold, and no step can make energy.
+Beside the elastic force F a Maxwell element (Zener's) adds z with z' = -z / tau + r dF/dt, and a
+dashpot adds T dF/dt. Of F the element's own dashpot has let go of w = r F - z. A step is the exact
+answer to a ramp of F within it, stable for any tau: with e = exp(-h / tau) and
+s = r (1 - e) tau / h,
 
-Where the forearm pivots, each of the skin's rows has branches of its own; elsewhere one set
-stands for the whole contact.
+    z+ = e z + s (F+ - F),    w+ = e w + (s - e r) F + (r - s) F+,
+
+so the whole is (1 + s + T / h) F+ - L with L = e w + (s - e r + T / h) F. No term of w or L is
+negative: the law stays convex, its solvers hold, no step can make energy, and nothing but the step
+itself depends on its length.
+
+Where the forearm pivots, each of the skin's rows has its own; elsewhere one stands for the whole
+contact.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from train.simulate import base
-from train.simulate.compiled import Array, call, integers, matrix, vector, vectors
+from train.simulate.compiled import call, integers, vector
 from train.simulate.pivot_solver import PIVOT, pivot_of
 from train.simulate.plan import Build
-from train.simulate.state import Rows, State
+from train.simulate.state import State
 from train.simulate.trial import Part, compiled
 
-MOST = 2
-"""Branches of a contact."""
-BRANCHES = Part(
+VISCOUS = Part(
     "viscous",
-    *integers("elastic", "count", "lines"),
-    *vectors(MOST, "decay", "rise"),
-    "gain",
-    *integers("loads", "load"),
+    # The elastic law's solver; how many lines; T; r and tau, or zeros.
+    *integers("elastic", "lines"),
+    *("loss_s", "ratio", "relax_s"),
+    # Of a step: e, r - s, s - e r, T / h, and the whole's 1 + s + T / h.
+    *("kept", "let_go", "late", "damped", "gain"),
+    # Of each line: F, w, and -L.
+    *integers("force", "given", "load"),
 )
-"""The branches of a trial: the elastic law's solver; how many there are, and of how many lines;
-e and s of each; 1 + sum s; each branch's part of Z (MOST, lines), and Z (lines,)."""
-branches_of = BRANCHES.of
+"""What answers to speed in a trial's contact."""
+viscous_of = VISCOUS.of
 
 RANK = base.ORDER + 30
-"""In the setup, where the branches begin; effects let them `grow` right after."""
+"""In the setup, where the element and the dashpot begin; effects set theirs right after."""
 
 
 def add(build: Build) -> None:
     """Let the contact answer to speed; the second effect that asks finds it done."""
-    if BRANCHES in build.parts:
+    if VISCOUS in build.parts:
         return
-    build.parts.add(BRANCHES)
+    build.parts.add(VISCOUS)
     by_line = "tilt" in build.effects
     elastic = build.solve.address
 
     def begin(state: State) -> None:
-        """No branch yet, of the whole contact or of any row."""
+        """No element yet, nor a dashpot, of the whole contact or of any row."""
         lines = state.skin.rows if by_line else 1
         none = np.zeros((lines, state.n))
-        load = state.lend("branch", none)
-        loads = state.lend("branches", np.zeros((MOST, *none.shape)))
-        state.begin(BRANCHES, elastic=elastic, lines=lines, gain=1.0, loads=loads, load=load)
+        lent = {name: state.lend(f"viscous_{name}", none) for name in ("force", "given", "load")}
+        state.begin(VISCOUS, elastic=elastic, lines=lines, **lent)
 
     build.put("setup", RANK, begin)
     if by_line:
         build.put("setup", RANK + 9, answer_to_speed)
+        build.put("tune", RANK, tune_lines)
         build.put("step", base.SETTLE + 10, relax_lines)
     else:
         build.wrap(solve)
+        build.put("tune", RANK, tune)
         build.put("step", base.SETTLE + 10, relax)
 
 
-def grow(branches: Rows, decay: Array, rise: Array) -> None:
-    """One more branch, with e and s (n,)."""
-    i = int(branches.count[0])
-    branches.decay[:, i], branches.rise[:, i] = decay, rise
-    branches.gain += rise
-    branches.count += 1
+def answer_to_speed(state: State) -> None:
+    """The rows bear what theirs do, too."""
+    own = state.of(PIVOT)
+    own.viscous, own.load = True, state.of(VISCOUS).load
 
 
 @njit(error_model="numpy")
-def move_on(own: Any, line: int, force: float) -> None:
-    """What a step's force on a line leaves behind for the next.
+def in_steps(own: Any, h: float) -> None:
+    """What a step of this length comes to."""
+    own.damped, rise, own.kept = own.loss_s / h, 0.0, 0.0
+    if own.ratio > 0.0:
+        part = h / own.relax_s
+        own.kept, rise = math.exp(-part), own.ratio * (-math.expm1(-part) / part)
+    own.gain = 1.0 + rise + own.damped
+    own.let_go, own.late = own.ratio - rise, rise - own.kept * own.ratio
+    for line in range(own.lines):
+        bear_on(own, line)
 
-    Where nothing is borne the surface comes back by itself: there (1 + sum s) F_e = -Z.
+
+@njit(error_model="numpy")
+def bear_on(own: Any, line: int) -> None:
+    """What is there of a line's next load already."""
+    force, given = vector(own.force, own.lines)[line], vector(own.given, own.lines)[line]
+    load = vector(own.load, own.lines)
+    load[line] = -(own.kept * given + (own.late + own.damped) * force)
+
+
+@njit(error_model="numpy")
+def move_on(own: Any, line: int, whole: float) -> None:
+    """What a step's load on a line leaves behind for the next.
+
+    Where nothing is borne the surface comes back by itself: there gain F = L.
     """
-    load, loads = vector(own.load, own.lines), matrix(own.loads, MOST, own.lines)
-    elastic = max((force - load[line]) / own.gain, 0.0)
-    load[line] = 0.0
-    for b in range(own.count):
-        decay = own.decay[b]
-        loads[b, line] = decay * loads[b, line] - (1.0 - decay) * own.rise[b] * elastic
-        load[line] += loads[b, line]
+    force, given = vector(own.force, own.lines), vector(own.given, own.lines)
+    elastic = max((whole - vector(own.load, own.lines)[line]) / own.gain, 0.0)
+    given[line] = own.kept * given[line] + own.late * force[line] + own.let_go * elastic
+    force[line] = elastic
+    bear_on(own, line)
 
 
-def answer_to_speed(state: State) -> None:
-    """The rows bear what their branches do, too."""
-    own, branches = state.of(PIVOT), state.of(BRANCHES)
-    own.viscous, own.gain, own.load = True, branches.gain, branches.load
+@compiled
+def tune(t: Any) -> None:
+    """The whole contact's law in steps of this length."""
+    in_steps(viscous_of(t), t.h)
+
+
+@compiled
+def tune_lines(t: Any) -> None:
+    """The rows' law in steps of this length."""
+    own = viscous_of(t)
+    in_steps(own, t.h)
+    pivot_of(t).gain = own.gain
 
 
 @compiled
 def relax_lines(t: Any) -> None:
-    """Each row's branches move on, under what the step's last answer has it bear; a row that the
-    face does not cover bears nothing."""
-    own, branches = pivot_of(t), branches_of(t)
-    forces = vector(own.out, t.rows)
+    """Each row moves on, under what the step's last answer has it bear; a row that the face does
+    not cover bears nothing."""
+    own, forces = viscous_of(t), vector(pivot_of(t).out, t.rows)
     for row in range(t.rows):
-        move_on(branches, row, forces[row])
+        move_on(own, row, forces[row])
 
 
 @compiled
 def relax(t: Any) -> None:
-    """The whole contact's branches move on."""
-    move_on(branches_of(t), 0, t.loads[0])
+    """The whole contact moves on."""
+    move_on(viscous_of(t), 0, t.loads[0])
 
 
 @compiled
 def solve(t: Any) -> None:
-    """F = gain F_e + Z: the elastic law with its compliance scaled, about a load that is there
-    already. A contact never pulls: there F = 0."""
-    own = branches_of(t)
+    """gain F - L: the elastic law with its compliance scaled, about a load that is there already.
+    A contact never pulls: there it is 0."""
+    own = viscous_of(t)
     load = vector(own.load, 1)[0]
     t.free[0] -= t.c[0] * load
     t.c[0] *= own.gain

@@ -71,7 +71,7 @@ class Rig:
             skin=build.scene.cylinder,
             trials=(),
             n=n,
-            h=h,
+            steps=1,
             values={key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)},
             kinematics=Kinematics(build.scene.arm),
             solve=plan.solve.address,
@@ -79,8 +79,8 @@ class Rig:
         t = state.trial
         t.h, t.joints, t.coordinates = h, 1, 1
         t.rate[:, 0], t.travel_s[:, 0], t.joint_k[:, 0] = speed, travel_s, arm_k
-        t.held[:, 0], t.give[:, 0] = arm_d / h, 1.0 / (arm_d / h + arm_k)
-        t.jacobian[:, 0, 0], t.compliance[:, 0] = 1.0, t.give[:, 0]
+        t.damping[:, 0] = arm_d
+        t.jacobian[:, 0, 0] = 1.0
         t.law_lines = len(law[1])
         t.law_gaps, t.slopes, t.intercepts = (
             state.lend(name, np.broadcast_to(part, (len(law[1]), n)))
@@ -89,6 +89,8 @@ class Rig:
         for function in plan.setup:
             if plan.owners[function] != "base":
                 function(state)
+        each(plan.addresses("tune"), t.here)
+        t.compliance[:, 0] = t.give[:, 0]
 
     def run(self, steps: int) -> Trace:
         t, seen = self.state.trial, []

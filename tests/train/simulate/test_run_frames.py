@@ -8,7 +8,19 @@ from train.simulate.compiled import addresses, matrix
 from train.simulate.run_frames import FULL, run_frames
 from train.simulate.trial import TRIAL, compiled
 
-FRAMES, SUBSTEPS = 4, 3
+FRAMES, STEPS = 4, 3
+NONE = np.zeros(0, dtype=np.int64)
+
+
+@compiled
+def hurry(t):
+    t.steps = 2 * STEPS if t.frame == 1.0 else STEPS
+
+
+@compiled
+def tune(t):
+    t.y[0] = t.h
+    t.y[1] += 1.0
 
 
 @compiled
@@ -39,15 +51,16 @@ def end_frame(t):
 class Run:
     """Two trials that begin at 0 and 10 steps and bear what is beyond 3 and 14 of them."""
 
-    def __init__(self, kind=np.uint16, whole=True, scale=1.0, frames=FRAMES):
+    def __init__(self, kind=np.uint16, whole=True, scale=1.0, frames=FRAMES, pace=NONE):
         self.trials = np.zeros(2, dtype=TRIAL)
         t = self.trials.view(np.recarray)
         t.here = addresses(t)
-        t.joints, t.rows, t.columns = 2, 1, 3
+        t.joints, t.rows, t.columns, t.steps, t.rate_hz = 2, 1, 3, STEPS, 100.0
         t.q[:, 0], t.q[:, 2], t.z = [0.0, 10.0], 99.0, [3.0, 14.0]
         image = np.zeros((2, 1, 3))
         t.image = addresses(image)
-        stages = tuple(np.array([f.address]) for f in (begin_frame, step, end_frame))
+        once = (np.array([f.address]) for f in (tune, begin_frame, step, end_frame))
+        stages = (pace, *once)
         self.joints, self.force = np.full((2, FRAMES, 2), -1.0), np.zeros((2, FRAMES))
         self.window = np.zeros((2, frames, 1, 3), dtype=kind)
         traced = np.array([addresses(t) + TRIAL.fields[n][1] for n in ("deepest", "frame")])
@@ -55,7 +68,6 @@ class Run:
         run_frames(
             self.trials,
             stages,
-            SUBSTEPS,
             self.joints,
             self.force,
             self.window,
@@ -72,6 +84,15 @@ def test_the_first_frame_is_the_setup_s_and_each_other_one_follows_its_steps():
     # Three steps in the first frame, three in the second with twice as much, and so on.
     assert run.joints[:, :, 1].tolist() == 2 * [[0, 3, 9, 18]]
     assert run.force.tolist() == [[0, 0, 3, 6], [0, -1, 2, 5]]
+
+
+def test_a_trial_takes_the_steps_that_its_pace_says_and_is_tuned_where_their_number_changes():
+    run = Run(pace=np.array([hurry.address]))
+    assert run.joints[:, :, 0].tolist() == [[0, 3, 9, 12], [10, 13, 19, 22]]
+    t = run.trials.view(np.recarray)
+    assert t.h.tolist() == t.y[:, 0].tolist() == 2 * [0.01 / STEPS]
+    assert t.y[:, 1].tolist() == [2.0, 2.0]  # as it began to hurry, and as it did no more
+    assert Run().trials["y"].tolist() == 2 * [[0.0, 0.0]]
 
 
 def test_what_is_traced_is_as_each_frame_left_it():

@@ -179,6 +179,8 @@ def test_5_the_number_of_functions_is_exact():
     bare = make_plan(scene(), ())
     assert {s: len(getattr(bare, s)) for s in STAGES} == {
         "setup": 7,
+        "pace": 0,
+        "tune": 1,
         "frame": 1,
         "step": 3,
         "sample": 3,
@@ -192,7 +194,7 @@ def test_5_the_number_of_functions_is_exact():
         plan = make_plan(one, kind.effects)
         extra = sum(EFFECTS[name].functions for name in kind.effects)
         if {"relaxation", "inertia"} & set(kind.effects):
-            extra += 3 if "tilt" in kind.effects else 2  # what the two share
+            extra += 4 if "tilt" in kind.effects else 3  # what the two share
         if {"friction", "sliding"} <= set(kind.effects):
             extra += 1  # the shear loads the floor
         if {"friction", "tilt"} <= set(kind.effects):

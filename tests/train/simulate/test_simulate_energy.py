@@ -8,6 +8,8 @@ what is pushed has its speed and its lean.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from numba import njit
@@ -23,6 +25,7 @@ from train.simulate.energy import check_energy
 from train.simulate.motion import MOVER
 from train.simulate.plan import RUN_STAGES
 from train.simulate.run import kinds
+from train.simulate.run_frames import set_paces
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS, IMPLIED_BY_FAMILY, LABELLED_BY
 
@@ -74,41 +77,42 @@ class Ledger:
     def run(self, trials, step_s, meddle=None):
         """(n, frames) newtons of trials that run as the engine runs them, with every step booked;
         `meddle` changes the state after each."""
-        substeps, h = engine.whole_steps(self.scene, step_s)
         values = engine.values_of(self.scene, trials)
-        state = engine.begin(self.scene, self.plan, trials, h, values)
-        frame, step, sample = (self.plan.addresses(stage) for stage in RUN_STAGES)
+        state = engine.begin(self.scene, self.plan, trials, step_s, values)
+        pace, tune, frame, step, sample = (self.plan.addresses(stage) for stage in RUN_STAGES)
         self.q, self.slide = state.q, np.zeros(state.n)
-        self.v = np.broadcast_to(state.rate, state.q.shape)
+        self.v, self.speed = np.broadcast_to(state.rate, state.q.shape), np.zeros(state.n)
         force = np.zeros((state.n, engine.frame_count(self.scene)))
         for k in range(1, force.shape[1]):
+            set_paces(state.records, pace, tune)
             each(frame, state.trial.here)
-            for _ in range(substeps):
-                each(step, state.trial.here)
+            for done in range(state.trial.steps.max()):
+                each(step, state.trial.here[state.trial.steps > done])
                 if meddle:
                     meddle(state.trial)
-                self.book(state)
+                self.book(state, state.trial.steps > done)
             each(sample, state.trial.here)
             force[:, k] = state.trial.force
         return force
 
-    def book(self, state):
-        """What this step moved."""
+    def book(self, state, moved):
+        """What this step moved, of the trials whose frame has not ended."""
         q, load = state.trial.q[:, : len(self.q)].T.copy(), state.trial.loads[:, 0]
         dq = q - self.q
-        v = dq / state.h
+        v = np.where(moved, dq / state.trial.h, self.v)
         spring = state.joint_k * (q - equilibrium(state, state.trial.t))
-        torque = self.inertia * (v - self.v) / state.h + self.damping * v + spring
+        torque = self.inertia * (v - self.v) / state.trial.h + self.damping * v + spring
         self.took.append(-(torque * dq).sum(axis=0))
         self.q, self.v = q, v
         idle = load == 0.0
-        if viscous.BRANCHES in state.own:
-            idle = idle & (np.abs(state.arrays["branch"]).max(axis=1) < 1e-6)
+        if viscous.VISCOUS in state.own:
+            idle = idle & (np.abs(state.arrays["viscous_load"]).max(axis=1) < 1e-6)
         if MOVER in state.own:
             mover = state.of(MOVER)
             way, self.slide = mover.slide - self.slide, mover.slide.copy()
             self.pushed.append(load * way)
-            speed = way / state.h
+            speed = np.where(moved, way / state.trial.h, self.speed)
+            self.speed = speed
             self.has.append(0.5 * mover.inertia * speed * speed + lean(state, mover))
             idle = idle & (self.has[-1] == 0.0)
         self.idle.append(idle)
@@ -206,23 +210,39 @@ def test_relaxing_foam_under_a_pivoting_arm_presses_no_harder_than_a_stiff_one()
 
 
 @njit
-def move_on(branches, forces):
-    for i in range(len(branches)):
-        viscous.move_on(branches[i], 0, forces[i])
+def in_steps(rows, h):
+    for i in range(len(rows)):
+        viscous.in_steps(rows[i], h[i])
 
 
-def test_branches_never_give_more_than_they_took():
+@njit
+def move_on(rows, forces):
+    for i in range(len(rows)):
+        viscous.move_on(rows[i], 0, forces[i])
+
+
+def viscous_rows(n, **values):
+    """Contacts of one line each, and their arrays, which have to live as long."""
+    own = viscous.VISCOUS.rows(n)
+    own.lines = 1
+    for name, value in values.items():
+        own[name] = value
+    lent = {name: np.zeros((n, 1)) for name in ("force", "given", "load")}
+    for name, array in lent.items():
+        own[name] = addresses(array)
+    return own, lent
+
+
+def test_what_answers_to_speed_never_gives_more_than_it_took():
     rng = np.random.default_rng(3)
     n = 200
-    own = viscous.BRANCHES.rows(n)
-    load, loads = np.zeros((n, 1)), np.zeros((n, viscous.MOST, 1))
-    own.lines, own.gain, own.load, own.loads = 1, 1.0, addresses(load), addresses(loads)
-    for _ in range(2):
-        part = 10.0 ** rng.uniform(-6, 3, n)
-        rise = 10.0 ** rng.uniform(-1, 2, n) * -np.expm1(-part) / part
-        viscous.grow(own, np.exp(-part), rise)
+    ratio, relax_s, loss_s = 10.0 ** rng.uniform([[-1], [-3], [-6]], [[2], [6], [3]], (3, n))
+    own, lent = viscous_rows(n, ratio=ratio, relax_s=relax_s, loss_s=loss_s)
+    load = lent["load"]
     depth, work = np.zeros(n), np.zeros(n)
-    for _ in range(500):
+    for k in range(500):
+        if k % 10 == 0:  # whatever the step's length, and whenever it changes
+            in_steps(own.view(np.ndarray), 10.0 ** rng.uniform(-4, 0, n))
         step = rng.normal(0.0, 0.1, n)
         elastic = np.maximum(depth + step, 0.0)
         force = np.maximum(own.gain * elastic + load[:, 0], 0.0)
@@ -231,6 +251,20 @@ def test_branches_never_give_more_than_they_took():
         move_on(own.view(np.ndarray), force)
         assert (load <= 0.0).all()
     assert (work > -1e-9).all()
+
+
+def test_a_ramp_relaxes_as_zeners_law_says_whatever_the_steps():
+    rng = np.random.default_rng(5)
+    ratio, relax_s, steepness = 1.5, 0.2, 7.0
+    own, lent = viscous_rows(1, ratio=ratio, relax_s=relax_s)
+    t = 0.0
+    for h in 10.0 ** rng.uniform(-5, -1, 60):
+        t += h
+        in_steps(own.view(np.ndarray), np.array([h]))
+        whole = own.gain * steepness * t + lent["load"][:, 0]
+        move_on(own.view(np.ndarray), whole)
+        want = steepness * (t + ratio * relax_s * -math.expm1(-t / relax_s))
+        assert whole[0] == pytest.approx(want, rel=1e-12)
 
 
 def test_a_run_that_makes_energy_is_refused():

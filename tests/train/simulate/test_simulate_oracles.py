@@ -13,11 +13,17 @@ from scipy.integrate import solve_ivp
 from edge.touch.arm import Chain
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import arm, base
+from train.simulate.assemble import make_plan
 from train.simulate.compiled import each
 from train.simulate.effects import friction, tilt
 from train.simulate.effects.friction import SHEAR
+from train.simulate.effects.inertia import FINER
 from train.simulate.effects.tipping import TIPPING
+from train.simulate.engine import begin, run_batch, values_of
 from train.simulate.motion import GRAVITY, MOVER
+from train.simulate.plan import RUN_STAGES
+from train.simulate.run import kinds
+from train.simulate.run_frames import set_paces
 from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, load
 
 ARM_K = 115.0
@@ -245,6 +251,40 @@ class TestInertia:
             errors.append(np.sqrt(np.mean((batch.force[0, :60] - want) ** 2)) / want.max())
         assert errors[1] < 0.1
         assert errors[1] < 0.75 * errors[0]
+
+    def test_a_hit_has_short_steps_of_its_own(self, tmp_path):
+        scene, h, loss_s = self.scene(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
+        kind, trials = next(iter(kinds(scene).items()))
+        plan = make_plan(scene, kind.effects)
+        plans = plan, replace(plan, pace=())
+        paced, plain = (run_batch(scene, tuple(trials), h, plan=one) for one in plans)
+        want = self.oracle(paced, loss_s)
+        hit = slice(0, int(np.argmax(want)) + 4)
+        apart = [np.abs(b.force[0, hit] - want[hit]).max() / want.max() for b in (paced, plain)]
+        assert apart[0] < 0.1
+        assert apart[1] > 0.4
+        # It bounces, as it does by the equations.
+        assert (paced.force[0, hit.stop : hit.stop + 3] == 0.0).all()
+
+    def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path):
+        scene = self.scene(tmp_path, 0.01, loss_s=0.02)
+        kind, trials = next(iter(kinds(scene).items()))
+        plan = make_plan(scene, kind.effects)
+        state = begin(scene, plan, tuple(trials), 0.01, values_of(scene, tuple(trials)))
+        pace, tune, frame, step, sample = (plan.addresses(stage) for stage in RUN_STAGES)
+        steps, force = [], []
+        for _ in range(60):
+            set_paces(state.records, pace, tune)
+            steps.append(int(state.trial.steps[0]))
+            assert state.trial.h[0] == 0.01 / steps[-1]
+            for functions in (frame, *steps[-1] * [step], sample):
+                each(functions, state.trial.here)
+            force.append(state.trial.force[0])
+        hit = int(np.argmax(np.array(force) > 0.0))
+        assert set(steps) == {1, FINER}
+        assert set(steps[: hit - 2]) == {1}
+        assert set(steps[hit : hit + 3]) == {FINER}
+        assert set(steps[hit + 15 :]) == {1}
 
     def test_less_loss_bounces_longer(self, tmp_path):
         aloft = []

@@ -83,10 +83,11 @@ def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
     assert mean["soft-movable"][1] > mean["soft-fixed"][1]
 
 
-def test_the_scenes_steps_are_the_measured_ones(cody18):
+def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     # Three kinds stand for all here; --explain measures every one. The arm's inertia is left
-    # out: its first hit lasts a frame, which no step of a frame's size resolves.
+    # out: how things bounce is another at each step.
     cody18 = replace(cody18, add=tuple(name for name in cody18.add if name != "inertia"))
     step = steps(cody18)
     for kind, trials in list(kinds(cody18).items())[2:10:3]:
-        assert step[kind] <= measure(cody18, tuple(trials)).step_s
+        found = measure(cody18, tuple(trials))
+        assert found.errors[found.steps_s.index(step[kind])] < 0.015

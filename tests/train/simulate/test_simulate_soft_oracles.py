@@ -14,7 +14,7 @@ from train.simulate import contact
 from train.simulate.compiled import each
 from train.simulate.effects import cover, lateral
 from train.simulate.reader import Value
-from train.simulate.viscous import BRANCHES
+from train.simulate.viscous import VISCOUS
 
 RADIUS = 0.04604
 
@@ -366,12 +366,12 @@ def test_no_row_that_the_face_does_not_cover_is_the_deepest():
 def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
     state = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).state
-    arrays, rise = state.arrays, state.of(BRANCHES).rise[:, :1]
+    arrays, ratio = state.arrays, state.of(VISCOUS).ratio[:, None]
     inside = np.maximum(arrays["line_depth"][:, :, None] - arrays["gaps"][:, None], 0.0)
     elastic = arrays["weight"] * (inside * arrays["stiffness"][:, None]).sum(axis=2)
     assert (np.ptp(elastic, axis=1) > 0.1).all()
     np.testing.assert_allclose(arrays["out"], elastic, atol=1e-3)
-    np.testing.assert_allclose(arrays["branch"], -rise * elastic, atol=1e-3)
+    np.testing.assert_allclose(arrays["viscous_given"], ratio * elastic, atol=1e-3)
 
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_what_they_are_pressed():

@@ -3,8 +3,6 @@ within its time."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from train.simulate import viscous
 from train.simulate.plan import Build
 from train.simulate.state import State
@@ -17,8 +15,6 @@ def add(build: Build) -> None:
 
 
 def relax(state: State) -> None:
-    """The second spring and its dashpot are one branch."""
-    values = state.values
-    part = state.h / values["relax_s"]
-    rise = values["relax_ratio"] * (-np.expm1(-part) / part)
-    viscous.grow(state.of(viscous.BRANCHES), np.exp(-part), rise)
+    """The second spring and its dashpot are the contact's Maxwell element."""
+    own = state.of(viscous.VISCOUS)
+    own.ratio, own.relax_s = state.values["relax_ratio"], state.values["relax_s"]

@@ -18,14 +18,14 @@ from train.simulate.trial import Part, compiled
 
 STEMS = Part(
     "stems",
-    "slip_m",
+    *("slip_m", "drag"),
     *integers("taxel", "following", "part", "order", "damping"),
     *integers("slopes", "intercepts", "sorted", "loads"),
 )
-"""The bend in metres at which a stem slips off; of each stem: the positions in the window's image
-of the two rows it lies between, and the part of its load that the second bears; which stem is the
-first, second and so on by depth; N s/m, 0 once it has slipped off; the law of those still held,
-without damping; room for two numbers."""
+"""The bend in metres at which a stem slips off; N s/m of all that bend; of each stem: the positions
+in the window's image of the two rows it lies between, and the part of its load that the second
+bears; which stem is the first, second and so on by depth; N s/m, 0 once it has slipped off; the law
+of those still held, without damping; room for two numbers."""
 stems_of = STEMS.of
 
 
@@ -34,6 +34,7 @@ def add(build: Build) -> None:
     build.replace(base.lay_bed, plant)
     build.replace(base.order_bed, stand)
     build.replace(base_steps.image, draw)
+    build.put("tune", base.ORDER, damp)
     build.put("step", base.SETTLE + 10, bend)
 
 
@@ -104,27 +105,41 @@ def law(t: Any) -> None:
     lay_law(t, own.sorted, own.slopes, own.intercepts)
 
 
-@compiled
-def bend(t: Any) -> None:
-    """Let go of stems bent too far; damp those that bend, implicitly, in the next step."""
+@njit(error_model="numpy")
+def lay(t: Any) -> None:
+    """The law of the next step: of those still held, and implicitly of what damps those that
+    bend."""
     own = stems_of(t)
-    weight, line_gap = vector(t.weight, t.lines), vector(t.line_gap, t.lines)
-    damping = vector(own.damping, t.lines)
-    gone, drag = False, 0.0
-    for stem in range(t.lines):
-        bent = t.depth[0] - line_gap[stem]
-        if bent > own.slip_m and weight[stem] > 0.0:
-            gone, weight[stem], damping[stem] = True, 0.0, 0.0
-        if bent > 0.0:
-            drag += damping[stem]
-    if gone:
-        law(t)
-    drag /= t.h
+    drag = own.drag / t.h
     slopes, intercepts = vector(t.slopes, t.lines), vector(t.intercepts, t.lines)
     held_slopes, held_intercepts = vector(own.slopes, t.lines), vector(own.intercepts, t.lines)
     for s in range(t.lines):
         slopes[s] = held_slopes[s] + drag
         intercepts[s] = held_intercepts[s] + drag * t.depth[0]
+
+
+@compiled
+def damp(t: Any) -> None:
+    """The law in steps of this length."""
+    lay(t)
+
+
+@compiled
+def bend(t: Any) -> None:
+    """Let go of stems bent too far; the others damp the next step."""
+    own = stems_of(t)
+    weight, line_gap = vector(t.weight, t.lines), vector(t.line_gap, t.lines)
+    damping = vector(own.damping, t.lines)
+    gone, own.drag = False, 0.0
+    for stem in range(t.lines):
+        bent = t.depth[0] - line_gap[stem]
+        if bent > own.slip_m and weight[stem] > 0.0:
+            gone, weight[stem], damping[stem] = True, 0.0, 0.0
+        if bent > 0.0:
+            own.drag += damping[stem]
+    if gone:
+        law(t)
+    lay(t)
 
 
 @compiled
