@@ -16,12 +16,13 @@ from train.simulate.compiled import Array, each
 from train.simulate.energy import check_energy
 from train.simulate.plan import RUN_STAGES, Plan
 from train.simulate.reader import Value
+from train.simulate.readings import Readings
 from train.simulate.required_effects import required_effects
 from train.simulate.run_frames import run_frames
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
 from train.simulate.schema import STIFFNESSES
 from train.simulate.sensor_frames import SensorFrames
-from train.simulate.state import Readings, State
+from train.simulate.state import State
 
 
 @dataclass(frozen=True)
@@ -189,13 +190,14 @@ def run_batch(
     first = trials[0]
     plan = plan or make_plan(scene, kind_of(scene, first.object, first.condition).effects)
     physics = run_physics(scene, trials, step_s, plan=plan, values=values, images=images)
-    parts = list(readings(physics, plan))
+    seen = list(readings(physics, plan))
 
-    def whole(name: str) -> Any:
-        values = [getattr(part, name) for part in parts]
-        return None if values[0] is None else np.concatenate(values)
+    def all_of(name: str) -> Any:
+        found = [getattr(one, name) for one in seen]
+        return None if found[0] is None else np.stack(found)
 
-    found = {name: whole(name) for name in ("counts", "joints", "times", "kept", "valid")}
+    found = {name: all_of(name) for name in ("joints", "times", "kept", "valid")}
+    found["counts"] = np.stack([one.frames() for one in seen])
     force, traces = physics.force, physics.traces
     return Batch(trials, physics.t, force=force, traces=traces, state=physics.state, **found)
 
@@ -271,14 +273,10 @@ def check_start(state: State, plan: Plan) -> None:
         )
 
 
-READ_AT_ONCE = 4
-"""Trials whose frames stay in a processor's cache while one sensor's effect follows the other."""
-
-
 def readings(
     physics: PhysicsRun, plan: Plan, which: NDArray[np.intp] | None = None
 ) -> Iterator[Readings]:
-    """What a plan's sensor and clock show of a run's trials, a few at a time.
+    """What a plan's sensor and clock show of a run's trials, one by one.
 
     One run serves any plan that differs in these alone, as long as each of them has some: the
     frames are kept in whole counts where no sensor's effect is called for.
@@ -286,19 +284,19 @@ def readings(
     Args:
         which: the trials to read; None for all.
     """
-    state, frames = physics.state, physics.frames
-    which = np.arange(state.n) if which is None else which
-    for first in range(0, len(which), READ_AT_ONCE):
-        some = which[first : first + READ_AT_ONCE]
+    state = physics.state
+    for i in range(state.n) if which is None else which.tolist():
+        counts, taxels = physics.frames.borne(state, i)
         seen = Readings(
             seed=state.scene.seed,
-            which=some,
-            trials=tuple(state.trials[i] for i in some),
+            which=i,
+            trial=state.trials[i],
             t=physics.t,
-            counts=frames.whole(state, some),
-            joints=physics.joints[some],
+            counts=counts,
+            taxels=taxels,
+            shape=(state.skin.rows, state.skin.cols),
+            joints=physics.joints[i].copy(),
         )
         for function in (*plan.clock, *plan.sensor):
             function(seen)
-        seen.counts = frames.in_counts(seen.counts)
         yield seen

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from train.simulate.readings import Readings
 from train.simulate.scene_model import Scene
 from train.simulate.schema import EFFECTS
-from train.simulate.state import Readings, State
+from train.simulate.state import State
 from train.simulate.trial import Part
 
 SetupFunction = Callable[[State], None]

@@ -118,35 +118,33 @@ def recordings(
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
     values = physics.state.values
     for seen in readings(physics, plan, which):
-        for i, trial in enumerate(seen.trials):
-            kept = slice(None) if seen.kept is None else seen.kept[i]
-            t = seen.t if seen.times is None else seen.times[i]
-            drawn = {name: float(value[seen.which[i]]) for name, value in values.items()}
-            soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
-            file = file_name(scene, trial)
-            meta: dict[str, Any] = {
-                "labels": {
-                    "category": f"{soft}-{trial.condition}",
-                    "mobility": trial.condition,
-                    "softness": soft,
-                    "object": trial.object.name,
-                },
-                "skin": skin,
-                "arm": arm,
-                "source": f"simulated: {scene.name}",
-                "trial": Path(file).stem,
-                "simulation": {
-                    "seed": scene.seed,
-                    "step_s": step_s,
-                    "family": trial.object.family,
-                    "redrawn": trial.attempt,
-                    "effects": list(plan.effects),
-                    "values": {k: v for k, v in drawn.items() if math.isfinite(v)},
-                },
-            }
-            valid = None if seen.valid is None else seen.valid[i]
-            frames, joints = seen.counts[i][kept], seen.joints[i][kept]
-            yield file, Recording(t=t[kept], frames=frames, joints=joints, valid=valid, meta=meta)
+        trial, kept = seen.trial, slice(None) if seen.kept is None else seen.kept
+        t = seen.t if seen.times is None else seen.times
+        drawn = {name: float(value[seen.which]) for name, value in values.items()}
+        soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
+        file = file_name(scene, trial)
+        meta: dict[str, Any] = {
+            "labels": {
+                "category": f"{soft}-{trial.condition}",
+                "mobility": trial.condition,
+                "softness": soft,
+                "object": trial.object.name,
+            },
+            "skin": skin,
+            "arm": arm,
+            "source": f"simulated: {scene.name}",
+            "trial": Path(file).stem,
+            "simulation": {
+                "seed": scene.seed,
+                "step_s": step_s,
+                "family": trial.object.family,
+                "redrawn": trial.attempt,
+                "effects": list(plan.effects),
+                "values": {k: v for k, v in drawn.items() if math.isfinite(v)},
+            },
+        }
+        frames, joints = seen.frames()[kept], seen.joints[kept]
+        yield file, Recording(t=t[kept], frames=frames, joints=joints, valid=seen.valid, meta=meta)
 
 
 def simulate_trials(

@@ -1,4 +1,4 @@
-"""What a batch of trials begins with, and what its sensors make of it."""
+"""What a batch of trials begins with."""
 
 from __future__ import annotations
 
@@ -138,29 +138,3 @@ class State:
             rows = self.trial if part is None else self.own[part]
             place[:] = addresses(rows) + rows.dtype.fields[name][1]
         return found
-
-
-@dataclass
-class Readings:
-    """What the sensors of a batch read, all frames at once.
-
-    Attributes:
-        seed: the scene's.
-        which: (n,) of the batch's trials.
-        t: (frames,) seconds.
-        counts: (n, frames, rows, cols), float32 until every sensor effect has run, then uint16.
-        joints: (n, frames, dof) radians.
-        times: (n, frames) seconds, where a clock effect shifts them.
-        kept: (n, frames) bool, where frames are lost.
-        valid: (n, rows, cols) bool, where taxels are known to be dead.
-    """
-
-    seed: int
-    which: NDArray[np.intp]
-    trials: tuple[TrialSpec, ...]
-    t: Array
-    counts: NDArray[Any]
-    joints: Array
-    times: Array | None = None
-    kept: NDArray[np.bool_] | None = None
-    valid: NDArray[np.bool_] | None = None

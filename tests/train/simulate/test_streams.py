@@ -50,25 +50,35 @@ def test_a_trial_s_draw_does_not_hang_on_the_trials_beside_it(kind):
         assert np.abs(streams.draws(3, ["p"], "s", np.arange(10_000), kind)).max() == 2.5
 
 
+def noise(*shape: int) -> np.ndarray:
+    values = np.zeros(shape, dtype=np.float32)
+    every = np.arange(shape[1])
+    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), values, every, len(every))
+    return values
+
+
 def test_noise_is_normal_and_each_number_takes_two_bytes():
-    values = np.zeros((1000, 200), dtype=np.float32)
-    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), values)
+    values = noise(1000, 200)
     assert abs(float(values.mean())) < 4 / np.sqrt(values.size)
     assert float(values.std()) == pytest.approx(1.0, abs=0.01)
     assert float(np.abs(values).max()) < 4.4
     again = np.random.default_rng(0)
     again.bytes(2 * values.size)
     fresh = np.random.default_rng(0)
-    before = np.full_like(values, 7.0)
-    after = before.copy()
-    streams.add_drawn(fresh, streams.quantiles(), after)
+    numbers = np.full_like(values, 7.0)
+    streams.add_drawn(fresh, streams.quantiles(), numbers, np.arange(200), 200)
     assert fresh.random() == again.random()
-    np.testing.assert_array_equal(after, before + values)
+    np.testing.assert_array_equal(numbers, np.float32(7.0) + values)
 
 
-def test_zeros_can_be_left_alone_without_a_change_in_the_other_numbers():
-    numbers = np.arange(10, dtype=np.float32) % 3
-    every, some = numbers.copy(), numbers.copy()
-    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), every)
-    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), some, but_to_zeros=True)
-    np.testing.assert_array_equal(some, np.where(numbers == 0.0, numbers, every))
+@pytest.mark.parametrize("columns", [[0, 1, 2], [6, 2, 3], []])
+def test_a_place_draws_the_same_whichever_others_there_are(columns):
+    some, places = np.zeros((5, len(columns)), dtype=np.float32), np.array(columns, dtype=np.intp)
+    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), some, places, 7)
+    np.testing.assert_array_equal(some, noise(5, 7)[:, places])
+
+
+def test_the_quantiles_are_in_order_and_as_wide_as_asked_for():
+    assert (np.diff(streams.quantiles()) >= 0.0).all()
+    np.testing.assert_array_equal(streams.quantiles(3.0), streams.quantiles() * np.float32(3.0))
+    assert streams.quantiles()[-1] == -streams.quantiles()[0]

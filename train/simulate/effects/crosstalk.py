@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate.plan import Build
-from train.simulate.state import Readings
+from train.simulate.readings import Readings
 
 
 def add(build: Build) -> None:
@@ -14,11 +14,11 @@ def add(build: Build) -> None:
 
     def couple(readings: Readings) -> None:
         """Counts + part * (sum of the neighbours' counts)."""
-        counts = readings.counts
+        counts = readings.everywhere()
         leak = counts * part
-        counts[:, :, 1:] += leak[:, :, :-1]
-        counts[:, :, :-1] += leak[:, :, 1:]
-        counts += np.roll(leak, 1, axis=3)
-        counts += np.roll(leak, -1, axis=3)
+        counts[:, 1:] += leak[:, :-1]
+        counts[:, :-1] += leak[:, 1:]
+        counts += np.roll(leak, 1, axis=2)
+        counts += np.roll(leak, -1, axis=2)
 
     build.read("sensor", 10, couple)

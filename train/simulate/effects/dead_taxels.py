@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from train.simulate import streams
 from train.simulate.plan import Build
-from train.simulate.state import Readings
+from train.simulate.readings import Readings
 
 
 def add(build: Build) -> None:
@@ -15,12 +13,10 @@ def add(build: Build) -> None:
 
     def kill(readings: Readings) -> None:
         """Zero where dead."""
-        counts, seed = readings.counts, readings.seed
-        valid = np.empty((len(counts), *counts.shape[2:]), dtype=bool)
-        for i, trial in enumerate(readings.trials):
-            generator = streams.stream(seed, "dead_taxels", trial.key, trial.number)
-            valid[i] = generator.random(counts.shape[2:]) >= settings["part"]
-        counts *= valid[:, None]
+        trial = readings.trial
+        generator = streams.stream(readings.seed, "dead_taxels", trial.key, trial.number)
+        valid = generator.random(readings.shape) >= settings["part"]
+        readings.counts *= valid.reshape(-1)[readings.taxels]
         if settings["known"]:
             readings.valid = valid
 

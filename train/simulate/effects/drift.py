@@ -6,7 +6,7 @@ import numpy as np
 
 from train.simulate import streams
 from train.simulate.plan import Build
-from train.simulate.state import Readings
+from train.simulate.readings import Readings
 
 
 def add(build: Build) -> None:
@@ -15,11 +15,9 @@ def add(build: Build) -> None:
 
     def wander(readings: Readings) -> None:
         """Counts + slope * t."""
-        counts, seed = readings.counts, readings.seed
-        t = readings.t.astype(np.float32)[:, None, None]
-        for i, trial in enumerate(readings.trials):
-            generator = streams.stream(seed, "drift", trial.key, trial.number)
-            slope = generator.standard_normal(counts.shape[2:], dtype=np.float32) * size
-            counts[i] += slope * t
+        counts, trial = readings.everywhere(), readings.trial
+        generator = streams.stream(readings.seed, "drift", trial.key, trial.number)
+        slope = generator.standard_normal(readings.shape, dtype=np.float32) * size
+        counts += slope * readings.t.astype(np.float32)[:, None, None]
 
     build.read("sensor", 30, wander)

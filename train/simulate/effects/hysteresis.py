@@ -4,9 +4,11 @@ Prandtl's hysteresis model)."""
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from train.simulate.plan import Build
-from train.simulate.state import Readings
+from train.simulate.readings import Readings
 
 
 def add(build: Build) -> None:
@@ -15,11 +17,15 @@ def add(build: Build) -> None:
 
     def lag(readings: Readings) -> None:
         """y = min(max(y before, x - half), x + half), from a rest at x = 0."""
-        counts = readings.counts
-        y = np.zeros_like(counts[:, 0])
-        for k in range(counts.shape[1]):
-            x = counts[:, k]
-            y = np.minimum(np.maximum(y, x - half), x + half)
-            counts[:, k] = y
+        _lag(readings.counts, half)
 
     build.read("sensor", 20, lag)
+
+
+@njit(cache=True)
+def _lag(counts: NDArray[np.float32], half: np.float32) -> None:
+    for i in range(counts.shape[1]):
+        y = np.float32(0.0)
+        for k in range(len(counts)):
+            y = min(max(y, counts[k, i] - half), counts[k, i] + half)
+            counts[k, i] = y

@@ -6,7 +6,7 @@ import numpy as np
 
 from train.simulate import streams
 from train.simulate.plan import Build
-from train.simulate.state import Readings
+from train.simulate.readings import Readings
 
 
 def add(build: Build) -> None:
@@ -17,19 +17,17 @@ def add(build: Build) -> None:
         """Load and joints between the neighbouring frames, at the shifted times."""
         counts, joints, t = readings.counts, readings.joints, readings.t
         frame = t[1] - t[0]
-        part = np.zeros((len(joints), len(t)))
-        for i, trial in enumerate(readings.trials):
-            generator = streams.stream(readings.seed, "jitter", trial.key, trial.number)
-            drawn = generator.standard_normal(len(t) - 2) * (size / frame)
-            part[i, 1:-1] = np.clip(drawn, -0.45, 0.45)
+        trial, part = readings.trial, np.zeros(len(t))
+        generator = streams.stream(readings.seed, "jitter", trial.key, trial.number)
+        drawn = generator.standard_normal(len(t) - 2) * (size / frame)
+        part[1:-1] = np.clip(drawn, -0.45, 0.45)
         readings.times = t + part * frame
-        for values in (joints, counts) if counts.shape[1] else (joints,):
-            weight = part.reshape(*part.shape, *(1,) * (values.ndim - 2))
-            late = np.maximum(weight, 0.0).astype(values.dtype)
-            early = np.maximum(-weight, 0.0).astype(values.dtype)
+        for values in (joints, counts) if len(counts) else (joints,):
+            late = np.maximum(part, 0.0).astype(values.dtype)[:, None]
+            early = np.maximum(-part, 0.0).astype(values.dtype)[:, None]
             mixed = values * (1 - late - early)
-            mixed[:, :-1] += values[:, 1:] * late[:, :-1]
-            mixed[:, 1:] += values[:, :-1] * early[:, 1:]
+            mixed[:-1] += values[1:] * late[:-1]
+            mixed[1:] += values[:-1] * early[1:]
             values[...] = mixed
 
     build.read("clock", 10, shift)

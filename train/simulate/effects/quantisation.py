@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from train.simulate.plan import Build
-from train.simulate.state import Readings
+from train.simulate.readings import Readings
 
 
 def add(build: Build) -> None:

@@ -1,0 +1,51 @@
+"""What bears nothing is left out until an effect asks for it; what is shown is whole counts."""
+
+import numpy as np
+import pytest
+
+from train.simulate.readings import Readings
+from train.simulate.run_frames import FULL
+
+FRAMES, ROWS, COLS = 3, 2, 4
+
+
+def reading(taxels, counts, kind=np.float32) -> Readings:
+    return Readings(
+        seed=0,
+        which=0,
+        trial=None,
+        t=np.arange(FRAMES) / 100.0,
+        counts=np.array(counts, dtype=kind).reshape(FRAMES, len(taxels)),
+        taxels=np.array(taxels, dtype=np.intp),
+        shape=(ROWS, COLS),
+        joints=np.zeros((FRAMES, 1)),
+    )
+
+
+@pytest.mark.parametrize("taxels", [[], [5, 2], [7, 6, 5, 4, 3, 2, 1, 0], list(range(8))])
+def test_each_taxel_stands_at_its_place_on_the_skin(taxels):
+    counts = 1.0 + np.arange(FRAMES * len(taxels)).reshape(FRAMES, len(taxels))
+    want = np.zeros((FRAMES, ROWS * COLS))
+    want[:, taxels] = counts
+    want = want.reshape(FRAMES, ROWS, COLS)
+    one = reading(taxels, counts)
+    assert one.frames().dtype == np.uint16
+    np.testing.assert_array_equal(one.frames(), want)
+    whole = one.everywhere()
+    np.testing.assert_array_equal(whole, want)
+    whole[2, 1, 3] = 99.0  # what an effect does to it is what the next one finds
+    assert one.everywhere()[2, 1, 3] == one.counts[2, 7] == one.frames()[2, 1, 3] == 99
+    assert one.taxels.tolist() == list(range(8))
+
+
+@pytest.mark.parametrize(
+    ("count", "shown"),
+    [(0.5, 0), (1.5, 2), (2.4, 2), (-3.0, 0), (FULL - 0.4, 65535), (1e9, 65535)],
+)
+def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, shown):
+    assert reading([6], [0.0, count, 0.0]).frames()[1, 1, 2] == shown
+
+
+def test_whole_counts_stay_as_they_are():
+    every = reading([0, 1], [[0, 1], [257, 40000], [65534, 65535]], np.uint16)
+    assert every.frames()[:, 0, :2].tolist() == [[0, 1], [257, 40000], [65534, 65535]]
