@@ -220,5 +220,5 @@ def hand_over(state: State) -> None:
     for name, value in numbers.items():
         trial[name] = value
     for name in ("start", "rate", "travel_s", "damping", "joint_k", "q"):
-        trial[name][:, :dof] = np.broadcast_to(getattr(state, name), (dof, n)).T
+        trial[name][:, :dof] = getattr(state, name).T
     trial["coordinates"] = np.maximum(trial["coordinates"], 1)

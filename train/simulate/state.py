@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from train.simulate.arm import Kinematics
 from train.simulate.compiled import Array, addresses
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
-from train.simulate.trial import TRIAL, Part
-
-Rows = Any
-"""(n,) records, with their fields as attributes: `np.recarray`."""
+from train.simulate.trial import TRIAL, Part, Rows
 
 
 @dataclass
@@ -109,7 +106,7 @@ class State:
         self.records = np.zeros(self.n, dtype=TRIAL)
         self.records["here"] = addresses(self.records)
         self.records["solve"] = self.solve
-        self.trial = self.records.view(np.recarray)
+        self.trial = self.records.view(Rows)
 
     def of(self, part: Part) -> Rows:
         """An effect's own state (n,)."""
@@ -127,8 +124,8 @@ class State:
     def lend(self, name: str, values: NDArray[Any]) -> NDArray[np.int64]:
         """(n,) addresses of values (..., n), laid out trial by trial; `arrays` has them."""
         assert name not in self.arrays, f"{name} is lent already: its address would be lost"
-        by_trial = values.T if values.ndim == 2 else np.moveaxis(values, -1, 0)
-        own = self.arrays[name] = np.array(by_trial, order="C")
+        by_trial = values.transpose(-1, *range(values.ndim - 1))
+        own = self.arrays[name] = by_trial.copy()
         return addresses(own)
 
     def places(self, fields: list[tuple[Part | None, str]]) -> NDArray[np.int64]:
