@@ -11,7 +11,6 @@ from numba import njit
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate.compiled import Array
-from train.simulate.contact import total
 
 
 class Pose(NamedTuple):
@@ -172,13 +171,8 @@ def poses(
         pose_of(table, q[i], origin[i], rotation[i], axes[i], origins[i])
 
 
-def dot(a: Array, b: Array) -> Array:
-    """Sum over the first axis, one term after the other: the same bits in any batch."""
-    return total(a * b)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross product along the first axis."""
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+@njit(error_model="numpy")
+def dot(a: Array, b: Array) -> float:
+    """The scalar product of two vectors (3,)."""
+    product: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product

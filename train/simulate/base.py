@@ -4,15 +4,18 @@ and the image of the load. Effects add to it, or take the place of one of its fu
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate import base_steps
-from train.simulate.arm import cross, dot
+from train.simulate.arm import dot, pose_of
 from train.simulate.compiled import Array, addresses
-from train.simulate.contact import covered, curve_gap, sort_bed, total
+from train.simulate.contact import covered, curve_gap, total
 from train.simulate.plan import Build
 from train.simulate.scene_model import Cylinder
 from train.simulate.state import Bed, State
@@ -31,7 +34,6 @@ def add(build: Build) -> None:
     build.put("setup", SWING, swing)
     build.put("setup", PLACE, place)
     build.put("setup", SPRINGS, springs)
-    build.put("setup", WINDOW, window)
     build.put("setup", BED, lay_bed)
     build.put("setup", ORDER, order_bed)
     build.put("setup", HAND_OVER, hand_over)
@@ -84,42 +86,6 @@ def swing(state: State) -> None:
 
 STILL_M_S = 1e-6
 """What moves more slowly does not move."""
-
-
-def place(state: State) -> None:
-    """Put the object where the sweep meets it after the lead."""
-    p, skin = state.values, state.skin
-    state.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
-    state.z = state.scene.place_m + p["place_m"]
-    pose = state.kinematics.pose(equilibrium(state, p["lead_s"]) - state.lag)
-    along = pose.rotation[:, 2]
-    point = pose.origin + along * state.z
-    arms = cross(pose.axes, (point[:, None] - pose.origins))
-    rate = np.broadcast_to(state.rate[:, :, None], (len(state.rate), 1, state.n))
-    speed = dot(np.moveaxis(arms, 1, 0), rate)
-    speed = speed - along * dot(speed, along)
-    size = np.sqrt(dot(speed, speed))
-    if not (size > STILL_M_S).all():
-        raise InputError(
-            f"{state.scene.name}: motion.rate_deg_s does not move the forearm where it is to meet "
-            "an object (motion.place_m); let a joint turn that carries it"
-        )
-    state.approach = size
-    normal = speed / size
-    yaw = np.radians(p["yaw_deg"])
-    state.normal = normal * np.cos(yaw) + along * np.sin(yaw)
-    state.face = point + skin.radius_m * normal
-    state.along_face = along * np.cos(yaw) - normal * np.sin(yaw)
-    state.meeting_angle = np.arctan2(
-        dot(speed, pose.rotation[:, 1]), dot(speed, pose.rotation[:, 0])
-    )
-
-
-def springs(state: State) -> None:
-    """Each taxel is a spring; covers and foundations join it in series."""
-    state.taxel_k = state.values["taxel_n_m"]
-
-
 WINDOW_HALF = 6
 """Columns to either side of the one that meets the object: +-90 degrees, beyond which a
 cylinder has no more surface to press."""
@@ -130,22 +96,93 @@ def beside(skin: Cylinder) -> int:
     return min(WINDOW_HALF, (skin.cols - 1) // 2)
 
 
-def window(state: State) -> None:
-    """The columns that can touch: their gaps R (1 - cos theta) at zero depth."""
-    skin = state.skin
-    angles = np.radians(np.array(skin.column_angles_deg))[:, None]
-    away = angles - state.meeting_angle
-    away = np.abs(away - 2.0 * math.pi * np.round(away / (2.0 * math.pi)))
-    nearest = np.argmin(away, axis=0)
-    away_by = np.arange(-beside(skin), beside(skin) + 1)[:, None]
-    state.columns = (nearest + away_by) % skin.cols
-    away = np.take_along_axis(away, state.columns, axis=0)
-    state.column_gaps = skin.radius_m * (1.0 - np.cos(away))
-    reach = np.where(away < 0.5 * math.pi, 1.0, 0.0)
-    # A narrow face ends among the columns.
-    pitch = skin.radius_m * 2.0 * math.pi / skin.cols
-    across = skin.radius_m * np.sin(away)
-    state.reach = reach * covered(across, state.values["breadth_m"], pitch)
+def place(state: State) -> None:
+    """Put the object where the sweep meets it after the lead, before the columns it can touch."""
+    values, skin, columns = state.values, state.skin, 2 * beside(state.skin) + 1
+    state.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
+    state.records["z"] = state.z = state.scene.place_m + values["place_m"]
+    state.columns = np.zeros((columns, state.n), dtype=np.intp)
+    state.column_gaps, state.reach = np.zeros((2, columns, state.n))
+    moves = meet(
+        state.records,
+        state.kinematics.table,
+        equilibrium(state, values["lead_s"]) - state.lag,
+        state.rate[:, 0],
+        np.radians(values["yaw_deg"]),
+        values["breadth_m"],
+        skin.radius_m,
+        np.radians(np.array(skin.column_angles_deg)),
+        state.columns,
+        state.column_gaps,
+        state.reach,
+    )
+    if not moves:
+        raise InputError(
+            f"{state.scene.name}: motion.rate_deg_s does not move the forearm where it is to meet "
+            "an object (motion.place_m); let a joint turn that carries it"
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def meet(
+    trials: NDArray[Any],
+    table: Array,
+    q: Array,
+    rate: Array,
+    yaw: Array,
+    breadth: Array,
+    radius: float,
+    angles: Array,
+    columns: NDArray[np.intp],
+    gaps: Array,
+    reach: Array,
+) -> bool:
+    """Each trial's face, across the way of the forearm and turned by its yaw, and the columns that
+    it can touch (columns, n): which these are, how far they lie back at zero depth,
+    R (1 - cos theta), and which part of each the face covers.
+
+    Returns:
+        Whether every forearm moves there.
+    """
+    speed, away, around = np.zeros(3), np.zeros(len(angles)), 2.0 * math.pi
+    for i in range(len(trials)):
+        t = trials[i]
+        pose_of(table, q[:, i], t.origin, t.rotation, t.axes, t.origins)
+        along, point = t.rotation[:, 2], t.origin + t.rotation[:, 2] * t.z
+        speed[:] = 0.0
+        for j in range(len(rate)):
+            for k, m, n in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                turned = t.axes[m, j] * (point[n] - t.origins[n, j])
+                turned -= t.axes[n, j] * (point[m] - t.origins[m, j])
+                speed[k] += turned * rate[j]
+        speed -= along * dot(speed, along)
+        size = math.sqrt(dot(speed, speed))
+        if not size > STILL_M_S:
+            return False
+        for k in range(3):
+            normal = speed[k] / size
+            t.normal[k] = normal * math.cos(yaw[i]) + along[k] * math.sin(yaw[i])
+            t.face[k] = point[k] + radius * normal
+            t.along_face[k] = along[k] * math.cos(yaw[i]) - normal * math.sin(yaw[i])
+        met = math.atan2(dot(speed, t.rotation[:, 1]), dot(speed, t.rotation[:, 0]))
+        for c in range(len(angles)):
+            apart = angles[c] - met
+            away[c] = abs(apart - around * np.rint(apart / around))
+        first = np.argmin(away) - len(columns) // 2
+        for c in range(len(columns)):
+            column = (first + c) % len(angles)
+            theta = away[column]
+            columns[c, i] = column
+            gaps[c, i] = radius * (1.0 - math.cos(theta))
+            # A narrow face ends among the columns.
+            part = covered(radius * math.sin(theta), breadth[i], radius * around / len(angles))
+            reach[c, i] = part if theta < 0.5 * math.pi else 0.0
+    return True
+
+
+def springs(state: State) -> None:
+    """Each taxel is a spring; covers and foundations join it in series."""
+    state.taxel_k = state.values["taxel_n_m"]
 
 
 FLAT_M = 1e6
@@ -168,32 +205,26 @@ def order_bed(state: State) -> None:
     """The bed's law as lines K a - B; a flat face needs one for each column only."""
     bed = state.bed
     if len(bed.line_gap) == 1 < len(bed.weight):
-        covered_rows = total(bed.weight)
-        law = sort_bed(bed.gaps, bed.stiffness * covered_rows)
-        bed.law_gaps, bed.slopes, bed.intercepts = law
+        state.obey(bed.gaps, bed.stiffness * total(bed.weight))
         return
     all_gaps = (bed.line_gap[:, None] + bed.gaps[None]).reshape(-1, state.n)
     all_stiffness = (bed.weight[:, None] * bed.stiffness[None]).reshape(-1, state.n)
-    bed.law_gaps, bed.slopes, bed.intercepts = sort_bed(all_gaps, all_stiffness)
+    state.obey(all_gaps, all_stiffness)
 
 
 def hand_over(state: State) -> None:
     """Give each trial's record what the setup has found; from here on it is the trial."""
     skin, bed, values, n = state.skin, state.bed, state.values, state.n
     dof, lines, columns = len(state.q), len(bed.weight), len(state.columns)
-    rate_hz = state.scene.trials["rate_hz"]
+    rate_hz, none = state.scene.trials["rate_hz"], np.zeros((lines, n))
     of_rows = {
-        "row_z": np.broadcast_to(state.row_z, (skin.rows, n)),
         "weight": bed.weight,
-        "line_gap": np.broadcast_to(bed.line_gap, bed.weight.shape),
-        "line_depth": np.zeros((lines, n)),
+        "line_gap": bed.line_gap + none,
+        "line_depth": none,
         "gaps": bed.gaps,
         "stiffness": bed.stiffness,
         "column_gaps": state.column_gaps,
         "reach": state.reach,
-        "law_gaps": bed.law_gaps,
-        "slopes": bed.slopes,
-        "intercepts": bed.intercepts,
         "image": np.zeros((skin.rows, columns, n)),
     }
     numbers = {
@@ -202,7 +233,7 @@ def hand_over(state: State) -> None:
         "rate_hz": rate_hz,
         "joints": dof,
         "chain": addresses(state.kinematics.table)[0],
-        "z": state.z,
+        "row_z": addresses(state.row_z)[0],
         "taxel_k": state.taxel_k,
         "width_m": values["width_m"],
         "face_radius_m": values["radius_m"],
@@ -212,8 +243,6 @@ def hand_over(state: State) -> None:
         "lines": lines,
         "columns": columns,
         "springs": len(bed.gaps),
-        "law_lines": len(bed.slopes),
-        **{name: getattr(state, name).T for name in ("normal", "face", "along_face")},
         **{name: state.lend(name, array) for name, array in of_rows.items()},
     }
     trial = state.records

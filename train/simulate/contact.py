@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from train.simulate.compiled import Array
 
@@ -44,13 +45,19 @@ def total(values: Array) -> Array:
     return whole
 
 
-def sort_bed(gaps: Array, stiffness: Array) -> tuple[Array, Array, Array]:
-    """The law of springs (E, n): gaps in ascending order, slopes K and intercepts B of
-    phi(a) = max(0, max_s(K_s a - B_s)), (E, n) each."""
-    order = np.argsort(gaps, axis=0, kind="stable")
-    gaps = np.take_along_axis(gaps, order, 0)
-    stiffness = np.take_along_axis(stiffness, order, 0)
+def by_depth(gaps: Array, stiffness: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """Springs (E, n) in the order of their gaps: which each is, its gap and its stiffness."""
+    order = gaps.argsort(axis=0, kind="stable")
+    trials = np.arange(gaps.shape[1])
+    return order, gaps[order, trials], stiffness[order, trials]
+
+
+def sort_bed(gaps: Array, stiffness: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    """The law of springs (E, n): which they are by their gaps, these in ascending order, slopes K
+    and intercepts B of phi(a) = max(0, max_s(K_s a - B_s)), (E, n) each."""
+    order, gaps, stiffness = by_depth(gaps, stiffness)
     return (
+        order,
         gaps,
         np.add.accumulate(stiffness, axis=0),
         np.add.accumulate(stiffness * gaps, axis=0),

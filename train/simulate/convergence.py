@@ -133,5 +133,6 @@ def _shows_swings(scene: Scene, trials: tuple[TrialSpec, ...]) -> float:
         return math.inf
     plan, values = make_plan(scene, kind.effects), middle_values(scene, trials)
     state = begin(scene, plan, trials, 1.0, values)
-    stiffest = state.bed.slopes.max(axis=0)
+    rows, springs = state.arrays["weight"][:, :, None], state.arrays["stiffness"][:, None]
+    stiffest = (rows * springs * state.arrays.get("alive", 1.0)).sum(axis=(1, 2))
     return OF_A_SWING * float(np.sqrt(values["mass_kg"] / stiffest).min())

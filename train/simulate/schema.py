@@ -147,7 +147,7 @@ EFFECTS: dict[str, EffectInfo] = {
         keys=("cover_n_m",),
     ),
     "pop": EffectInfo(
-        "bubbles: the gas law, no stiffness after the burst", "contact", 2, families=(BUBBLES,)
+        "bubbles: the gas law, no stiffness after the burst", "contact", 3, families=(BUBBLES,)
     ),
     "stems": EffectInfo(
         "foliage: stems that bend, damp and slip off", "contact", 2, families=(FOLIAGE,)
@@ -155,7 +155,7 @@ EFFECTS: dict[str, EffectInfo] = {
     "tilt": EffectInfo(
         "the forearm pivots about the contact",
         "contact",
-        3,
+        2,
         families=(RIGID, FOAM, PILLOW, BUBBLES),
     ),
     "relaxation": EffectInfo("standard linear solid", "contact", 1, families=ELASTIC),

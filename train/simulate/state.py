@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from train.simulate.arm import Kinematics
 from train.simulate.compiled import Array, addresses
+from train.simulate.contact import sort_bed
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
 from train.simulate.trial import TRIAL, Part, Rows
 
@@ -23,17 +24,12 @@ class Bed:
         stiffness: (S, n) newtons a metre.
         weight: (L, n) the part of each line that the object covers.
         line_gap: (L, n) metres by which the object's face draws back; (1, n) where it is flat.
-        law_gaps, slopes, intercepts: (E, n) the law of the whole bed, phi(a) = max_s (K_s a - B_s),
-            and the depths from which each K_s counts.
     """
 
     gaps: Array
     stiffness: Array
     weight: Array
     line_gap: Array
-    law_gaps: Array = field(init=False)
-    slopes: Array = field(init=False)
-    intercepts: Array = field(init=False)
 
 
 @dataclass
@@ -59,9 +55,6 @@ class State:
         q: (dof, n) radians, before the first step.
         row_z: (rows, 1) metres in the skin's link, of its rows.
         z: (n,) the same of what meets the object.
-        approach: (n,) m/s along the push before the contact.
-        normal, face, along_face: (3, n) the object's face: its normal, a point, the direction
-            along the forearm.
         columns: (C, n) those that can touch; `column_gaps` (C, n) metres that each lies back at
             zero depth, `reach` the part of it that the face can touch.
         taxel_k: (n,) newtons a metre, of a taxel and what is in series with it.
@@ -90,11 +83,6 @@ class State:
 
     row_z: Array = field(init=False)
     z: Array = field(init=False)
-    approach: Array = field(init=False)
-    normal: Array = field(init=False)
-    face: Array = field(init=False)
-    along_face: Array = field(init=False)
-    meeting_angle: Array = field(init=False)
     columns: NDArray[np.intp] = field(init=False)
     column_gaps: Array = field(init=False)
     reach: Array = field(init=False)
@@ -127,6 +115,15 @@ class State:
         by_trial = values.transpose(-1, *range(values.ndim - 1))
         own = self.arrays[name] = by_trial.copy()
         return addresses(own)
+
+    def obey(self, gaps: Array, stiffness: Array) -> NDArray[np.intp]:
+        """Give the records the law of springs (E, n), phi(a) = max_s (K_s a - B_s), and the depths
+        from which each K_s counts; (E, n) which spring is the first, second and so on by depth."""
+        order, *law = sort_bed(gaps, stiffness)
+        self.records["law_lines"] = len(gaps)
+        for name, part in zip(("law_gaps", "slopes", "intercepts"), law, strict=True):
+            self.records[name] = self.lend(name, part)
+        return order
 
     def places(self, fields: list[tuple[Part | None, str]]) -> NDArray[np.int64]:
         """(fields, n) addresses of a field of the trials themselves, or of an effect's part."""

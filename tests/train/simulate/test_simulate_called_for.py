@@ -116,7 +116,7 @@ OWN = {
 
 
 BASE_ARRAYS = {
-    *("row_z", "weight", "line_gap", "line_depth", "gaps", "stiffness"),
+    *("weight", "line_gap", "line_depth", "gaps", "stiffness"),
     *("column_gaps", "reach", "law_gaps", "slopes", "intercepts", "image"),
 }
 
@@ -178,7 +178,7 @@ def test_4_streams_go_by_name_not_by_place():
 def test_5_the_number_of_functions_is_exact():
     bare = make_plan(scene(), ())
     assert {s: len(getattr(bare, s)) for s in STAGES} == {
-        "setup": 7,
+        "setup": 6,
         "pace": 0,
         "tune": 1,
         "frame": 1,

@@ -99,14 +99,14 @@ class TestArm:
         state = batch.state
         poses = arm.Kinematics(Chain.cody()).pose(batch.joints[0].T)
         point = poses.origin + poses.rotation[:, 2] * state.z[0]
-        along = ((point - state.face[:, :1]) * state.normal[:, :1]).sum(axis=0) + RADIUS
+        along = ((point - state.trial.face[:1].T) * state.trial.normal[:1].T).sum(axis=0) + RADIUS
         touched = np.flatnonzero(batch.force[0] > 0.0)
         assert np.abs(along[touched]).max() < 2e-3
         one = copy(state)
         one.start = state.start[:, :1]
         free = arm.Kinematics(Chain.cody()).pose(base.equilibrium(one, batch.t[-1]))
         gone = free.origin[:, 0] + free.rotation[:, 2, 0] * state.z[0]
-        assert (gone - state.face[:, 0]) @ state.normal[:, 0] + RADIUS > 0.12
+        assert (gone - state.trial.face[0]) @ state.trial.normal[0] + RADIUS > 0.12
 
 
 class TestSliding:
@@ -221,13 +221,13 @@ class TestInertia:
         """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never pulling."""
         state, rate = batch.state, math.radians(30.0)
         kinematics = arm.Kinematics(state.scene.arm)
-        slopes, intercepts = state.bed.slopes[:, 0], state.bed.intercepts[:, 0]
+        slopes, intercepts = state.arrays["slopes"][0], state.arrays["intercepts"][0]
 
         def contact_at(q, speed):
             pose = kinematics.pose(np.array([[q]]))
             axis = pose.origin[:, 0] + pose.rotation[:, 2, 0] * state.z[0]
-            normal = state.normal[:, 0]
-            depth = (axis - state.face[:, 0]) @ normal + RADIUS
+            normal = state.trial.normal[0]
+            depth = (axis - state.trial.face[0]) @ normal + RADIUS
             lever = np.cross(pose.axes[:, 0, 0], axis) @ normal
             elastic = max((slopes * depth - intercepts).max(), 0.0)
             stiffness = slopes[np.argmax(slopes * depth - intercepts)] if elastic > 0.0 else 0.0
@@ -324,7 +324,7 @@ class TestFriction:
 
     def test_the_skin_moves_along_the_face_as_its_jacobian_says(self):
         state = run(make(one_object(width_m=0.05, skin_friction=0.4))).state
-        t, along = state.trial, state.along_face
+        t, along = state.trial, state.trial.along_face.T
         skin = (t.point + RADIUS * t.normal - t.origin).T
         local = np.einsum("ikn,in->kn", pose_of(state, t.q_frame).rotation, skin)
         for j in range(4):
@@ -345,18 +345,18 @@ class TestFriction:
     def test_what_is_soft_and_smooth_presses_along_the_forearms_own_normal(self):
         foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
         t = (state := run(make(foam, "tilt")).state).trial
-        push = t.loads[:, 0] * state.normal + state.of(SHEAR).pull * state.along_face
+        push = t.loads[:, 0] * t.normal.T + state.of(SHEAR).pull * t.along_face.T
         forearm = t.rotation[:, :, 2].T
-        askew = (state.normal * forearm).sum(axis=0)
+        askew = (t.normal.T * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
         np.testing.assert_allclose((push * forearm).sum(axis=0) / t.loads[:, 0], 0.0, atol=0.01)
 
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
         state, t = batch.state, batch.state.trial
-        push = t.loads[:, 0] * state.normal + state.of(SHEAR).pull * state.along_face
+        push = t.loads[:, 0] * t.normal.T + state.of(SHEAR).pull * t.along_face.T
         forearm = pose_of(state, t.q).rotation[:, 2]
-        own = state.normal - forearm * (state.normal * forearm).sum(axis=0)
+        own = t.normal.T - forearm * (t.normal.T * forearm).sum(axis=0)
         own /= np.sqrt((own * own).sum(axis=0))
         np.testing.assert_allclose(batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3)
 
@@ -365,7 +365,7 @@ class TestFriction:
         held = run(make(one_object(conditions=["movable"], skin_friction=0.5, **box)))
         shear, mover = held.state.of(SHEAR), held.state.of(MOVER)
         weigh = np.array([friction.weigh.address])
-        shear.pull = 5.0 / held.state.along_face[2]
+        shear.pull = 5.0 / held.state.trial.along_face[:, 2]
         each(weigh, held.state.trial.here)
         assert mover.weight.tolist() == [0.0, 0.0]
         shear.pull = -shear.pull
@@ -381,7 +381,7 @@ class TestFriction:
         assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
         shear, mover = held.state.of(SHEAR), held.state.of(MOVER)
         assert mover.weight[0] == pytest.approx(
-            GRAVITY - shear.pull[0] * held.state.along_face[2, 0], rel=0.01
+            GRAVITY - shear.pull[0] * held.state.trial.along_face[0, 2], rel=0.01
         )
         assert held.force[0].max() > 1.2 * plain.force[0].max()
 

@@ -43,7 +43,7 @@ class TestRelaxation:
         rng = np.random.default_rng(8)
         gaps = np.sort(rng.uniform(0.0, 0.02, (6, 40)), axis=0)
         gaps[0] = 0.0
-        gaps, slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
+        _, gaps, slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
         rig = tools.Rig(
             h=0.01,
             arm_k=1e12,
@@ -130,7 +130,8 @@ class TestBed:
             k = 2.0 ** rng.integers(-3, 30, 5)
             c = float(2.0 ** rng.integers(-12, 2))
             free = float(rng.integers(1, furthest)) / 1024.0
-            force = contact.closed_form(*contact.sort_bed(gaps, k), free, c)
+            _, *law = contact.sort_bed(gaps[:, None], k[:, None])
+            force = contact.closed_form(*(part[:, 0] for part in law), free, c)
             best = Fraction(0)
             total_k = total_b = Fraction(0)
             for g, s in zip(gaps, k, strict=True):

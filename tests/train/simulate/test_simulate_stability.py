@@ -121,7 +121,7 @@ class TestGrid:
         gaps = np.sort(rng.uniform(0.0, 0.05, (9, n)), axis=0)
         gaps[0] = 0.0
         k = 10.0 ** rng.uniform(0, 6, (9, n))
-        gaps, slopes, intercepts = contact.sort_bed(gaps, k)
+        _, gaps, slopes, intercepts = contact.sort_bed(gaps, k)
         mass = 10.0 ** rng.uniform(-3, 1, n)
         rig = tools.Rig(
             h=10.0 ** rng.uniform(-3, -1, n),
@@ -319,7 +319,7 @@ def lugre(h, *, explicit, v=0.2, sigma=1e5, hold=1.0):
 def taxel_forces(rig, gaps, k, steps):
     """What presses beds of springs (S, n) on a rig in the end, and what all their taxels bear of
     it: as stiffness times depth, and shared out."""
-    law = dict(zip(("gaps", "slopes", "intercepts"), contact.sort_bed(gaps, k), strict=True))
+    law = dict(zip(("gaps", "slopes", "intercepts"), contact.sort_bed(gaps, k)[1:], strict=True))
     trace = rig(h=0.01, **law).run(steps)
     force, sums = trace.force[-1], []
     for i, one in enumerate(force):

@@ -15,7 +15,7 @@ from numba import njit
 from train.simulate import base, base_steps
 from train.simulate.base_steps import bed_loads, lay_law
 from train.simulate.compiled import indices, integers, matrix, vector
-from train.simulate.contact import share_out, sort_bed
+from train.simulate.contact import share_out
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 from train.simulate.trial import Part, compiled
@@ -26,39 +26,18 @@ BREAKS = (1.0 / 3.0, 2.0 / 3.0)
 """Depths at which they cross, as multiples of b."""
 SEGMENTS = len(SLOPES) + 1
 
-POP = Part("pop", "pop_n", ("in_order", "?"), *integers("order", "bears", "loads"))
-"""The newtons that burst a bubble; whether the bed's law is asked for, as no pivoting forearm's
-solver asks the rows themselves; of all rows' springs by their gaps; room for a number of each,
-twice."""
+POP = Part("pop", "pop_n", *integers("order", "bears", "loads"))
+"""The newtons that burst a bubble; of all rows' springs: which is the first, second and so on by
+its gap, if that is asked for, and room for two numbers."""
 pop_of = POP.of
 
 
 def add(build: Build) -> None:
     """Bubbles between skin and backing."""
-    in_order = "tilt" not in build.effects
-
-    def begin(state: State) -> None:
-        """Every bubble is whole."""
-        bed = state.bed
-        rows, (springs, n) = len(bed.weight), bed.gaps.shape
-        alive = np.ones((rows, springs, n))
-        alive[:, springs // SEGMENTS * (SEGMENTS - 1) :] = 0.0
-        gaps = (bed.line_gap[:, None] + np.broadcast_to(bed.gaps, alive.shape)).reshape(-1, n)
-        order = np.argsort(gaps, axis=0, kind="stable")
-        stiffness = bed.weight[:, None] * (bed.stiffness[None] * alive)
-        bed.law_gaps, bed.slopes, bed.intercepts = sort_bed(gaps, stiffness.reshape(-1, n))
-        state.trial.alive = state.lend("alive", alive)
-        state.begin(
-            POP,
-            pop_n=state.values["pop_n"],
-            in_order=in_order,
-            order=state.lend("pop_order", order.astype(np.int64)),
-            bears=state.lend("pop_bears", np.zeros_like(gaps)),
-            loads=state.lend("pop_loads", alive),
-        )
-
     build.put("setup", base.BED + 5, inflate)
-    build.replace(base.order_bed, begin)
+    build.put("setup", base.BED + 6, begin)
+    if "tilt" not in build.effects:
+        build.replace(base.order_bed, order)
     build.replace(base_steps.image, image)
     build.put("sample", base.IMAGE + 20, burst)
 
@@ -86,11 +65,31 @@ def inflate(state: State) -> None:
     )
 
 
+def begin(state: State) -> None:
+    """Every bubble is whole."""
+    springs, n = state.bed.gaps.shape
+    alive = np.ones((len(state.bed.weight), springs, n))
+    alive[:, springs // SEGMENTS * (SEGMENTS - 1) :] = 0.0
+    state.records["alive"] = state.lend("alive", alive)
+    loads = state.lend("pop_loads", alive)
+    state.begin(POP, pop_n=state.values["pop_n"], loads=loads)
+
+
+def order(state: State) -> None:
+    """The bed's law, and room for what it becomes as bubbles burst."""
+    bed, own = state.bed, state.of(POP)
+    alive = np.moveaxis(state.arrays["alive"], 0, -1)
+    gaps = (bed.line_gap[:, None] + np.broadcast_to(bed.gaps, alive.shape)).reshape(-1, state.n)
+    stiffness = bed.weight[:, None] * (bed.stiffness[None] * alive)
+    own.order = state.lend("pop_order", state.obey(gaps, stiffness.reshape(-1, state.n)))
+    own.bears = state.lend("pop_bears", np.zeros_like(gaps))
+
+
 @njit(error_model="numpy")
 def law(t: Any) -> None:
-    """The law of the springs that are there."""
+    """The law of the springs that are there; a pivoting forearm's solver asks the rows instead."""
     own = pop_of(t)
-    if not own.in_order:
+    if own.order == 0:
         return
     weight, stiffness = vector(t.weight, t.rows), vector(t.stiffness, t.springs)
     alive, order = matrix(t.alive, t.rows, t.springs), indices(own.order, t.law_lines)

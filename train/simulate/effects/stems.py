@@ -11,7 +11,6 @@ from numba import njit
 from train.simulate import base, base_steps, streams
 from train.simulate.base_steps import lay_law
 from train.simulate.compiled import indices, integers, vector
-from train.simulate.contact import sort_bed
 from train.simulate.plan import Build
 from train.simulate.state import Bed, State
 from train.simulate.trial import Part, compiled
@@ -80,16 +79,14 @@ def stand(state: State) -> None:
     """The stems by depth, and what each damps: 2 zeta sqrt(k m)."""
     values, bed, own = state.values, state.bed, state.of(STEMS)
     stiffness = bed.weight * bed.stiffness
-    order = np.argsort(bed.line_gap, axis=0, kind="stable")
     damping = (2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])) * (
         bed.weight > 0.0
     )
-    bed.law_gaps, bed.slopes, bed.intercepts = sort_bed(bed.line_gap, stiffness)
     own.slip_m = values["stem_slip_m"]
-    own.order = state.lend("stem_order", order.astype(np.int64))
+    own.order = state.lend("stem_order", state.obey(bed.line_gap, stiffness))
     own.damping = state.lend("stem_damping", damping)
-    own.slopes = state.lend("stem_slopes", bed.slopes)
-    own.intercepts = state.lend("stem_intercepts", bed.intercepts)
+    own.slopes = state.lend("stem_slopes", state.arrays["slopes"].T)
+    own.intercepts = state.lend("stem_intercepts", state.arrays["intercepts"].T)
     own.sorted = state.lend("stem_sorted", stiffness)
     own.loads = state.lend("stem_loads", stiffness)
 

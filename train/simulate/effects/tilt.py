@@ -14,7 +14,7 @@ import numpy as np
 from train.simulate import base, base_steps
 from train.simulate.base_steps import crossed, deepest, pose
 from train.simulate.compiled import vector
-from train.simulate.contact import covered, curve_gap
+from train.simulate.contact import by_depth, covered, curve_gap
 from train.simulate.pivot_solver import GUARDED_ROUNDS, PIVOT, pivot_of, search
 from train.simulate.plan import Build
 from train.simulate.state import State
@@ -27,16 +27,15 @@ def add(build: Build) -> None:
 
     def upright(state: State) -> None:
         """No load yet."""
-        gaps, stiffness = state.bed.gaps, state.bed.stiffness
-        column = np.argsort(gaps, axis=0, kind="stable")
+        column, gaps, stiffness = by_depth(state.bed.gaps, state.bed.stiffness)
         none = np.zeros((state.skin.rows, state.n))
         state.trial.coordinates = 2
         state.begin(
             PIVOT,
             springs=len(gaps),
-            gaps=state.lend("pivot_gaps", np.take_along_axis(gaps, column, axis=0)),
-            stiffness=state.lend("pivot_stiffness", np.take_along_axis(stiffness, column, axis=0)),
-            column=state.lend("pivot_column", column.astype(np.int64)),
+            gaps=state.lend("pivot_gaps", gaps),
+            stiffness=state.lend("pivot_stiffness", stiffness),
+            column=state.lend("pivot_column", column),
             alive=state.trial.alive,
             bursts=bursts,
             rows=state.skin.rows,
@@ -50,9 +49,9 @@ def add(build: Build) -> None:
         own = state.of(PIVOT)
         own.weight, own.line_gap = state.trial.weight, state.trial.line_gap
 
+    build.replace(base.order_bed, upright)
     build.replace(base_steps.locate, pivot)
     build.replace(base_steps.bear, bear)
-    build.put("setup", base.ORDER + 2, upright)
     build.put("setup", base.HAND_OVER + 2, lay)
     build.put("step", base.SETTLE + 20, remember)
     build.wrap(solve)
