@@ -162,14 +162,15 @@ def write_whole(
         InputError: the folder cannot be written, or the disk is full.
     """
     target = Path(path)
+    folder = target.parent
     taken = NameTaken(f"{target}: exists already; choose another name or remove it")
     if not overwrite and target.exists():
         raise taken
     # Not after the target's name, which may be as long as a name can be.
-    temporary = target.parent / f".edge-classify-{os.urandom(8).hex()}"
+    temporary = folder / f".edge-classify-{os.urandom(8).hex()}"
     try:
-        if not target.parent.is_dir():
-            target.parent.mkdir(parents=True, exist_ok=True)
+        if not folder.is_dir():
+            folder.mkdir(parents=True, exist_ok=True)
         with open(temporary, "xb") as file:
             yield file
             file.flush()
@@ -180,10 +181,10 @@ def write_whole(
         else:
             _name_free(temporary, target)
         if lasting:
-            _sync_folder(target.parent)
+            _sync_folder(folder)
     except FileExistsError as error:
-        if error.filename == os.fspath(target.parent):
-            raise InputError(f"{target}: cannot be written: {target.parent} is a file") from None
+        if error.filename == os.fspath(folder):
+            raise InputError(f"{target}: cannot be written: {folder} is a file") from None
         raise taken from None
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None

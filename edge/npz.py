@@ -9,9 +9,11 @@ import io
 import struct
 import zlib
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import dtype_to_descr, write_array_header_1_0
 from numpy.typing import NDArray
 
 LARGEST_BYTES = 1 << 31
@@ -26,9 +28,7 @@ def pieces(arrays: Mapping[str, NDArray[Any]]) -> list[bytes | memoryview]:
     directory, at = b"", 0
     for key, array in arrays.items():
         array = np.asarray(array, order="C")
-        described = np.lib.format.header_data_from_array_1_0(array)
-        np.lib.format.write_array_header_1_0(npy := io.BytesIO(), described)
-        header, data = npy.getvalue(), array.reshape(-1).view(np.uint8).data
+        header, data = _header(array.dtype, array.shape), array.reshape(-1).view(np.uint8).data
         name, size = f"{key}.npy".encode(), len(header) + len(data)
         # The version of ZIP that reads it, no flags, neither packed nor at any hour of its day.
         fields = struct.pack("<5HL", 20, 0, 0, 0, FIRST_DAY, zlib.crc32(data, zlib.crc32(header)))
@@ -40,3 +40,11 @@ def pieces(arrays: Mapping[str, NDArray[Any]]) -> list[bytes | memoryview]:
     count, size = len(arrays), len(directory)
     end = b"PK\x05\x06" + struct.pack("<4H2LH", 0, 0, count, count, size, at, 0)
     return [*out, directory + end]
+
+
+@lru_cache(maxsize=64)
+def _header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    """What stands before an array's numbers; recordings of a kind have the same."""
+    described = {"descr": dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    write_array_header_1_0(npy := io.BytesIO(), described)
+    return npy.getvalue()

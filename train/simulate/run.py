@@ -116,11 +116,11 @@ def recordings(
 ) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a run, or of some, as a scene's plan shows them."""
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
-    values = physics.state.values
+    values = {name: value.tolist() for name, value in physics.state.values.items()}
     for seen in readings(physics, plan, which):
         trial, kept = seen.trial, slice(None) if seen.kept is None else seen.kept
         t = seen.t if seen.times is None else seen.times
-        drawn = {name: float(value[seen.which]) for name, value in values.items()}
+        drawn = {name: value[seen.which] for name, value in values.items()}
         soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
         file = file_name(scene, trial)
         meta: dict[str, Any] = {
@@ -133,7 +133,7 @@ def recordings(
             "skin": skin,
             "arm": arm,
             "source": f"simulated: {scene.name}",
-            "trial": Path(file).stem,
+            "trial": file.removesuffix(".npz"),
             "simulation": {
                 "seed": scene.seed,
                 "step_s": step_s,
@@ -164,7 +164,7 @@ def simulate_part(
     out: list[Simulated] = []
     for name, trial in simulate_trials(scene, trials, step_s):
         if folder is not None:
-            recording.save(Path(folder) / name, trial, lasting=False)
+            recording.save(f"{folder}/{name}", trial, lasting=False)
         redrawn = int(trial.meta["simulation"]["redrawn"])
         felt = bool(trial.frames.max(initial=0) > scene.skin.onset)
         out.append(Simulated(name, redrawn, felt, trial if folder is None else None))
