@@ -41,6 +41,7 @@ class Kinematics:
 
     Attributes:
         table: (dof + 1, WIDTH) what lies before each joint, and its axis; last what lies behind.
+        limits: (2, dof, 1) radians, the lower and the upper of each joint; without them infinite.
     """
 
     def __init__(self, chain: Chain) -> None:
@@ -71,6 +72,8 @@ class Kinematics:
             main = int(np.argmax(np.abs(axis)))
             rows.append(_row(before, axis, main if abs(axis[main]) == 1.0 else 3))
         self.table = np.array([*rows, _row(pending, np.zeros(3), 3)])
+        none = (-math.inf, math.inf)
+        self.limits = np.array([pair or none for pair in chain.limits]).T[:, :, None]
 
     def pose(self, q: Array) -> Pose:
         """Poses at the angles q (dof, n)."""

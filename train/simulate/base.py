@@ -11,7 +11,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch.arm import Chain
 from train.simulate import base_steps
 from train.simulate.arm import dot, pose_of
 from train.simulate.compiled import Array, addresses
@@ -53,13 +52,6 @@ def equilibrium(state: State, t: float | Array) -> Array:
     return np.asarray(state.start + state.rate * np.minimum(t, state.travel_s))
 
 
-def limits(chain: Chain) -> tuple[Array, Array]:
-    """(dof, 1) radians, the lower and upper limit of each joint; without limits infinite."""
-    none = (-math.inf, math.inf)
-    both = [pair if pair is not None else none for pair in chain.limits]
-    return np.array([b[0] for b in both])[:, None], np.array([b[1] for b in both])[:, None]
-
-
 def swing(state: State) -> None:
     """Set the arm in its steady sweep.
 
@@ -69,7 +61,7 @@ def swing(state: State) -> None:
     scene = state.scene
     k = np.array(scene.stiffness)[:, None]
     d = np.array(scene.damping)[:, None]
-    low, high = limits(scene.arm)
+    low, high = state.kinematics.limits
     start = np.repeat(np.array(scene.start)[:, None], state.n, axis=1)
     start[-1] += np.radians(state.values["roll_deg"])
     state.start = np.clip(start, low, high)

@@ -117,7 +117,8 @@ def compiled(dtype: np.dtype[Any]) -> Callable[[Callable[[Any], None]], Any]:
 def addresses(array: NDArray[Any]) -> NDArray[np.int64]:
     """(n,) of an array's parts along its first axis, whose numbers lie side by side."""
     assert array.flags.c_contiguous
-    return array.ctypes.data + array.strides[0] * np.arange(len(array))
+    first, step = array.ctypes.data, array.strides[0]
+    return np.arange(first, first + step * len(array), step)
 
 
 @njit(cache=True, error_model="numpy")

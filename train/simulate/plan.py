@@ -71,7 +71,6 @@ class Build:
     effects: tuple[str, ...]
     owner: str = "base"
     entries: list[tuple[str, int, Any]] = field(default_factory=list)
-    sensors: list[tuple[str, int, SensorFunction]] = field(default_factory=list)
     solve: Compiled = field(init=False)
     press: Compiled = field(init=False)
     traces: dict[str, Trace] = field(default_factory=dict)
@@ -86,8 +85,7 @@ class Build:
 
     def read(self, stage: str, rank: int, function: SensorFunction) -> None:
         """Add a function to a stage of the sensor; the lower rank runs first."""
-        self.sensors.append((stage, rank, function))
-        self.owners[function] = self.owner
+        self.put(stage, rank, function)
 
     def replace(self, function: Any, by: Any) -> None:
         """Let `by` run where `function` would."""
@@ -112,25 +110,11 @@ class Build:
 
     def plan(self) -> Plan:
         """The plan as it has been put together."""
-
-        def stage(name: str) -> tuple[Any, ...]:
-            ranked = sorted((e for e in self.entries if e[0] == name), key=lambda e: e[1])
-            return tuple(function for _, _, function in ranked)
-
-        def reading(name: str) -> tuple[SensorFunction, ...]:
-            ranked = sorted((e for e in self.sensors if e[0] == name), key=lambda e: e[1])
-            return tuple(function for _, _, function in ranked)
-
+        ranked = sorted(self.entries, key=lambda entry: entry[1])
+        stages = {name: tuple(f for stage, _, f in ranked if stage == name) for name in STAGES}
         return Plan(
             effects=self.effects,
-            setup=stage("setup"),
-            pace=stage("pace"),
-            tune=stage("tune"),
-            frame=stage("frame"),
-            step=stage("step"),
-            sample=stage("sample"),
-            clock=reading("clock"),
-            sensor=reading("sensor"),
+            **stages,
             solve=self.solve,
             press=self.press,
             traces=self.traces,

@@ -15,7 +15,7 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
     for name in IMPLIED_BY_CONDITION.get(condition, ()):
         required[name] = condition
     for name, info in EFFECTS.items():
-        if info.keys and all(key in item.given for key in info.keys):
+        if info.keys and item.given.issuperset(info.keys):
             required[name] = " and ".join(info.keys)
     for name in scene.add:
         if name not in required and _supports(item, condition, name):
@@ -23,7 +23,7 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
     for name in scene.leave_out:
         required.pop(name, None)
     while True:
-        gone = [n for n in required if any(need not in required for need in EFFECTS[n].needs)]
+        gone = [n for n in required if not required.keys() >= {*EFFECTS[n].needs}]
         if not gone:
             return {name: required[name] for name in EFFECTS if name in required}
         for name in gone:
@@ -32,11 +32,11 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
 
 def _supports(item: SceneObject, condition: str, name: str) -> bool:
     info = EFFECTS[name]
-    if any(name in names and condition != c for c, names in IMPLIED_BY_CONDITION.items()):
-        return False
     if info.families and item.family not in info.families:
         return False
-    return all(key in item.values for key in info.keys)
+    if any(name in names and condition != c for c, names in IMPLIED_BY_CONDITION.items()):
+        return False
+    return item.values.keys() >= {*info.keys}
 
 
 def check_supported(scene: Scene, where: str) -> None:

@@ -90,15 +90,20 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
     return {kind: measure(scene, tuple(trials)) for kind, trials in kinds(scene).items()}
 
 
-def steps(scene: Scene, found: dict[Kind, Convergence] | None = None) -> dict[Kind, float]:
+def steps(
+    scene: Scene,
+    found: dict[Kind, Convergence] | None = None,
+    every: Iterable[Kind] | None = None,
+) -> dict[Kind, float]:
     """The physics' step of each kind of trials: the smallest that the scene's `step_s` gives
-    its effects, or the measured one where the scene gives none (`found`, if it is at hand)."""
+    its effects, or the measured one where the scene gives none (`found` and `every` kind, if they
+    are at hand)."""
     if not scene.step_s:
         found = measured(scene) if found is None else found
         return {kind: convergence.step_s for kind, convergence in found.items()}
     return {
         kind: min(scene.step_s[name] for name in ("base", *kind.effects) if name in scene.step_s)
-        for kind in kinds(scene)
+        for kind in every or kinds(scene)
     }
 
 
@@ -177,10 +182,11 @@ def parts(
     """The scene cut into batches: (trials, step) each; `found` as for `steps`."""
     if batch < 1:
         raise InputError(f"--batch must be at least 1, not {batch}")
-    step = steps(scene, found)
+    every = kinds(scene)
+    step = steps(scene, found, every)
     return [
         (tuple(trials[i : i + batch]), step[kind])
-        for kind, trials in kinds(scene).items()
+        for kind, trials in every.items()
         for i in range(0, len(trials), batch)
     ]
 

@@ -102,7 +102,7 @@ class Scene:
         """The arm's."""
         return Kinematics(self.arm)
 
-    @property
+    @cached_property
     def cylinder(self) -> Cylinder:
         """The skin's shape; `load` has made sure that it is a cylinder."""
         skin = self.skin

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,19 +36,20 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     """What each trial of a run did against its label; None where it did as it says."""
     scene, labels = physics.state.scene, physics.state.scene.labels
     touched = physics.force > 0.0
-    onset = np.argmax(touched, axis=1)
+    onset, every = np.argmax(touched, axis=1), np.arange(len(touched))
+    ever = touched[every, onset]
     last = onset + round(labels["window_s"] * scene.trials["rate_hz"])
     last = np.minimum(last, touched.shape[1] - 1)
 
-    def by_then(name: str) -> NDArray[np.float64]:
-        return np.array([t[: k + 1].max() for t, k in zip(physics.traces[name], last, strict=True)])
+    def by_then(name: str) -> Any:
+        return np.maximum.accumulate(physics.traces[name], axis=1)[every, last]
 
     depth = by_then("depth_m")
     slide = by_then("slide_m") if "slide_m" in physics.traces else np.zeros(len(depth))
     found: list[Contradiction | None] = []
     for i, trial in enumerate(physics.state.trials):
         what = mend = ""
-        if not touched[i].any():
+        if not ever[i]:
             what = "was never touched"
             mend = "let [motion] reach it, and the skin's columns face it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
@@ -59,7 +61,7 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
                 what = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
                 mend = "lower its stiffness, or labels.yields"
         if what:
-            cut, longer = _cut_short(physics, i, physics.t[onset[i]] if touched[i].any() else 0.0)
+            cut, longer = _cut_short(physics, i, physics.t[onset[i]] if ever[i] else 0.0)
             found.append(Contradiction(what + cut, longer + mend))
         else:
             found.append(None)
