@@ -240,16 +240,17 @@ def write(
         for trial in part:
             if trial.recording is not None:
                 recording.save(target / trial.name, trial.recording, lasting=False)
-            made.append(replace(trial, recording=None))
+                trial = replace(trial, recording=None)
+            made.append(trial)
         progress(len(part))
     return Written(
-        paths=sorted(target / trial.name for trial in made),
+        paths=[target / name for name in sorted(trial.name for trial in made)],
         redrawn=sum(1 for trial in made if trial.redrawn),
         unfelt=sum(1 for trial in made if not trial.felt),
         rough={
-            trials[0].key: found[kind].error
-            for kind, trials in kinds(scene).items()
-            if found and not found[kind].within
+            kinds(scene)[kind][0].key: convergence.error
+            for kind, convergence in found.items()
+            if not convergence.within
         },
     )
 
