@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -11,23 +10,6 @@ from numba import njit
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate.compiled import Array
-
-
-class Pose(NamedTuple):
-    """Where n arms are.
-
-    Attributes:
-        origin: (3, n) metres, the tip.
-        rotation: (3, 3, n), the tip's axes as columns.
-        axes: (3, dof, n), each joint's axis in the base's frame.
-        origins: (3, dof, n) metres, a point of each axis.
-    """
-
-    origin: Array
-    rotation: Array
-    axes: Array
-    origins: Array
-
 
 JOINTS = 16
 """That turn, at most."""
@@ -50,7 +32,6 @@ class Kinematics:
         Raises:
             InputError: a joint slides, or there are too many.
         """
-        self.chain = chain
         if chain.dof > JOINTS:
             raise InputError(
                 f"the arm has {chain.dof} joints that turn; the simulator takes at most {JOINTS}: "
@@ -74,14 +55,6 @@ class Kinematics:
         self.table = np.array([*rows, _row(pending, np.zeros(3), 3)])
         none = (-math.inf, math.inf)
         self.limits = np.array([pair or none for pair in chain.limits]).T[:, :, None]
-
-    def pose(self, q: Array) -> Pose:
-        """Poses at the angles q (dof, n)."""
-        dof, n = q.shape
-        origin, rotation = np.empty((n, 3)), np.empty((n, 3, 3))
-        axes, origins = np.empty((n, 3, dof)), np.empty((n, 3, dof))
-        poses(self.table, np.ascontiguousarray(q.T), origin, rotation, axes, origins)
-        return Pose(*(np.moveaxis(part, 0, -1) for part in (origin, rotation, axes, origins)))
 
 
 def _row(before: tuple[Array, Array], axis: Array, main: int) -> Array:
@@ -146,7 +119,14 @@ def turn(step: Array, angle: float, rotation: Array) -> None:
 def pose_of(
     table: Array, q: Array, origin: Array, rotation: Array, axes: Array, origins: Array
 ) -> None:
-    """One arm's pose at its angles (dof, or more room), into arrays as of `Pose`."""
+    """One arm's pose at its angles (dof, or more room).
+
+    Args:
+        origin: (3,) metres, the tip.
+        rotation: (3, 3), the tip's axes as columns.
+        axes: (3, dof), each joint's axis in the base's frame.
+        origins: (3, dof) metres, a point of each axis.
+    """
     for i in range(3):
         origin[i] = 0.0
         for k in range(3):
@@ -163,15 +143,6 @@ def pose_of(
             )
         turn(step, q[j], rotation)
     move(table[-1], origin, rotation)
-
-
-@njit(cache=True, error_model="numpy")
-def poses(
-    table: Array, q: Array, origin: Array, rotation: Array, axes: Array, origins: Array
-) -> None:
-    """The poses of n arms, (n, ...) each."""
-    for i in range(len(q)):
-        pose_of(table, q[i], origin[i], rotation[i], axes[i], origins[i])
 
 
 @njit(error_model="numpy")

@@ -31,7 +31,7 @@ TRIAL = record(
     *vectors(JOINTS, "start", "rate", "travel_s"),
     *vectors(JOINTS, "damping", "joint_k", "held", "give"),
     *vectors(JOINTS, "q", "q_free", "q_frame"),
-    # Its pose, as of `arm.Pose`.
+    # Its pose, as of `arm.pose_of`.
     *vectors(3, "origin"),
     *((name, "f8", (3, size)) for name, size in POSE),
     # The point on the forearm's axis beside the middle of the contact; the object's face: its

@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from edge.touch.arm import Chain
-from tests.train.simulate.scenes import make, one_object, run
-from train.simulate import arm, base
+from tests.train.simulate.scenes import make, one_object, poses, run
+from train.simulate import base
 from train.simulate.assemble import make_plan
 from train.simulate.compiled import each
 from train.simulate.effects import friction, tilt
@@ -34,7 +34,7 @@ class TestArm:
     def test_kinematics_are_the_edges(self):
         chain = Chain.cody()
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (chain.dof, 50))
-        pose, want = arm.Kinematics(chain).pose(q), chain.pose(q.T)
+        pose, want = poses(chain, q), chain.pose(q.T)
         np.testing.assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
         np.testing.assert_allclose(np.moveaxis(pose.rotation, 2, 0), want[:, :3, :3], atol=2e-15)
 
@@ -54,12 +54,12 @@ class TestArm:
             }
         )
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 20))
-        pose, want = arm.Kinematics(chain).pose(q), chain.pose(q.T)
+        pose, want = poses(chain, q), chain.pose(q.T)
         np.testing.assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
         np.testing.assert_allclose(np.moveaxis(pose.rotation, 2, 0), want[:, :3, :3], atol=2e-15)
 
     def test_the_gains_give_the_stiffness_that_was_measured_at_mid_forearm(self):
-        pose = arm.Kinematics(Chain.cody()).pose(np.radians(CODY_START_DEG)[:, None])
+        pose = poses(Chain.cody(), np.radians(CODY_START_DEG)[:, None])
         along = pose.rotation[:, 2, 0]
         point = pose.origin[:, 0] + 0.103 * along
         jacobian = np.cross(pose.axes[:, :, 0].T, point - pose.origins[:, :, 0].T)
@@ -97,14 +97,14 @@ class TestArm:
         # A rigid, fixed object: the skin's point at the contact does not go on along the push.
         batch = run(make(one_object(width_m=0.05)))
         state = batch.state
-        poses = arm.Kinematics(Chain.cody()).pose(batch.joints[0].T)
-        point = poses.origin + poses.rotation[:, 2] * state.z[0]
+        held = poses(Chain.cody(), batch.joints[0].T)
+        point = held.origin + held.rotation[:, 2] * state.z[0]
         along = ((point - state.trial.face[:1].T) * state.trial.normal[:1].T).sum(axis=0) + RADIUS
         touched = np.flatnonzero(batch.force[0] > 0.0)
         assert np.abs(along[touched]).max() < 2e-3
         one = copy(state)
         one.start = state.start[:, :1]
-        free = arm.Kinematics(Chain.cody()).pose(base.equilibrium(one, batch.t[-1]))
+        free = poses(Chain.cody(), base.equilibrium(one, batch.t[-1]))
         gone = free.origin[:, 0] + free.rotation[:, 2, 0] * state.z[0]
         assert (gone - state.trial.face[0]) @ state.trial.normal[0] + RADIUS > 0.12
 
@@ -220,11 +220,10 @@ class TestInertia:
     def oracle(self, batch, loss_s):
         """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never pulling."""
         state, rate = batch.state, math.radians(30.0)
-        kinematics = arm.Kinematics(state.scene.arm)
         slopes, intercepts = state.arrays["slopes"][0], state.arrays["intercepts"][0]
 
         def contact_at(q, speed):
-            pose = kinematics.pose(np.array([[q]]))
+            pose = poses(state.scene.arm, np.array([[q]]))
             axis = pose.origin[:, 0] + pose.rotation[:, 2, 0] * state.z[0]
             normal = state.trial.normal[0]
             depth = (axis - state.trial.face[0]) @ normal + RADIUS
@@ -297,7 +296,7 @@ class TestInertia:
 
 def pose_of(state, q):
     """Of the arms at joint angles (n, 16)."""
-    return state.kinematics.pose(q[:, : state.kinematics.chain.dof].T)
+    return poses(state.scene.arm, q[:, : state.scene.arm.dof].T)
 
 
 class TestFriction:
