@@ -124,6 +124,16 @@ def test_the_longest_name_can_be_written(tmp_path):
     assert longest.read_bytes() == b"x"
 
 
+def test_a_file_has_the_rights_that_the_user_gives_to_new_ones(tmp_path):
+    before = os.umask(0o027)
+    try:
+        with write_whole(tmp_path / "new" / "a") as file:
+            file.write(b"x")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new" / "a").stat().st_mode & 0o777 == 0o640
+
+
 def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
     (tmp_path / "file").write_text("")
     check_writable(tmp_path / "new" / "folder")
