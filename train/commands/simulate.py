@@ -55,8 +55,15 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out:
         from tqdm import tqdm
 
+        from train.simulate.base_steps import press
+        from train.simulate.compiled import is_fresh
         from train.simulate.run import total_trials, write
 
+        if is_fresh(press):
+            print(
+                "compiling the simulator, once for this machine: about half a minute",
+                file=sys.stderr,
+            )
         with tqdm(total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr) as bar:
             written = write(
                 scene,

@@ -114,6 +114,11 @@ def compiled(dtype: np.dtype[Any]) -> Callable[[Callable[[Any], None]], Any]:
     return compile_
 
 
+def is_fresh(function: Any) -> bool:
+    """Whether a compiled function had to be compiled just now, as nothing was kept of it."""
+    return int(function.cache_hits) == 0
+
+
 def addresses(array: NDArray[Any]) -> NDArray[np.int64]:
     """(n,) of an array's parts along its first axis, whose numbers lie side by side."""
     assert array.flags.c_contiguous

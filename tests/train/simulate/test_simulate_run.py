@@ -11,6 +11,7 @@ import pytest
 from edge.errors import InputError
 from edge.recording import load
 from train.__main__ import main
+from train.simulate import compiled
 from train.simulate import scene as scenes
 from train.simulate.run import (
     parts,
@@ -137,6 +138,12 @@ class TestCommand:
         err = capsys.readouterr().err
         assert "8/8" in err
         assert len(list(tmp_path.iterdir())) == 8
+
+    @pytest.mark.parametrize("fresh", [True, False])
+    def test_what_compiles_first_says_so(self, tmp_path, capsys, monkeypatch, fresh):
+        monkeypatch.setattr(compiled, "is_fresh", lambda function: fresh)
+        assert main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)]) == 0
+        assert ("compiling the simulator" in capsys.readouterr().err) is fresh
 
     def test_explain_tells_what_runs_why_and_at_what_cost(self, tmp_path, capsys):
         path = tmp_path / "one.toml"
