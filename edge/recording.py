@@ -14,7 +14,6 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from edge import npz
 from edge.config import parse_json, shown
 from edge.errors import InputError
 from edge.files import open_regular, parsing, write_whole
@@ -397,14 +396,11 @@ def save_arrays(
         text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{os.fspath(path)}: meta cannot be written as JSON: {error}") from None
-    arrays = {"meta": np.array(text), **arrays}
-    if sum(array.nbytes for array in arrays.values()) > npz.LARGEST_BYTES:
-        raise InputError(f"{os.fspath(path)}: more than {npz.LARGEST_BYTES} bytes; split it")
     with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
         if compress:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+            np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
         else:
-            file.writelines(npz.pieces(arrays))
+            np.savez(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
 def find(paths: list[str]) -> list[Path]:
