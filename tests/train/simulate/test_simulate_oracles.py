@@ -400,6 +400,13 @@ class TestTilt:
             np.testing.assert_allclose(moved / 1e-6, jacobian[:, :, j], atol=2e-5)
             t.q[:, j] -= 1e-6
 
+    def test_what_has_been_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
+        box = {"mass_kg": 0.3, "friction_static": 0.3, "friction_kinetic": 0.25, "width_m": 2.0}
+        batch = run(make(one_object(conditions=["movable"], skin_friction=0.3, **box), "tilt"))
+        lever = batch.state.arrays["lever"]
+        assert (batch.traces["slide_m"][:, -1] > 0.2).all()
+        assert (lever[:, 0] == 0.0).all()  # as near to it as a row is
+
     def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
         scene = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
         t = run(scene, 0.0025).state.trial
