@@ -106,13 +106,12 @@ def share_out(force: float, loads: Array) -> None:
 
     Not the loads themselves: at a stiffness of 1e15 N/m they lose digits that the force has.
     """
-    columns = np.zeros(loads.shape[1])
-    for line in range(len(loads)):
-        for c in range(loads.shape[1]):
-            columns[c] += loads[line, c]
     whole = 0.0
     for c in range(loads.shape[1]):
-        whole += columns[c]
+        column = 0.0
+        for line in range(len(loads)):
+            column += loads[line, c]
+        whole += column
     part = force / (whole if whole > 0.0 else 1.0)
     for line in range(len(loads)):
         for c in range(loads.shape[1]):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from train.simulate.compiled import Array
@@ -49,16 +50,22 @@ class Readings:
         """(frames, rows, cols) counts of all taxels: `counts` has them from here on."""
         every = np.arange(self.shape[0] * self.shape[1])
         if not np.array_equal(self.taxels, every):
-            self.counts, self.taxels = self._spread(self.counts, self.counts.dtype), every
+            counts = np.zeros((len(self.counts), len(every)), dtype=self.counts.dtype)
+            counts[:, self.taxels] = self.counts
+            self.counts, self.taxels = counts, every
         return self.counts.reshape(-1, *self.shape)
 
     def frames(self) -> NDArray[np.uint16]:
         """(frames, rows, cols) whole counts within the converter's range."""
-        whole = np.clip(np.rint(self.counts), 0.0, FULL)
-        return self._spread(whole, np.uint16).reshape(-1, *self.shape)
+        whole = np.zeros((len(self.counts), self.shape[0] * self.shape[1]), dtype=np.uint16)
+        show(self.counts, self.taxels, whole)
+        return whole.reshape(-1, *self.shape)
 
-    def _spread(self, counts: NDArray[Any], kind: Any) -> NDArray[Any]:
-        """(frames, all taxels) of this kind, zero where there are no counts."""
-        out = np.zeros((len(counts), self.shape[0] * self.shape[1]), dtype=kind)
-        out[:, self.taxels] = counts
-        return out
+
+@njit(cache=True)
+def show(counts: NDArray[Any], taxels: NDArray[np.intp], whole: NDArray[np.uint16]) -> None:
+    """The nearest whole counts (frames, taxels of the skin) that the converter can read, of the
+    taxels (frames, n) that have any."""
+    for k in range(len(counts)):
+        for i in range(len(taxels)):
+            whole[k, taxels[i]] = np.uint16(min(max(np.rint(counts[k, i]), 0.0), FULL))
