@@ -243,11 +243,11 @@ class TestInertia:
 
     @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
     def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
-        errors = []
-        for h in (1e-4, 5e-5):
-            batch = run(self.scene(tmp_path, h, loss_s=loss_s), h)
-            want = self.oracle(batch, loss_s)
-            errors.append(np.sqrt(np.mean((batch.force[0, :60] - want) ** 2)) / want.max())
+        batches = [run(self.scene(tmp_path, h, loss_s=loss_s), h) for h in (1e-4, 5e-5)]
+        want = self.oracle(batches[0], loss_s)
+        errors = [
+            np.sqrt(np.mean((batch.force[0, :60] - want) ** 2)) / want.max() for batch in batches
+        ]
         assert errors[1] < 0.1
         assert errors[1] < 0.75 * errors[0]
 
