@@ -61,7 +61,7 @@ def swing(state: State) -> None:
     scene = state.scene
     k = np.array(scene.stiffness)[:, None]
     d = np.array(scene.damping)[:, None]
-    low, high = state.kinematics.limits
+    low, high = state.scene.kinematics.limits
     start = np.repeat(np.array(scene.start)[:, None], state.n, axis=1)
     start[-1] += np.radians(state.values["roll_deg"])
     state.start = np.clip(start, low, high)
@@ -97,7 +97,7 @@ def place(state: State) -> None:
     state.column_gaps, state.reach = np.zeros((2, columns, state.n))
     moves = meet(
         state.records,
-        state.kinematics.table,
+        state.scene.kinematics.table,
         equilibrium(state, values["lead_s"]) - state.lag,
         state.rate[:, 0],
         np.radians(values["yaw_deg"]),
@@ -224,7 +224,7 @@ def hand_over(state: State) -> None:
         "h": 1.0 / (rate_hz * state.steps),
         "rate_hz": rate_hz,
         "joints": dof,
-        "chain": addresses(state.kinematics.table)[0],
+        "chain": addresses(state.scene.kinematics.table)[0],
         "row_z": addresses(state.row_z)[0],
         "taxel_k": state.taxel_k,
         "width_m": values["width_m"],

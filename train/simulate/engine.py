@@ -140,7 +140,6 @@ def begin(
         n=len(trials),
         steps=max(1, round(1.0 / (scene.trials["rate_hz"] * step_s))),
         values=values,
-        kinematics=scene.kinematics,
         solve=plan.solve.address,
     )
     for function in plan.setup:

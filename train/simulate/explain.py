@@ -81,8 +81,8 @@ def spent_in(
             spent[plan.owners[function]] += took
 
     for _ in range(1, frame_count(scene)):
-        for function in plan.pace:
-            spent[plan.owners[function]] += timed(set_paces, state.records, pace, tune)
+        if plan.pace:
+            spent[plan.owners[plan.pace[0]]] += timed(set_paces, state.records, pace, tune)
         where, in_frame = state.trial.here, state.trial.steps
         charge("frame", where)
         for k in range(in_frame.max()):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from train.simulate.arm import Kinematics
 from train.simulate.compiled import Array, addresses
 from train.simulate.contact import sort_bed
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
@@ -66,7 +65,6 @@ class State:
     n: int
     steps: int
     values: dict[str, Array]
-    kinematics: Kinematics
     solve: int
     own: dict[Part, Rows] = field(default_factory=dict)
     arrays: dict[str, NDArray[Any]] = field(default_factory=dict)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from train.simulate import base
-from train.simulate.arm import Kinematics
 from train.simulate.compiled import each
 from train.simulate.effects import relaxation, sliding
 from train.simulate.motion import MOVER
@@ -73,7 +72,6 @@ class Rig:
             n=n,
             steps=1,
             values={key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)},
-            kinematics=Kinematics(build.scene.arm),
             solve=plan.solve.address,
         )
         t = state.trial

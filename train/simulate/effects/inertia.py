@@ -31,8 +31,9 @@ JOLT = 0.1
 """What the force's change from frame to frame differs by from the one before, as a part of the peak
 so far: the arm has been hit, or let go of."""
 LASTS_S = 0.02
+"""Seconds for which steps stay short after it."""
 NEAR = 1.5
-"""Frames, at the speed of the last."""
+"""Frames that a touch is away, at the speed of the last."""
 
 MOMENTUM = Part(
     "inertia",
@@ -100,10 +101,8 @@ def pace(t: Any) -> None:
         own.left = math.ceil(LASTS_S * t.rate_hz)
     near = t.force == 0.0 and depth + NEAR * closing > 0.0
     own.depth, own.force, own.change = depth, t.force, change
-    t.steps = own.usual
-    if near or own.left > 0:
-        own.left -= 1
-        t.steps = FINER * own.usual
+    t.steps = FINER * own.usual if near or own.left > 0 else own.usual
+    own.left = max(own.left - 1, 0)
 
 
 @compiled
