@@ -77,7 +77,7 @@ SCALED = {
 }
 """{spread: the values it is a part of}; any other is added to the value of its own name."""
 PLACED = dict.fromkeys(("place_m", "yaw_deg", "roll_deg"), Value(0.0, 0.0))
-"""What an object is not asked for."""
+"""Where the forearm meets an object: spreads about 0, of which no object has a value."""
 
 
 def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:

@@ -32,14 +32,14 @@ def stream(seed: int, name: str, condition: str, trial: int | None = None) -> np
 
 
 class _Seed(np.random.SeedSequence):
-    """One whose state is known."""
+    """A seed whose state has been computed already."""
 
     def __init__(self, state: NDArray[np.uint64]) -> None:
-        """Of the four words for which PCG64 asks."""
+        """Of the four words that PCG64 asks for."""
         self.known = state
 
     def generate_state(self, n_words: int, dtype: Any = np.uint32) -> NDArray[Any]:
-        """They."""
+        """The four words."""
         return self.known
 
 

@@ -74,7 +74,7 @@ def add(build: Build) -> None:
 
 
 def answer_to_speed(state: State) -> None:
-    """The rows bear what theirs do, too."""
+    """The pivot's solver asks each row for what answers to speed, too."""
     own = state.of(PIVOT)
     own.viscous, own.load = True, state.of(VISCOUS).load
 
