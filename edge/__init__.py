@@ -1,7 +1,7 @@
-"""What the board runs: from the skin's taxels to a decision about the thing touched.
+"""What the board runs: from the taxels of a skin to a decision about the object it touches.
 
-The names below are the public ones, and each is loaded when it is first used: `import edge` alone
-takes next to no time. Everything else may move.
+Only the names below are public; everything else may move. Each is loaded at its first use, so that
+`import edge` alone is quick.
 """
 
 from __future__ import annotations
@@ -10,55 +10,38 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from edge.classifier import Classifier
-    from edge.errors import EdgeError, InputError
-    from edge.events import Decided, Onset, Release
-    from edge.model.model import Decision, Model
-    from edge.recording import Recording, load, save
-    from edge.skin.skin import Skin
-    from edge.touch.arm import Chain
-    from edge.touch.features import feature_vector
-    from edge.touch.region import find_regions, largest_region
+    from edge.classifier import Classifier as Classifier
+    from edge.errors import EdgeError as EdgeError
+    from edge.errors import InputError as InputError
+    from edge.events import Decided as Decided
+    from edge.events import Onset as Onset
+    from edge.events import Release as Release
+    from edge.model.model import Decision as Decision
+    from edge.model.model import Model as Model
+    from edge.recording import Recording as Recording
+    from edge.recording import load as load
+    from edge.recording import save as save
+    from edge.skin.skin import Skin as Skin
+    from edge.touch.arm import Chain as Chain
+    from edge.touch.features import feature_vector as feature_vector
+    from edge.touch.region import find_regions as find_regions
+    from edge.touch.region import largest_region as largest_region
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "Chain",
-    "Classifier",
-    "Decided",
-    "Decision",
-    "EdgeError",
-    "InputError",
-    "Model",
-    "Onset",
-    "Recording",
-    "Release",
-    "Skin",
-    "feature_vector",
-    "find_regions",
-    "largest_region",
-    "load",
-    "save",
-]
-
-_HOMES = {
-    "Chain": "edge.touch.arm",
-    "Classifier": "edge.classifier",
-    "Decided": "edge.events",
-    "Decision": "edge.model.model",
-    "EdgeError": "edge.errors",
-    "InputError": "edge.errors",
-    "Model": "edge.model.model",
-    "Onset": "edge.events",
-    "Recording": "edge.recording",
-    "Release": "edge.events",
-    "Skin": "edge.skin.skin",
-    "feature_vector": "edge.touch.features",
-    "find_regions": "edge.touch.region",
-    "largest_region": "edge.touch.region",
-    "load": "edge.recording",
-    "save": "edge.recording",
+_PUBLIC = {
+    "edge.classifier": ["Classifier"],
+    "edge.errors": ["EdgeError", "InputError"],
+    "edge.events": ["Decided", "Onset", "Release"],
+    "edge.model.model": ["Decision", "Model"],
+    "edge.recording": ["Recording", "load", "save"],
+    "edge.skin.skin": ["Skin"],
+    "edge.touch.arm": ["Chain"],
+    "edge.touch.features": ["feature_vector"],
+    "edge.touch.region": ["find_regions", "largest_region"],
 }
+_HOMES = {name: module for module, names in _PUBLIC.items() for name in names}
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""edge-classify: the command of the robot's computer."""
+"""The `edge-classify` command line: parses the arguments and runs one subcommand."""
 
 from __future__ import annotations
 
@@ -11,48 +11,39 @@ import logging
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 
 from edge import __version__
 from edge.errors import EdgeError
 
-COMMANDS = (
-    "check",
-    "scan",
-    "calibrate",
-    "record",
-    "run",
-    "view",
-    "replay",
-    "info",
-    "verify",
-    "bench",
-    "fake",
-    "demo",
-)
-"""Modules of `edge.commands`, in the order of the help; see `add_commands`."""
+COMMANDS = tuple("check scan calibrate record run view replay info verify bench fake demo".split())
+"""Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
+UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of writing to a full disk, beyond a quota, or to a terminal that has gone."""
 
 
 def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
-    """The command line with the commands `wanted`.
+    """The command line, with the commands `wanted` alone.
 
-    To run one command, that one is enough: a slow board need not load the modules of the others.
+    A slow board starts sooner if it loads only the command that it runs.
     """
     top = argparse.ArgumentParser(
         prog="edge-classify",
-        description="Tells what a robot touched from what its skin felt.",
-        epilog="`edge-classify COMMAND --help` explains a command. At a terminal, commands print "
-        "text; where stdout is piped, one JSON object per line.",
+        description="Tells from a robot's skin what the robot has touched.",
+        epilog="`edge-classify COMMAND --help` explains a command. Commands print text to a "
+        "terminal, and one JSON object per line to a pipe or a file.",
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
     for command in add_commands(top, "edge.commands", wanted):
         command.add_argument(
-            "--json", action="store_true", help="print JSON lines, as if stdout were no terminal"
+            "--json", action="store_true", help="print JSON lines even to a terminal"
         )
-        command.add_argument("-v", "--verbose", action="store_true", help="say more on stderr")
         command.add_argument(
-            "-q", "--quiet", action="store_true", help="say nothing on stderr but errors"
+            "-v", "--verbose", action="store_true", help="print more messages to stderr"
+        )
+        command.add_argument(
+            "-q", "--quiet", action="store_true", help="print only errors to stderr"
         )
     return top
 
@@ -60,10 +51,10 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
 def add_commands(
     top: argparse.ArgumentParser, package: str, names: Sequence[str]
 ) -> Iterator[argparse.ArgumentParser]:
-    """Add subcommands, each a module of the package, and give their parsers.
+    """Add each named module of the package as a subcommand, and yield the subcommands' parsers.
 
-    A module has `HELP` (a line), `DESCRIPTION`, `add_options(parser)`, and `run`, a function of
-    the parsed arguments that returns the exit status.
+    A module has `HELP` (one line), `DESCRIPTION`, `add_options(parser)` and `run(arguments)`,
+    which returns the exit status.
     """
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in names:
@@ -76,23 +67,17 @@ def add_commands(
         yield command
 
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of writing to a disk or a quota that is full."""
-
-
-def complete(top: argparse.ArgumentParser) -> None:
-    """Answer a shell that asks for completions, if argcomplete is installed."""
-    if "_ARGCOMPLETE" in os.environ:
-        try:
-            import argcomplete
-        except ImportError:
-            return
-        argcomplete.autocomplete(top)
-
-
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
-    """Parse and run; an expected error becomes one sentence on stderr and exit status 2."""
-    complete(top)
+    """Parse the arguments and run the command; returns the exit status.
+
+    An expected error becomes one sentence on stderr and exit status 2. A shell that asks for
+    completions gets them, if argcomplete is installed.
+    """
+    if "_ARGCOMPLETE" in os.environ:
+        with suppress(ImportError):
+            import argcomplete
+
+            argcomplete.autocomplete(top)
     arguments = top.parse_args(argv)
     level = logging.INFO
     if getattr(arguments, "verbose", False):
@@ -105,7 +90,7 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
 @contextmanager
 def messages(prog: str, level: int = logging.INFO) -> Iterator[None]:
-    """Within the block, log messages of this level and above go to stderr, one line each."""
+    """Within the block, print log messages of this level and above to stderr, one line each."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter(f"{prog}: %(message)s"))
     loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
@@ -116,9 +101,9 @@ def messages(prog: str, level: int = logging.INFO) -> Iterator[None]:
     try:
         yield
     finally:
-        for logger, was in zip(loggers, before, strict=True):
+        for logger, former in zip(loggers, before, strict=True):
             logger.removeHandler(handler)
-            logger.setLevel(was)
+            logger.setLevel(former)
 
 
 def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
@@ -130,16 +115,16 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
         print(f"{top.prog}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        _discard_output()  # whoever read the output has gone
+        _discard_output()  # the reader of the output has closed the pipe
         return 0
     except OSError as error:
-        # `edge.files` reports errors of the files that it writes.
-        if error.filename is not None or error.errno not in FULL:
+        # An error of a file has a name, or `edge.files` has reported it: this one is of stdout.
+        if error.filename is not None or error.errno not in UNWRITABLE:
             raise
         _discard_output()
         print(
-            f"{top.prog}: standard output cannot be written: {error.strerror or error}; free some "
-            "space or redirect the output elsewhere",
+            f"{top.prog}: standard output cannot be written: {error.strerror}; redirect it to "
+            "another place",
             file=sys.stderr,
         )
         return 2
@@ -147,32 +132,29 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
         return 130
 
 
-def _complete_stdio() -> None:
-    """Give the program the standard streams that it was started without.
+def _open_missing_streams() -> None:
+    """Open the null device for each standard stream that was closed before the program began.
 
-    The next file to be opened would take the descriptor of one that is closed, and be written to.
-    What an encoding does not have is written as an escape.
+    Otherwise the next file to be opened would take the stream's descriptor, and receive what is
+    printed. Characters that the output's encoding lacks are then written as escapes.
     """
-    for name, descriptor in (("stdin", 0), ("stdout", 1), ("stderr", 2)):
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            null = os.open(os.devnull, os.O_RDWR)
-            if null != descriptor:
-                os.dup2(null, descriptor)
-                os.close(null)
-            setattr(sys, name, open(descriptor, "r" if descriptor == 0 else "w", closefd=False))  # noqa: SIM115
+            # The lowest descriptor that is free is the stream's own.
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def _discard_output() -> None:
-    """Redirect stdout, so that flushing its buffer at exit cannot fail again."""
+    """Redirect stdout to the null device, so that flushing it at exit cannot fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; returns 0 if all is well, 1 if a check failed, 2 for bad usage or input."""
-    _complete_stdio()
+    """Run the command; returns 0 for success, 1 if a check failed, 2 for bad usage or input."""
+    _open_missing_streams()
     words = list(sys.argv[1:] if argv is None else argv)
     wanted = [word for word in words[:1] if word in COMMANDS]
     top = parser(wanted or COMMANDS)
@@ -180,7 +162,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         top.print_help()
         return 2
     if not wanted and words and not words[0].startswith("-"):
-        from difflib import get_close_matches  # a slow board starts sooner without it
+        from difflib import get_close_matches  # rarely needed, and slow to load
 
         near = get_close_matches(words[0], COMMANDS, 1, 0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"the commands are {', '.join(COMMANDS)}"
@@ -189,8 +171,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return dispatch(top, words)
 
 
-# The interpreter's last collection would visit all that was ever imported, and a program that is
-# told to end takes twice as long.
+# The interpreter's last garbage collection would visit every imported object, which doubles the
+# time that the program takes to end.
 atexit.register(gc.freeze)
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""TOML and JSON that a person or another program wrote, checked: one sentence for a mistake.
+"""TOML and JSON files, read and checked; a mistake in one gives a one-sentence error.
 
-Every complaint reads `FILE: KEY must be WHAT IS WANTED, not WHAT IS THERE`.
+The sentence reads `FILE: KEY must be X, not Y`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import os
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, NoReturn, Self
 
 from edge.errors import InputError
@@ -19,13 +19,13 @@ from edge.files import parsing, read_bytes, read_text
 REQUIRED: Any = object()
 """Default of a key that must be given."""
 LONGEST_WHOLE = 40
-"""Digits of a whole number; no key needs more than 20, and beyond 308 it is no float."""
+"""Most digits of a whole number; no key needs more than 20, and a float holds at most 309."""
 _repr = reprlib.Repr()
 _repr.maxstring = _repr.maxother = 60
 
 
 def shown(value: object) -> str:
-    """A value as an error shows it: short, however large it is.
+    """A short text of a value for an error message, however large the value is.
 
     >>> shown([1] * 1000)
     '[1, 1, 1, 1, 1, 1, ...]'
@@ -60,14 +60,14 @@ def parse_json(text: str | bytes, where: str) -> Any:
     """The value of a JSON text; every number in it is finite.
 
     Raises:
-        InputError: it is not JSON, or not UTF-8; `where` is what the sentence calls it.
+        InputError: it is not JSON, or not UTF-8; the message begins with `where`.
     """
     with parsing(where, "JSON"):
         return _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:
-    """The value that a JSON file holds, as `parse_json`.
+    """The value of a JSON file; see `parse_json`.
 
     Raises:
         InputError: it cannot be read, or is not JSON.
@@ -77,11 +77,12 @@ def read_json(path: str | os.PathLike[str]) -> Any:
 
 @contextmanager
 def json_file(path: str | os.PathLike[str], what: str, mend: str) -> Iterator[Any]:
-    """The value that a JSON file holds, to be taken apart in the block.
+    """The value of a JSON file, for a block that takes it apart.
 
     Raises:
-        InputError: it cannot be read; or it is no JSON, or the block raised what a missing key
-            or a wrong type raises: then it is not `what`, and `mend` says how to make one.
+        InputError: the file cannot be read; or it is not JSON, or the block failed, as it does at
+            a missing key or a wrong type. The message then says that the file is not `what`, and
+            ends with the remedy `mend`.
     """
     text = read_bytes(path)
     with parsing(os.fspath(path), what, f"; {mend}"):
@@ -92,9 +93,9 @@ def parse_toml(text: str, where: str) -> ConfigTable:
     """The top table of a TOML text.
 
     Raises:
-        InputError: it is not TOML; `where` is what the sentence calls it.
+        InputError: it is not TOML; the message begins with `where`.
     """
-    import tomllib  # a model brings its arm along: many runs read no TOML file
+    import tomllib  # most runs read no TOML file
 
     with parsing(where, "TOML"):
         return ConfigTable(tomllib.loads(text), where)
@@ -110,7 +111,7 @@ def read_toml(path: str | os.PathLike[str]) -> ConfigTable:
 
 
 class ConfigTable:
-    """A table whose keys are taken one by one; `done` refuses those that nobody took.
+    """A table of a file, read key by key; `done` refuses the keys that were never asked for.
 
     >>> table = ConfigTable({"rate_hz": 100}, "skin.toml", "read.")
     >>> table.number("rate_hz", low=0.1, high=1e4)
@@ -121,15 +122,15 @@ class ConfigTable:
     """
 
     def __init__(self, raw: object, where: str, prefix: str = "") -> None:
-        """Take a table apart.
+        """Wrap a table.
 
         Args:
-            raw: what should be one.
-            where: what errors call the file.
-            prefix: what errors write before a key: `read.` in a table of that name.
+            raw: the parsed value, which should be a mapping.
+            where: the name of the file in errors.
+            prefix: put before a key in errors: `read.` in a table `[read]`.
 
         Raises:
-            InputError: it is no table.
+            InputError: `raw` is not a mapping.
         """
         if not isinstance(raw, Mapping):
             name = prefix.rstrip(".: ") or "the file"
@@ -138,16 +139,16 @@ class ConfigTable:
         self._taken: list[str] = []
 
     def called(self, key: str) -> str:
-        """What errors call a key."""
+        """The name of a key in errors."""
         return f"{self.where}: {self.prefix}{key}"
 
     def fail(self, key: str, wanted: str, value: object = REQUIRED) -> InputError:
-        """The error of a key whose value is not what is wanted, to raise."""
+        """Build the error for a bad value."""
         value = self.raw.get(key) if value is REQUIRED else value
         return InputError(f"{self.called(key)} must be {wanted}, not {shown(value)}")
 
     def has(self, key: str) -> bool:
-        """Whether a key is given; JSON's null is as good as none."""
+        """Whether a key is given; null counts as absent."""
         self._taken.append(key)
         return self.raw.get(key) is not None
 
@@ -166,7 +167,7 @@ class ConfigTable:
         allowed: Sequence[int] | range = range(1 << 62),
         form: str = "d",
     ) -> int:
-        """A whole number among those allowed; `form` is how errors write the limits."""
+        """One of the allowed whole numbers; errors format the limits with `form`."""
         value = self.get(key, default)
         if type(value) is not int or value not in allowed:
             if not isinstance(allowed, range):
@@ -190,25 +191,19 @@ class ConfigTable:
     def as_number(
         self, key: str, value: object, low: float, high: float, *, open_low: bool = False
     ) -> float:
-        """A value that belongs to a key, a number of a list say, checked as `number` does."""
+        """A value that belongs to a key, such as an entry of its list, checked as in `number`."""
         number = math.nan
         if isinstance(value, int | float) and not isinstance(value, bool):
-            try:
+            with suppress(OverflowError):  # a whole number larger than any float
                 number = float(value)
-            except OverflowError:  # a whole number beyond all floats
-                number = math.nan
-        above = number > low if open_low else number >= low
-        if not (above and number <= high and math.isfinite(number)):
-            if math.isinf(low) and math.isinf(high):
-                wanted = "a finite number"
-            else:
-                wanted = f"a number {'above' if open_low else 'from'} {low:g}"
-                if open_low and math.isfinite(high):
-                    wanted += f", at most {high:g}"
-                elif math.isfinite(high):
-                    wanted += f" to {high:g}"
-                elif not open_low:
-                    wanted = f"a number of at least {low:g}"
+        in_range = low < number <= high or (number == low and not open_low)
+        if not (in_range and math.isfinite(number)):
+            wanted = "a finite number"
+            if math.isfinite(high):
+                between = ", at most" if open_low else " to"
+                wanted = f"a number {'above' if open_low else 'from'} {low:g}{between} {high:g}"
+            elif math.isfinite(low):
+                wanted = f"a number {'above' if open_low else 'of at least'} {low:g}"
             raise self.fail(key, wanted, value)
         return number
 
@@ -222,7 +217,7 @@ class ConfigTable:
         *,
         open_low: bool = False,
     ) -> tuple[float, ...]:
-        """A list of numbers, of so many where a count is given."""
+        """A list of numbers; with a count, of exactly that many."""
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or count not in (None, len(value)):
             raise self.fail(key, f"a list of {'' if count is None else f'{count} '}numbers")
@@ -236,14 +231,14 @@ class ConfigTable:
         return value
 
     def text(self, key: str, default: Any = REQUIRED, *, empty: bool = False) -> str:
-        """Text, which may be blank only where `empty`."""
+        """Text, which may be blank only if `empty` is True."""
         value = self.get(key, default)
         if not isinstance(value, str) or not (empty or value.strip()):
             raise self.fail(key, "text")
         return value
 
     def choice(self, key: str, options: Sequence[str], default: Any = REQUIRED) -> str:
-        """One of some words."""
+        """One of the given words."""
         value = self.get(key, default)
         if value not in options:
             raise self.fail(key, f"one of {', '.join(options)}")
@@ -264,7 +259,7 @@ class ConfigTable:
         return tuple(value)
 
     def pair(self, key: str, value: object = REQUIRED) -> tuple[int, int]:
-        """[row, col]: the key's value, or one that belongs to it."""
+        """[row, col]: the value of the key, or a given value that belongs to it."""
         value = self.get(key) if value is REQUIRED else value
         if not isinstance(value, list) or [type(x) for x in value] != [int, int]:
             raise self.fail(key, "[row, col]", value)
@@ -275,14 +270,14 @@ class ConfigTable:
         return type(self)(self.get(key, default), self.where, f"{self.prefix}{key}.")
 
     def tables(self, key: str, item: str) -> list[Self]:
-        """A list of at least one table; errors call each `item` and its number from 0."""
+        """A list of at least one table; errors name each by `item` and its number from 0."""
         entries = self.get(key, [])
         if not isinstance(entries, list | tuple) or not entries:
             raise self.fail(key, "a list of tables", entries)
         return [type(self)(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)]
 
     def done(self) -> None:
-        """Refuse the keys that nobody took."""
+        """Refuse the keys that were never asked for."""
         for key in self.raw:
             if key not in self._taken:
                 allowed = ", ".join(dict.fromkeys(self._taken))

@@ -1,4 +1,4 @@
-"""Files at their edge: read with a limit, written whole or not at all."""
+"""Reading files up to a size limit, and writing them whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,46 +12,45 @@ from typing import BinaryIO
 from edge.errors import EdgeError, InputError
 
 LARGEST_TEXT = 16 << 20
-"""Bytes of a file that a person or a program wrote as text; the calibration of a skin of a
-million taxels takes 12 MB."""
+"""Largest text file in bytes; the calibration of a skin of a million taxels takes 12 MB."""
 
 
 @contextmanager
 def parsing(name: str, what: str, mend: str = "") -> Iterator[None]:
-    """Turn any exception of a parser into one sentence: `NAME: not WHAT: reason; MEND`.
+    """Turn any exception of a parser into one sentence: `NAME: not WHAT: REASON` and MEND.
 
-    Parsers of damaged or hostile input raise what they like; no list of exceptions is complete.
+    On damaged or hostile input, parsers raise exceptions of many kinds; no list is complete.
 
     Raises:
-        InputError: the block raised something else than an EdgeError.
+        InputError: the block raised an exception that is no EdgeError.
     """
     try:
         yield
     except EdgeError:
         raise
-    except UnicodeError:
-        raise InputError(f"{name}: not {what}: it is not UTF-8 text{mend}") from None
-    except RecursionError:
-        raise InputError(f"{name}: not {what}: it is nested too deeply{mend}") from None
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {error.strerror or error}") from None
-    except KeyError as error:
-        raise InputError(f"{name}: not {what}: {error} is missing{mend}") from None
     except Exception as error:
         reason = str(error)[:200] or type(error).__name__
+        if isinstance(error, UnicodeError):
+            reason = "it is not UTF-8 text"
+        elif isinstance(error, RecursionError):
+            reason = "it is nested too deeply"
+        elif isinstance(error, KeyError):
+            reason = f"{error} is missing"
         raise InputError(f"{name}: not {what}: {reason}{mend}") from None
 
 
 @contextmanager
 def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryIO]:
-    """Open a file for reading, if it is one: a FIFO would wait, a device may never end.
+    """Open a regular file for reading. Reading a FIFO could wait, and a device may never end.
 
     Raises:
-        InputError: it is missing, a folder, a FIFO or a device, or has more than `at_most` bytes.
+        InputError: it is missing, a folder, a FIFO or a device, or larger than `at_most` bytes.
     """
     name = os.fspath(path)
     try:
-        # Without O_NONBLOCK, opening a FIFO waits for someone to write to it.
+        # Without O_NONBLOCK, opening a FIFO waits until another process opens it for writing.
         handle = os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or error
@@ -64,7 +63,7 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
             raise InputError(f"{name}: cannot be read: it is not a regular file")
         if status.st_size > at_most:
             raise InputError(
-                f"{name}: has {status.st_size} bytes; at most {at_most} are read from such a file"
+                f"{name}: has {status.st_size} bytes; a file of this kind has at most {at_most}"
             )
         with open(handle, "rb", closefd=False) as file:
             yield file
@@ -78,14 +77,8 @@ def read_bytes(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> byt
     Raises:
         InputError: as `open_regular`.
     """
-    with open_regular(path, at_most) as file:
-        try:
-            # A file that grows while it is read is not followed.
-            return file.read(at_most)
-        except OSError as error:
-            raise InputError(
-                f"{os.fspath(path)}: cannot be read: {error.strerror or error}"
-            ) from None
+    with open_regular(path, at_most) as file, parsing(os.fspath(path), "a file"):
+        return file.read(at_most)  # the limit, as the file may still grow
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
@@ -103,10 +96,10 @@ class NameTaken(InputError):
 
 
 def check_writable(folder: str | os.PathLike[str]) -> None:
-    """Make a folder if need be, and refuse one in which no file can be made.
+    """Make a folder if it is missing, and check that a file can be created in it.
 
     Raises:
-        InputError: the sentence names it.
+        InputError: the folder cannot be made or written to.
     """
     import tempfile
 
@@ -119,23 +112,23 @@ def check_writable(folder: str | os.PathLike[str]) -> None:
 
 
 def _name_free(temporary: Path, target: Path) -> None:
-    """Give a file a name that nobody else has taken, not even at this moment.
+    """Rename a file, but never over another one, even if that appears at the same moment.
 
     Raises:
-        FileExistsError: it is taken.
+        FileExistsError: the name is taken.
     """
     try:
         os.link(temporary, target)
         os.unlink(temporary)
     except FileExistsError:
         raise
-    except OSError:  # FAT, exFAT and some network folders know no hard links
+    except OSError:  # FAT, exFAT and some network folders have no hard links
         os.close(os.open(target, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
         os.replace(temporary, target)
 
 
 def _sync_folder(folder: Path) -> None:
-    """Let a new name outlast a loss of power, where the file system can promise that."""
+    """Make a new name survive a loss of power, if the file system can."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -148,14 +141,14 @@ def _sync_folder(folder: Path) -> None:
 def write_whole(
     path: str | os.PathLike[str], *, overwrite: bool = True, lasting: bool = True
 ) -> Iterator[BinaryIO]:
-    """Open a temporary file beside `path`; at the end of the block it takes the name.
+    """Open a temporary file beside `path`, which is renamed to `path` at the end of the block.
 
-    Where the block raises, `path` is as it was and the temporary file is gone.
+    If the block raises, `path` stays as it was and the temporary file is removed.
 
     Args:
-        overwrite: whether a file that exists is replaced.
-        lasting: wait until the file would outlast a loss of power. What can be made again need
-            not: on a disk the wait takes several times as long as the writing.
+        overwrite: replace an existing file.
+        lasting: wait until the file would survive a loss of power. On a disk this takes several
+            times as long as the writing, so leave it out for files that can be made again.
 
     Raises:
         NameTaken: `path` exists and `overwrite` is False.
@@ -166,7 +159,7 @@ def write_whole(
     taken = NameTaken(f"{target}: exists already; choose another name or remove it")
     if not overwrite and target.exists():
         raise taken
-    # Not after the target's name, which may be as long as a name can be.
+    # The target's own name may already have the greatest length that the file system allows.
     temporary = folder / f".edge-classify-{os.urandom(8).hex()}"
     try:
         if not folder.is_dir():
@@ -189,5 +182,5 @@ def write_whole(
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
     finally:
-        with suppress(OSError):  # it has its name, or could not be made
+        with suppress(OSError):  # it has been renamed, or was never made
             os.unlink(temporary)

@@ -1,4 +1,4 @@
-"""One trial, one `.npz`: what the skin (and the arm) gave, with what is known about it."""
+"""A recording: the frames, joint angles and metadata of one trial, in one `.npz` file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,9 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 LARGEST_BYTES = 1 << 27
-"""Arrays that claim to be larger together are taken for a damaged file: an hour of 384 taxels at
-40 Hz has 111 MB, two minutes of 64 x 62 at 100 Hz have 95."""
-MOST_COUNTS = 65535
+"""Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111 MB, two
+minutes of 64 x 62 taxels at 100 Hz take 95."""
+MAX_COUNTS = 65535
 KEYS = ("t", "frames", "joints", "valid", "meta")
 
 
@@ -38,12 +38,13 @@ class Recording:
     [0.0, 0.01]
 
     Attributes:
-        t: (n,) seconds, never going back; of frames at equal times the last one counts.
+        t: (n,) seconds that never decrease; of several frames at one time, the last counts.
         frames: (n, rows, cols) counts above baseline.
-        joints: (n, dof) radians, NaN in a frame whose pose was not known; or None.
-        valid: (rows, cols) or (n, rows, cols), taxels that could be read, or None for all.
+        joints: (n, dof) radians, NaN in a frame whose pose was not known; None without an arm.
+        valid: (rows, cols) or (n, rows, cols), True where a taxel could be read; None if all
+            could.
         meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of each
-            column of `joints`], `source`, `trial`, and more.
+            column of `joints`], `source`, `trial`, and any other facts.
     """
 
     t: NDArray[np.float64]
@@ -54,28 +55,28 @@ class Recording:
 
     @property
     def labels(self) -> dict[str, str]:
-        """{task: label}; empty where the trial is not labelled."""
+        """{task: label}; empty if the trial is not labelled."""
         return dict(self.meta.get("labels", {}))
 
     @property
     def layout(self) -> SkinLayout:
-        """The skin that the trial was recorded with."""
+        """The skin with which the trial was recorded."""
         skin = {"rows": self.frames.shape[1], "cols": self.frames.shape[2]}
         return SkinLayout.from_dict({**skin, **self.meta.get("skin", {})})
 
     @property
     def joint_names(self) -> tuple[str, ...] | None:
-        """The joint of each column of `joints`, or None where it is not known."""
+        """The joint of each column of `joints`, or None if the names are unknown."""
         names = self.meta.get("joint_names")
         return None if names is None else tuple(names)
 
     def for_joints(self, names: Sequence[str], where: str = "recording") -> Recording:
         """The recording with the angles of these joints, in this order.
 
-        The recording itself where it does not name its joints.
+        A recording that does not name its joints is returned as it is.
 
         Raises:
-            InputError: it has no angle of one of them; the sentence names `where`.
+            InputError: the recording lacks one of the joints; the message begins with `where`.
         """
         if self.joints is None or self.joint_names in (None, tuple(names)):
             return self
@@ -87,7 +88,7 @@ class Recording:
         return replace(self, joints=self.joints[:, columns], meta=meta)
 
     def __iter__(self) -> Iterator[Frame]:
-        """The frames as the live skin would give them."""
+        """Iterate over the frames as the live skin would give them."""
         for i, t in enumerate(self.t.tolist()):
             valid = self.valid
             if valid is not None and valid.ndim == 3:
@@ -98,166 +99,130 @@ class Recording:
             yield Frame(t=t, counts=self.frames[i], valid=valid, joints=joints)
 
 
-def _plain(path: str, recording: Recording, scale: float | None = None) -> Recording:
-    """The recording as the contract says, where what it means leaves no doubt.
+def _checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
+    """The recording in the types of the contract.
 
-    Whole numbers of any type that are counts become uint16, taxels in a row the skin's rows and
-    columns, times and angles float64, and labels that are whole numbers text.
+    Whole numbers of any type become uint16 counts, flat frames get the skin's rows and columns,
+    times and angles become float64, and labels that are whole numbers become text.
 
     Args:
+        path: names the recording in errors.
+        recording: to convert and check.
         scale: see `save`.
+
+    Raises:
+        InputError: the recording breaks the contract.
     """
-    meta, frames = recording.meta, np.asarray(recording.frames)
+
+    def fail(problem: str) -> NoReturn:
+        raise InputError(f"{path}: {problem}")
+
+    def expect(name: str, array: NDArray[Any], dtype: type, *shapes: tuple[int, ...]) -> None:
+        if array.dtype != dtype or array.shape not in shapes:
+            wanted = f"{np.dtype(dtype)} {' or '.join(map(str, shapes))}"
+            fail(f"{name} must be {wanted}, not {array.dtype} {array.shape}")
+
+    meta, frames = dict(recording.meta), np.asarray(recording.frames)
     if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
         frames = _counts(path, frames, scale)
-        meta = meta if scale is None else {**meta, "scale": scale}
-    known = meta if isinstance(meta, dict) else {}  # what is none, `_check` refuses
-    skin, labels = known.get("skin"), known.get("labels")
-    if frames.ndim == 2 and isinstance(skin, dict):
-        rows, cols = skin.get("rows"), skin.get("cols")
-        if isinstance(rows, int) and isinstance(cols, int) and rows > 0 and cols > 0:
-            frames = frames.reshape(-1, rows, cols) if rows * cols == frames.shape[1] else frames
-    if isinstance(labels, dict) and any(map(_whole, labels.values())):
-        text = {task: str(label) if _whole(label) else label for task, label in labels.items()}
-        meta = {**meta, "labels": text}
-
-    def double(values: NDArray[Any]) -> NDArray[Any]:
-        return values.astype(np.float64) if values.dtype.kind == "f" else values
-
-    joints = None if recording.joints is None else double(np.asarray(recording.joints))
-    return Recording(double(np.asarray(recording.t)), frames, joints, recording.valid, meta)
-
-
-def _whole(label: object) -> bool:
-    return isinstance(label, int | np.integer) and not isinstance(label, bool)
-
-
-def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[Any]:
-    """Frames of another type as uint16, times `scale` and rounded where it is given."""
-    if scale is not None:
-        if not 0.0 < scale < np.inf:
-            raise InputError(f"{path}: the scale must be a number above 0, not {scale:g}")
-        frames = np.rint(frames.astype(np.float64) * scale)
-    if not frames.size:
-        return frames.astype(np.uint16)
-    if not np.isfinite(frames).all():
-        raise InputError(
-            f"{path}: frames hold what is not finite; set it to 0 and say in `valid` which taxels "
-            "could be read"
-        )
-    low, high = frames.min(), frames.max()
-    if low < 0:
-        raise InputError(
-            f"{path}: frames go down to {low:g}; counts are above baseline: subtract the frame "
-            "before touch, then np.clip(frames, 0, None)"
-        )
-    fine = (frames != np.rint(frames)).any()
-    if fine or high > MOST_COUNTS:
-        # A power of ten, so that the factor is easily the same for all recordings of a set.
-        factor = (scale or 1.0) * 10.0 ** np.floor(np.log10(MOST_COUNTS / high))
-        raise InputError(
-            f"{path}: frames are {frames.dtype} up to {high:g}"
-            f"{' and no whole numbers' if fine else ''}; counts are whole numbers up to "
-            f"{MOST_COUNTS}: edge.save(path, recording, scale={factor:g}), the same for all"
-        )
-    return frames.astype(np.uint16)
-
-
-def _check(path: str, recording: Recording) -> None:
-    """Raise InputError with one sentence where the trial is not as the contract says."""
-    t, frames, joints, valid = recording.t, recording.frames, recording.joints, recording.valid
-
-    def fail(what: str) -> None:
-        raise InputError(f"{path}: {what}")
-
-    if frames.dtype != np.uint16 or frames.ndim != 3:
-        fail(
-            f"frames must be uint16 (n, rows, cols), not {frames.dtype} {frames.shape}; "
-            + (
-                'say in meta.skin how many "rows" and "cols" they have'
-                if frames.ndim == 2
-                else "store counts above baseline"
-            )
-        )
-    n, rows, cols = frames.shape
-    if n == 0 or rows == 0 or cols == 0:
-        fail(f"frames are empty {frames.shape}; record at least one frame")
-    if t.dtype != np.float64 or t.shape != (n,):
-        fail(
-            f"t must be float64 ({n},), a time in seconds a frame, not {t.dtype} {t.shape}; mend it"
-        )
-    if not np.isfinite(t).all():
-        fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
-    back = np.flatnonzero(t[1:] < t[:-1])
-    if back.size:
-        fail(f"time goes back at frame {int(back[0]) + 1}; sort the frames or split the recording")
-    if joints is not None:
-        if joints.dtype != np.float64 or joints.ndim != 2 or joints.shape[0] != n:
-            fail(
-                f"joints must be float64 ({n}, dof) for {n} frames, "
-                f"not {joints.dtype} {joints.shape}; mend them"
-            )
-        if joints.shape[1] == 0:
-            fail("joints have no column; leave them out where the arm is unknown")
-        unknown = np.isnan(joints)
-        odd = np.isinf(joints) | (unknown != unknown[:, :1])
-        if odd.any():
-            fail(
-                f"a joint angle of frame {int(np.argmax(odd.any(axis=1)))} is not finite; where "
-                "the pose was not known, all angles of a frame must be NaN"
-            )
-    if valid is not None and (
-        valid.dtype != np.bool_ or valid.shape not in ((rows, cols), (n, rows, cols))
-    ):
-        fail(
-            f"valid must be bool ({rows}, {cols}) or ({n}, {rows}, {cols}), "
-            f"not {valid.dtype} {valid.shape}; mend it"
-        )
-    meta = recording.meta
-    if not isinstance(meta, dict):
-        fail("meta must be a JSON object")
-    labels = meta.get("labels", {})
-    if not isinstance(labels, dict) or not all(
-        isinstance(k, str) and k and isinstance(v, str) and v for k, v in labels.items()
-    ):
-        fail("meta.labels must map task names to labels, both text")
-    names = meta.get("joint_names")
-    if names is not None:
-        if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
-            fail("meta.joint_names must be a list of names")
-        if len(set(names)) < len(names):
-            fail("meta.joint_names has the same name twice")
-        dof = 0 if joints is None else joints.shape[1]
-        if len(names) != dof:
-            fail(f"meta.joint_names has {len(names)} names for {dof} joint angles")
-    skin = meta.get("skin", {})
+        meta |= {} if scale is None else {"scale": scale}
+    skin, labels = meta.get("skin", {}), meta.get("labels", {})
     if not isinstance(skin, dict):
         fail("meta.skin must be an object")
+    if frames.ndim == 2:
+        rows, cols = skin.get("rows"), skin.get("cols")
+        if type(rows) is type(cols) is int and rows > 0 and rows * cols == frames.shape[1]:
+            frames = frames.reshape(len(frames), rows, cols)
+        else:
+            fail('frames are flat; give their "rows" and "cols" in meta.skin')
+    if frames.dtype != np.uint16 or frames.ndim != 3:
+        fail(f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} {frames.shape}")
+    n, rows, cols = frames.shape
+    if 0 in frames.shape:
+        fail(f"frames are empty {frames.shape}; record at least one frame")
     layout = SkinLayout.from_dict({"rows": rows, "cols": cols, **skin}, where=path)
     if layout.shape != (rows, cols):
         fail(f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}")
 
+    t = _as_double(recording.t)
+    expect("t", t, np.float64, (n,))
+    if not np.isfinite(t).all():
+        fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
+    backwards = np.flatnonzero(t[1:] < t[:-1])
+    if backwards.size:
+        fail(f"time goes back at frame {backwards[0] + 1}; sort the frames or split the recording")
+    joints, dof = recording.joints, 0
+    if joints is not None:
+        joints = _as_double(joints)
+        dof = max(joints.shape[1], 1) if joints.ndim == 2 else 1
+        expect("joints", joints, np.float64, (n, dof))
+        unknown = np.isnan(joints)
+        odd = (np.isinf(joints) | (unknown != unknown[:, :1])).any(axis=1)
+        if odd.any():
+            fail(
+                f"a joint angle of frame {int(np.argmax(odd))} is not finite; in a frame without "
+                "a known pose, all angles must be NaN"
+            )
+    if recording.valid is not None:
+        expect("valid", recording.valid, np.bool_, (rows, cols), (n, rows, cols))
 
-def _array(path: str, archive: zipfile.ZipFile, key: str) -> NDArray[Any]:
-    """One array of the archive; its header is read before anything is allocated."""
-    with archive.open(f"{key}.npy") as file:
-        version = np.lib.format.read_magic(file)
-        read = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }.get(version)
-        if read is None:
-            raise InputError(f"{path}: {key} is in an unknown npy version {version}")
-        shape, _, dtype = read(file)
-        if dtype.hasobject:
-            raise InputError(f"{path}: {key} holds Python objects; store plain numbers")
-        size = dtype.itemsize
-        for extent in shape:
-            size *= extent
-        if size > archive.getinfo(f"{key}.npy").file_size:
-            raise InputError(f"{path}: {key} claims {size} bytes, more than the file holds")
-    with archive.open(f"{key}.npy") as file:
-        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+    if isinstance(labels, dict) and labels:
+        labels = {task: _label_text(label) for task, label in labels.items()}
+        meta["labels"] = labels
+    if not isinstance(labels, dict) or not all(map(_is_name, (*labels, *labels.values()))):
+        fail("meta.labels must map task names to labels, both text")
+    names = meta.get("joint_names")
+    if names is not None and not (
+        isinstance(names, list) and all(map(_is_name, names)) and len(set(names)) == len(names)
+    ):
+        fail("meta.joint_names must be a list of different names")
+    if names is not None and len(names) != dof:
+        fail(f"the number of meta.joint_names is {len(names)}, of joint angles {dof}")
+    return Recording(t, frames, joints, recording.valid, meta)
+
+
+def _as_double(values: NDArray[Any]) -> NDArray[Any]:
+    array = np.asarray(values)
+    return array.astype(np.float64) if array.dtype.kind == "f" else array
+
+
+def _label_text(label: object) -> object:
+    is_whole = isinstance(label, int | np.integer) and not isinstance(label, bool)
+    return str(label) if is_whole else label
+
+
+def _is_name(value: object) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
+    """Frames of another type as uint16, multiplied by `scale` and rounded if it is given."""
+    if scale is not None:
+        if not 0.0 < scale < np.inf:
+            raise InputError(f"{path}: the scale must be a number above 0, not {scale:g}")
+        frames = np.rint(frames.astype(np.float64) * scale)
+    if not np.isfinite(frames).all():
+        raise InputError(
+            f"{path}: frames hold values that are not finite; set them to 0 and mark the taxels "
+            "in `valid`"
+        )
+    low, high = frames.min(initial=0), frames.max(initial=0)
+    if low < 0:
+        raise InputError(
+            f"{path}: frames go down to {low:g}, but counts are above baseline: subtract the "
+            "frame before touch, then use np.clip(frames, 0, None)"
+        )
+    fractions = (frames != np.rint(frames)).any()
+    if fractions or high > MAX_COUNTS:
+        # With a power of ten, all recordings of a set can share the factor.
+        factor = (scale or 1.0) * 10.0 ** np.floor(np.log10(MAX_COUNTS / high))
+        raise InputError(
+            f"{path}: frames are {frames.dtype} up to {high:g}"
+            f"{', with fractions' if fractions else ''}; counts are whole numbers up to "
+            f"{MAX_COUNTS}: use edge.save(path, recording, scale={factor:g}), with the same scale "
+            "for all recordings"
+        )
+    return frames.astype(np.uint16)
 
 
 def load_arrays(
@@ -265,12 +230,15 @@ def load_arrays(
     file: BinaryIO | None = None,
     keys: Sequence[str] | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Arrays of an `.npz`, without pickle.
+    """Arrays of an `.npz`, read without pickle.
+
+    An array is filled from the file piece by piece, so a header that claims more than the file
+    holds takes no memory.
 
     Args:
-        path: of the file, which sentences name.
-        file: its contents, where they have been read already.
-        keys: those to read, as far as they are there; all where None.
+        path: of the file, for errors.
+        file: its contents, if they have been read already.
+        keys: the arrays to read, as far as the file has them; all if None.
 
     Raises:
         InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds something
@@ -282,15 +250,18 @@ def load_arrays(
             file = stack.enter_context(open_regular(name, LARGEST_BYTES))
         stack.enter_context(parsing(name, "a readable .npz file", "; copy or record it again"))
         archive = stack.enter_context(zipfile.ZipFile(file))
-        sizes = {
-            member.filename.removesuffix(".npy"): member.file_size
-            for member in archive.infolist()
-            if member.filename.endswith(".npy")
-        }
-        wanted = [key for key in sizes if keys is None or key in keys]
-        if sum(sizes[key] for key in wanted) > LARGEST_BYTES:
+        members = {info.filename: info for info in archive.infolist()}
+        wanted = [key for key in members if key.endswith(".npy")]
+        if keys is not None:
+            wanted = [key for key in wanted if key.removesuffix(".npy") in keys]
+        if sum(members[key].file_size for key in wanted) > LARGEST_BYTES:
             raise InputError(f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it")
-        return {key: _array(name, archive, key) for key in wanted}
+        arrays = {}
+        for key in wanted:
+            with archive.open(members[key]) as stream:
+                array = np.lib.format.read_array(stream, allow_pickle=False)
+            arrays[key.removesuffix(".npy")] = np.asarray(array)
+        return arrays
 
 
 def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
@@ -328,16 +299,11 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}")
+    meta = load_meta(name, arrays)
     recording = Recording(
-        t=arrays["t"],
-        frames=arrays["frames"],
-        joints=arrays.get("joints"),
-        valid=arrays.get("valid"),
-        meta=load_meta(name, arrays),
+        arrays["t"], arrays["frames"], arrays.get("joints"), arrays.get("valid"), meta
     )
-    recording = _plain(name, recording)
-    _check(name, recording)
-    return recording
+    return _checked(name, recording)
 
 
 def save(
@@ -372,13 +338,9 @@ def save(
             it exists and `overwrite` is False.
     """
     name = os.fspath(path)
-    recording = _plain(name, recording, scale)
-    _check(name, recording)
-    arrays: dict[str, NDArray[Any]] = {"t": recording.t, "frames": recording.frames}
-    if recording.joints is not None:
-        arrays["joints"] = recording.joints
-    if recording.valid is not None:
-        arrays["valid"] = recording.valid
+    recording = _checked(name, recording, scale)
+    arrays = {key: getattr(recording, key) for key in KEYS[:-1]}
+    arrays = {key: array for key, array in arrays.items() if array is not None}
     save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)
 
 
@@ -396,11 +358,9 @@ def save_arrays(
         text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{os.fspath(path)}: meta cannot be written as JSON: {error}") from None
+    write = np.savez_compressed if compress else np.savez
     with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
-        if compress:
-            np.savez_compressed(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
-        else:
-            np.savez(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
+        write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
 def find(paths: list[str]) -> list[Path]:
