@@ -3,41 +3,50 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
-# Errors alone: every editable installation warns.
+# Only errors: every editable installation prints a warning.
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
-# Matrices this small only lose by several threads, which also fight with the processes beside.
+# Several threads slow down matrices as small as ours, and disturb the processes beside them.
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
   board-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk \
-  stopping soak soak-day clean
+  stopping soak soak-day constraints clean
 
 help:
-	@echo "make test     what CI runs: lint, types and tests"
-	@echo "make export   fit a model; DATA=folder of recordings (default: the simulated set) OUT=build"
-	@echo "make demo     fit a model on a small simulated set, then decide on touches it has not seen"
-	@echo "make study    the paper's analyses beside ours: build/study/report.html; DATA= for yours"
-	@echo "make tradeoff what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json for"
-	@echo "              a board's timings (edge-classify bench; default: this machine's), DATA= for yours;"
-	@echo "              then make export FRONT=fast|balanced|accurate|milliseconds|accuracy"
-	@echo "make wheel    what goes on the board: dist/edge_classify-*.whl"
-	@echo "make wheel-test   tests the wheel in an empty environment, outside the checkout"
-	@echo "make board-test   tests the wheel on an emulated aarch64 and counts its instructions"
-	@echo "make demo-data    renews the model and the touches that the wheel carries"
-	@echo "make bench    speed, side by side with the alternatives"
-	@echo "make docs     the documentation as a site: build/site/index.html"
-	@echo "make transfer a model of SCENE on trials that another engine (MuJoCo) makes: accuracies, curves"
-	@echo "make matched  the same four touches in MuJoCo and in our simulator, beside theory"
-	@echo "make faults   what each fault on the skin's wires costs, as a table"
-	@echo "make risk     how often a certified error rate is exceeded, over 200 simulated data sets"
-	@echo "make stopping   deciding when sure beside fixed windows and, where aeon is installed, TEASER"
-	@echo "make hard-cases   what each hard case costs us and the usual tools, as a table"
-	@echo "make hard-cases-versions   the same answers from another ONNX Runtime"
-	@echo "make mutants  removes each guard in turn, and makes 200 random changes: do tests fail?"
-	@echo "make fuzz     reads 5,000 hostile files of each kind: every one must end in an answer or a sentence"
-	@echo "make soak     ten minutes of the loop in virtual time: memory and schedule"
-	@echo "make soak-day the same for 24 hours, with decisions, map and UDP"
-	@echo "make requirements-board.txt   the board's packages, pinned with hashes"
+	@echo "Everyday"
+	@echo "  make test          lint, types and tests, as CI runs them"
+	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
+	@echo "                     and write model.onnx and golden.npz to OUT (default: build)"
+	@echo "  make demo          fit a model to a small simulated set and decide on touches new to it"
+	@echo "  make study         the paper's analyses of DATA beside ours: build/study/report.html"
+	@echo "  make tradeoff      what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json"
+	@echo "                     (from edge-classify bench) takes a board's timings in place of this"
+	@echo "                     machine's; then make export FRONT=fast|balanced|accurate|MS|ACCURACY"
+	@echo "  make docs          the documentation as a site: build/site/index.html"
+	@echo "For a board"
+	@echo "  make wheel         build the package that goes on the board: dist/edge_classify-*.whl"
+	@echo "  make wheel-test    test the wheel in an empty environment outside the checkout"
+	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
+	@echo "  make requirements-board.txt   pin the board's packages with hashes"
+	@echo "Measurements"
+	@echo "  make bench         speed beside the alternatives"
+	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
+	@echo "  make matched       four touches in MuJoCo and in our simulator, beside theory"
+	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
+	@echo "  make risk          how often a certified error rate is exceeded, over 200 simulated sets"
+	@echo "  make stopping      deciding when sure beside fixed windows, and beside TEASER if aeon is there"
+	@echo "  make soak          ten minutes of the loop in virtual time: memory and schedule"
+	@echo "  make soak-day      24 hours of the same, with decisions, map and UDP"
+	@echo "Thorough tests"
+	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
+	@echo "  make hard-cases-versions   the same answers from another ONNX Runtime"
+	@echo "  make mutants       make 200 random changes to the code: does a test notice each?"
+	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
+	@echo "Upkeep"
+	@echo "  make golden        renew the small model and outputs that the tests compare with"
+	@echo "  make demo-data     renew the model and the touches that the wheel carries"
+	@echo "  make constraints   check that constraints.txt pins exactly what the groups need"
+	@echo "  make clean         remove build and dist"
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -73,7 +82,7 @@ RECORDINGS := $(SIMULATED)
 export: $(SIMULATED)/.made
 endif
 
-# FRONT=fast, balanced, accurate, milliseconds or an accuracy: a point of `make tradeoff`.
+# FRONT=fast, balanced, accurate, milliseconds or an accuracy: a point that `make tradeoff` found.
 ifdef FRONT
 FRONTED := --front $(FRONT) $(addprefix --fronts ,$(wildcard $(OUT)/tradeoff/front.json))
 endif
@@ -83,7 +92,7 @@ export: $(READY)
 
 DEMO := $(OUT)/demo
 
-# Contacts to learn from, contacts of another seed to decide on, the same over fake chips.
+# Contacts to learn from, contacts of another seed to decide on, and one of these over fake chips.
 demo: $(READY)
 	rm -rf $(DEMO)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMO)/known
@@ -93,11 +102,11 @@ demo: $(READY)
 	$(BIN)/edge-classify replay --model $(DEMO)/model.onnx --summary $(DEMO)/unseen
 	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
 
-# The committed model and outputs that the tests hold the edge to.
+# The committed model and outputs that the tests compare the edge with.
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make
 
-# The README's pictures, and the settings of `make export FRONT=` where no trade-off was made here.
+# The README's pictures, and the settings that `make export FRONT=` uses before a `make tradeoff`.
 docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
 	cp $(OUT)/tradeoff/front.json train/tradeoff/front.json
@@ -139,8 +148,8 @@ endif
 study: $(READY)
 	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
 
-# Without a BOARD, this machine's own figures: a model of these recordings, with the features that
-# the report measures, benched here.
+# Without a BOARD: time a model of these recordings on this machine, with the features that the
+# report measures.
 ifdef BOARD
 tradeoff: $(READY)
 else
@@ -154,7 +163,7 @@ endif
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
 	  --prices $(OUT)/tradeoff/prices.json --out $(OUT)/tradeoff $(TRADEOFF)
 
-# The site, with the reference from the docstrings; every link must lead somewhere.
+# The site, with the Python reference from the docstrings; a broken link is an error.
 $(VENV)/.docs: $(READY)
 	$(PIP) --group docs
 	@touch $@
@@ -184,7 +193,7 @@ soak-day: $(READY)
 requirements-board.txt: $(READY) pyproject.toml constraints.txt
 	$(BIN)/python -m board.requirements
 
-# Stale copies of modules would go into the wheel.
+# setuptools would pack modules that an earlier build left behind.
 wheel: $(READY)
 	rm -rf build/lib build/bdist.* dist
 	PIP_CONSTRAINT=$(CURDIR)/constraints.txt SOURCE_DATE_EPOCH=1577836800 \
@@ -208,12 +217,12 @@ demo-data: $(READY)
 
 HARD := $(OUT)/hard-cases
 
-# With what another ONNX Runtime answers, and an aarch64 where `make board-test` has run.
+# Includes the answers of another ONNX Runtime, and of an aarch64 after `make board-test`.
 hard-cases: hard-cases-versions
 	$(BIN)/python -m tests.hard_cases --out $(HARD)
 	$(BIN)/python -m tests.hard_cases.adversarial
 
-# Golden files of hard cases, then asked again with another ONNX Runtime.
+# Writes golden files of the hard cases, then checks them with another ONNX Runtime.
 OTHER_RUNTIME ?= 1.22.1
 OTHER := $(HARD)/onnxruntime-$(OTHER_RUNTIME)
 
@@ -227,12 +236,19 @@ hard-cases-versions: $(READY) $(OTHER)/.ready
 	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
 	$(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $(OTHER)/bin/python
 
-mutants: $(READY)
-	$(BIN)/python -m tests.mutation.guards
-	$(BIN)/python -m tests.mutation.sample
+$(VENV)/.mutants: $(READY)
+	$(PIP) --group mutants
+	@touch $@
+
+# MUTANTS="--only edge.touch --count 50 --minutes 5": a smaller draw.
+mutants: $(VENV)/.mutants
+	$(BIN)/python -m tests.mutants $(MUTANTS)
+
+constraints: $(READY)
+	$(BIN)/python -m board.requirements --check-constraints
 
 fuzz: $(READY)
 	$(BIN)/python -m tests.fuzz --out $(OUT)/fuzz $(FUZZ)
 
 clean:
-	rm -rf build dist
+	rm -rf build dist mutants

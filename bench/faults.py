@@ -19,7 +19,6 @@ import numpy as np
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
-from bench.read_scheduler import one_bus
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
 from edge.fake.player import calibrated, fake_buses, fake_skin
@@ -29,6 +28,7 @@ from edge.skin.loop import Schedule
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec, ChipSpec
 from edge.touch.frame import Frame
+from tests.wires import one_bus
 
 PERIOD_S = 0.01
 BEGIN_S, END_S = 0.5, 1.0

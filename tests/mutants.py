@@ -1,0 +1,78 @@
+"""`make mutants`: change the code a little, at random places, and see whether a test fails.
+
+mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that reach the
+changed function; `[tool.mutmut]` in pyproject.toml names the files and the tests. A run tries
+`--count` mutants drawn by `--seed` until `--minutes` are over, and prints the difference of each
+mutant that no test noticed. Results are kept in `mutants/`: what was tried is not tried again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import subprocess
+import sys
+from collections import Counter
+from random import Random
+
+MUTMUT = (sys.executable, "-m", "mutmut")
+UNNOTICED = ("survived", "no tests")
+
+
+def output(*arguments: str) -> str:
+    """What a mutmut command prints; its errors pass through."""
+    done = subprocess.run([*MUTMUT, *arguments], check=True, stdout=subprocess.PIPE, text=True)
+    return done.stdout
+
+
+def statuses() -> dict[str, str]:
+    """{name of a mutant: its status}, "not checked" where it was not tried yet."""
+    lines = output("results", "--all", "true").splitlines()
+    return dict(line.strip().rsplit(": ", 1) for line in lines if "__mutmut_" in line)
+
+
+def generate() -> None:
+    """Make all mutants, and measure which tests reach which function.
+
+    Raises:
+        SystemExit: a test fails on the unchanged code.
+    """
+    done = subprocess.run(
+        [*MUTMUT, "run", "no such mutant"], capture_output=True, text=True, check=False
+    )
+    if "nothing matches" not in done.stderr:
+        raise SystemExit(done.stdout + done.stderr)
+
+
+def run(names: list[str], minutes: float) -> None:
+    """Try these mutants until the time is over."""
+    process = subprocess.Popen([*MUTMUT, "run", *names], stdout=subprocess.DEVNULL)
+    try:
+        process.wait(60.0 * minutes)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+
+
+def main() -> None:
+    """Try a sample of mutants; print those that no test notices, and a count of each status."""
+    parser = argparse.ArgumentParser(prog="mutants", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--count", type=int, default=200, help="mutants to draw (%(default)s)")
+    parser.add_argument("--seed", type=int, default=2012, help="of the draw (%(default)s)")
+    parser.add_argument("--minutes", type=float, default=10.0, help="at most (%(default)s)")
+    parser.add_argument("--only", default="", help="draw from mutants whose name contains this")
+    arguments = parser.parse_args()
+    generate()
+    names = [name for name in statuses() if arguments.only in name]
+    names = Random(arguments.seed).sample(names, min(arguments.count, len(names)))
+    run(names, arguments.minutes)
+    results = statuses()
+    for name in sorted(names):
+        if results[name] in UNNOTICED:
+            print(f"{results[name]}: {name}\n{output('show', name)}")
+    counts = Counter(results[name] for name in names)
+    print(", ".join(f"{status}: {count}" for status, count in counts.most_common()))
+
+
+if __name__ == "__main__":
+    main()
