@@ -53,15 +53,16 @@ def add_commands(
 ) -> Iterator[argparse.ArgumentParser]:
     """Add each named module of the package as a subcommand, and yield the subcommands' parsers.
 
-    A module has `HELP` (one line), `DESCRIPTION`, `add_options(parser)` and `run(arguments)`,
-    which returns the exit status.
+    A module's docstring is its help: the first line stands in the list of commands, the rest in the
+    command's own help. The module has `add_options(parser)` and `run(arguments)`, which returns the
+    exit status.
     """
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in names:
         module = import_module(f"{package}.{name}")
-        command = commands.add_parser(
-            name.rstrip("_"), help=module.HELP, description=module.DESCRIPTION
-        )
+        headline, _, description = (module.__doc__ or name).partition("\n\n")
+        brief = headline[0].lower() + headline[1:].rstrip(".")
+        command = commands.add_parser(name.rstrip("_"), help=brief, description=description)
         module.add_options(command)
         command.set_defaults(run=module.run)
         yield command

@@ -1,4 +1,9 @@
-"""`edge-classify bench`: how long each stage of a decision takes on this machine."""
+"""Time each stage of a decision on this machine.
+
+Times each stage with a touch that grows over the model's skin, and writes medians, 99th
+percentiles, memory and start-up time as JSON, for `make tradeoff BOARD=board.json` on the
+workstation.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,8 +28,9 @@ from numpy.typing import NDArray
 from edge import __version__
 from edge.classifier import Classifier
 from edge.commands.check import FRAMES
+from edge.commands.options import within
 from edge.commands.output import Output
-from edge.errors import EdgeError, InputError
+from edge.errors import EdgeError
 from edge.fake.player import frame_bits
 from edge.files import write_whole
 from edge.model.model import Model
@@ -37,7 +44,7 @@ from edge.touch.track import ContactTracker, first_contact
 FORMAT = 1
 RATE_HZ = 100.0
 INSIDE = slice(1, -2)
-"""Frames of the touch at which nothing but following is due."""
+"""The frames of the touch in which a contact is followed but neither begins nor is decided."""
 FEWEST_ROUNDS, MOST_ROUNDS = 20, 1_000_000
 COLD_STARTS = 5
 COLD = "import sys; from edge.classifier import Classifier; from edge.model.model import Model; \
@@ -45,34 +52,23 @@ Classifier(Model(sys.argv[1]))"
 Timings = dict[str, float | int]
 
 
-HELP = "time each stage of a decision on this machine"
-DESCRIPTION = (
-    "Times each stage on a touch that grows over the model's skin, and writes "
-    "medians, 99th percentiles, memory and start-up time as JSON, for `make tradeoff "
-    "BOARD=board.json` on the workstation."
-)
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument("--out", required=True, metavar="board.json", help="the file to write")
     parser.add_argument(
-        "--skin",
-        metavar="skin.toml",
-        help="also count how long a frame of this skin takes on its wires",
+        "--skin", metavar="skin.toml", help="also calculate a frame's time on this skin's wires"
     )
     parser.add_argument(
-        "--rounds", type=int, default=2000, help="how often each stage is timed (default: 2000)"
+        "--rounds",
+        type=within(int, FEWEST_ROUNDS, MOST_ROUNDS),
+        default=2000,
+        help="how often each stage is timed (default: %(default)s)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, write, and print one line per stage on stderr."""
-    if not FEWEST_ROUNDS <= arguments.rounds <= MOST_ROUNDS:
-        raise InputError(
-            f"--rounds must be {FEWEST_ROUNDS} to {MOST_ROUNDS}, not {arguments.rounds}"
-        )
+    """Measure, write the file, and print a line for each stage."""
     model = Model(arguments.model)
     skin = None if arguments.skin is None else load(arguments.skin)
     output = Output.of(arguments)
@@ -80,31 +76,23 @@ def run(arguments: argparse.Namespace) -> int:
     with write_whole(arguments.out) as file:
         file.write(json.dumps(board, indent=1, ensure_ascii=False).encode() + b"\n")
     for name, stage in board["stages"].items():
-        output.text(
-            f"{name:<10} {stage['median_us']:>9.1f} us median {stage['p99_us']:>9.1f} us p99"
-        )
+        output.text(f"{name:<10} {stage['median_us']:>9} us median {stage['p99_us']:>9} us p99")
     output.text(
         f"model      {board['model']['bytes'] / 1e6:>9.3f} MB\n"
-        f"memory     {board['memory_mb']:>9.1f} MB\ncold start {board['cold_start_ms']:>9.1f} ms "
-        f"(median of {COLD_STARTS})"
+        f"memory     {board['memory_mb']:>9.1f} MB\n"
+        f"cold start {board['cold_start_ms']:>9.1f} ms (median of {COLD_STARTS})"
     )
     if board["wire"] is not None:
         output.text(
-            f"wire       {board['wire']['frame_ms']:>9.3f} ms a frame, counted from the drivers' "
-            "transactions"
+            f"wire       {board['wire']['frame_ms']:>9.3f} ms a frame, calculated from the bits "
+            "that the drivers transfer"
         )
     output.event({"event": "bench", "file": arguments.out}, f"written to {arguments.out}")
     return 0
 
 
 def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
-    """The contents of board.json.
-
-    Args:
-        model: to time.
-        rounds: how often each stage is timed.
-        skin: the skin whose wire time is counted, or None.
-    """
+    """The contents of board.json; `skin` is the one whose wire time is calculated, or None."""
     with garbage_aside():
         stages = time_stages(model, rounds)
     return {
@@ -133,7 +121,7 @@ def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
 
 
 def touch(model: Model, seconds: float) -> list[Frame]:
-    """Frames of a touch that begins at once and grows in force and area on the model's skin."""
+    """Frames of a touch on the model's skin that begins at once and grows in force and area."""
     layout, dof = model.info.layout, model.info.dof
     rows = np.arange(layout.rows)[:, None] - layout.rows // 2
     cols = np.arange(layout.cols) - layout.cols // 2
@@ -145,34 +133,25 @@ def touch(model: Model, seconds: float) -> list[Frame]:
         reach = 1.0 + 2.0 * age
         counts = np.minimum(force * np.maximum(0.0, 1.0 - distance / (reach + 1.0)), 65535)
         joints = None if dof is None else np.full(dof, 0.1 * age)
-        frames.append(
-            Frame(
-                counts=counts.astype(np.uint16),
-                valid=np.ones(layout.shape, dtype=bool),
-                t=age,
-                joints=joints,
-            )
-        )
+        valid = np.ones(layout.shape, dtype=bool)
+        frames.append(Frame(age, counts.astype(np.uint16), valid, joints=joints))
     return frames
 
 
 def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     """Median and 99th percentile of each stage in microseconds.
 
-    `region`: finding the largest region of a frame. `track`: the same, the arm's pose, and what
-    the features measure. `features`: from a contact's series to its vector. `decision`: ONNX
-    Runtime and the answers of all tasks. `answer`: features and decision together. `frame`:
-    everything that a frame in a contact costs. `last`: everything that the frame costs at which a
-    decision is due.
+    `region`: finding the largest region of a frame. `track`: that, the arm's pose and the measures
+    of the features. `features`: from a contact's series to its vector. `decision`: ONNX Runtime
+    and the answers of all tasks. `answer`: features and decision together. `frame`: a frame within
+    a contact, from counts to events. `last`: the frame at which a decision is due, likewise.
     """
     info = model.info
     layout, frames = info.layout, touch(model, info.window_s)
-    found = first_contact(frames, info.tracker(layout))
-    if found is None:
-        raise EdgeError(
-            f"{model.path}: no touch rises above its onset_counts; export the model again"
-        )
-    series, counts = found[1], [frame.counts for frame in frames[INSIDE]]
+    contact = first_contact(frames, info.tracker(layout))
+    if contact is None:
+        raise EdgeError(f"{model.path}: no touch exceeds its onset_counts; export the model again")
+    series, counts = contact[1], [frame.counts for frame in frames[INSIDE]]
     due = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
 
     def region(counts: NDArray[np.uint16]) -> object:
@@ -202,15 +181,15 @@ def pushed(
     keep: slice,
     rounds: int,
 ) -> list[float]:
-    """Microseconds that the frames `keep` take, pushed with the others into what `make` gives."""
-    seen: list[float] = []
-    while len(seen) < rounds:
-        seen += timed(make().push, frames)[keep]
-    return seen
+    """Microseconds of each frame in `keep`, pushed among the others into new objects of `make`."""
+    times: list[float] = []
+    while len(times) < rounds:
+        times += timed(make().push, frames)[keep]
+    return times
 
 
 def timed(call: Callable[[Any], object], items: Iterable[Any]) -> list[float]:
-    """Microseconds that a call with each of the items takes."""
+    """Microseconds of a call with each of the items."""
     times = []
     for item in items:
         began = time.perf_counter_ns()
@@ -220,7 +199,7 @@ def timed(call: Callable[[Any], object], items: Iterable[Any]) -> list[float]:
 
 
 def summary(times: list[float]) -> Timings:
-    """Median, 99th percentile (nearest rank) and number of times given in microseconds."""
+    """Median, 99th percentile (nearest rank) and number of times in microseconds."""
     ordered = sorted(times)
     rank = math.ceil(0.99 * len(ordered)) - 1
     return {
@@ -239,7 +218,7 @@ def peak_memory_mb() -> float:
 
 
 def cold_start_ms(path: str) -> float:
-    """Median milliseconds from starting Python to a classifier that is ready."""
+    """Median milliseconds from the start of Python to a ready classifier."""
     times = []
     for _ in range(COLD_STARTS):
         began = time.perf_counter()
@@ -270,22 +249,18 @@ def machine() -> dict[str, Any]:
 
 
 def kind() -> str:
-    """The board's model, else the processor's name."""
-    try:
-        text = Path("/proc/device-tree/model").read_text(encoding="utf-8", errors="replace")
-        return text.strip("\x00 \n")
-    except OSError:
-        pass
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown"
+    """The name of the board, or else of the processor."""
+    with suppress(OSError):
+        return Path("/proc/device-tree/model").read_text(errors="replace").strip("\x00 \n")
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"
 
 
 def wire(skin: SkinFile) -> dict[str, Any]:
-    """The wire time of a frame, from the bits that the drivers send over a fake bus."""
+    """The wire time of a frame, from the bits that the drivers transfer over a fake bus."""
     bits: NDArray[np.float64] = np.array(frame_bits(skin, FRAMES)) / FRAMES
     rate = frame_rate(bits.tolist(), [bus.clock_hz for bus in skin.buses])
     return {

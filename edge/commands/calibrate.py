@@ -1,4 +1,8 @@
-"""`edge-classify calibrate`: rest values and noise while nothing touches the skin."""
+"""Measure rest values and noise and write them into the skin file.
+
+Reads the skin while nothing touches it, and writes each taxel's mean and standard deviation into
+the skin file. The old file is kept as skin.toml.bak.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.commands.options import add_skin
+from edge.commands.options import add_skin, within
 from edge.commands.output import Output
 from edge.commands.source import open_skin
 from edge.errors import InputError
@@ -22,19 +26,11 @@ from edge.skin.skin import Skin
 LOG = logging.getLogger(__name__)
 
 FRAMES = 1000
-"""As many as the lab averaged for its own baseline."""
-LEAST_FRAMES = 20
-RESTLESS = 10.0
-"""A taxel whose noise is this many times the median's (and `RESTLESS_COUNTS` more) is being
-touched, or broken."""
-RESTLESS_COUNTS = 5.0
-
-
-HELP = "measure rest values and noise and write them into the skin file"
-DESCRIPTION = (
-    "Reads the skin while nothing touches it and writes each taxel's mean and "
-    "standard deviation into the skin file; the old file is kept as skin.toml.bak."
-)
+"""As many as the paper's lab averaged for its baseline."""
+FEWEST_FRAMES, MOST_FRAMES = 20, 1_000_000
+RESTLESS, RESTLESS_COUNTS = 10.0, 5.0
+"""A taxel is being touched, or broken, if its noise exceeds this factor times the median noise plus
+so many counts."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -42,14 +38,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_skin(parser)
     parser.add_argument(
         "--frames",
-        type=int,
+        type=within(int, FEWEST_FRAMES, MOST_FRAMES),
         default=FRAMES,
-        help="how many frames to average (default: %(default)s)",
+        help="number of frames to average (default: %(default)s)",
     )
     parser.add_argument(
         "--force",
         action="store_true",
-        help="write the calibration even if a taxel seems to be touched",
+        help="write the calibration even if something seems to touch the skin",
     )
 
 
@@ -57,12 +53,12 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCa
     """Mean and standard deviation of each taxel's raw values, from sums of whole numbers.
 
     Args:
-        skin: started, and touched by nothing.
-        frames: how many.
-        lasts_s: for how many seconds there is something to read.
+        skin: set up, and touched by nothing.
+        frames: the number of frames to read.
+        lasts_s: the greatest time to read for.
 
     Returns:
-        The calibration, and the number of frames behind it.
+        The calibration, and the number of frames that it was taken from.
     """
     shape = skin.layout.shape
     n = np.zeros(shape, dtype=np.int64)
@@ -84,21 +80,21 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCa
 def mean_and_deviation(
     n: NDArray[np.int64], total: NDArray[np.int64], squares: NDArray[np.int64]
 ) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
-    """Rounded mean and sample standard deviation; 0 where there is none.
+    """Rounded mean and sample standard deviation; 0 for a taxel that was never read.
 
-    The sum of squared deviations is taken about a whole number next to the mean, all in whole
-    numbers, so that a large mean costs no digits.
+    Squared deviations are summed about the rounded mean in whole numbers, so that a large mean
+    loses no digits.
     """
-    some = np.maximum(n, 1)
-    mean = (2 * total + some) // (2 * some)
+    divisor = np.maximum(n, 1)
+    mean = (2 * total + divisor) // (2 * divisor)
     deviations = squares - 2 * mean * total + n * mean * mean
-    shift = total - n * mean  # what rounding the mean left over
-    variance = (deviations - shift * shift / some) / np.maximum(n - 1, 1)
+    remainder = total - n * mean
+    variance = (deviations - remainder * remainder / divisor) / np.maximum(n - 1, 1)
     return mean.astype(np.uint16), np.sqrt(np.maximum(variance, 0.0))
 
 
 def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Taxels (row, col) whose values vary far more than the others', worst first."""
+    """Taxels (row, col) that vary far more than the others, the worst first."""
     limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
     taxels = np.argwhere(noise > limit)
     order = np.argsort(-noise[noise > limit], kind="stable")
@@ -109,28 +105,26 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure, refuse a skin that is being touched, and write."""
     if arguments.skin is None:
         raise InputError("give --skin skin.toml, the file into which the calibration is written")
-    if arguments.frames < LEAST_FRAMES:
-        raise InputError(f"--frames must be at least {LEAST_FRAMES}, not {arguments.frames}")
     with open_skin(arguments, calibrated=False) as opened:
         LOG.info("measuring; keep everything off the skin")
         calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
         unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
-    if seen < LEAST_FRAMES:
-        raise InputError(f"only {seen} frames could be read; at least {LEAST_FRAMES} are needed")
+    if seen < FEWEST_FRAMES:
+        raise InputError(f"only {seen} frames could be read; at least {FEWEST_FRAMES} are needed")
     moving = restless(calibration.noise)
     if moving and not arguments.force:
         row, col = moving[0]
         raise InputError(
-            f"{len(moving)} taxels vary while they should be at rest, [{row}, {col}] the most, by "
-            f"{calibration.noise[row, col]:.1f} counts; keep everything off the skin, list broken "
-            "taxels under dead in [signal], or write the calibration with --force"
+            f"taxels that vary while they should be at rest: {len(moving)}, most of all "
+            f"[{row}, {col}], by {calibration.noise[row, col]:.1f} counts; keep everything off "
+            "the skin, list broken taxels under dead in [signal], or use --force"
         )
     taken = datetime.now(UTC).replace(microsecond=0)
     backup = save_calibration(
         arguments.skin, TaxelCalibration(calibration.baseline, calibration.noise, taken)
     )
     if unread:
-        LOG.warning("%d taxels could not be read", unread)
+        LOG.warning(f"taxels that could not be read: {unread}")
     median, largest = float(np.median(calibration.noise)), float(calibration.noise.max())
     Output.of(arguments).event(
         {
@@ -143,7 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
             "unread": unread,
             "moving": moving,
         },
-        f"{arguments.skin}: calibrated from {seen} frames; noise {median:.1f} counts (median), "
-        f"{largest:.1f} (largest). The old file is {backup}.",
+        f"{arguments.skin}: calibrated from {seen} frames; the noise is {median:.1f} counts "
+        f"(median) to {largest:.1f} (largest). The old file is kept as {backup}.",
     )
     return 0

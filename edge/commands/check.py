@@ -1,4 +1,9 @@
-"""`edge-classify check`: whether a skin's file is right, and what frame rate its wires carry."""
+"""Find mistakes in a skin file, and the frame rate that its wires carry.
+
+Reads a skin file and runs its drivers over a fake bus that counts the bits on the wires. The exit
+status is 1 if the skin cannot work as the file describes it, or the wires cannot carry the frame
+rate that the file asks for.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +17,7 @@ from edge.fake.player import frame_bits
 from edge.skin.file import SkinFile, frame_rate, load
 
 FRAMES = 100
-"""Counted together, so that transactions that not every frame needs count by their share."""
-
-
-HELP = "say what is wrong with a skin file, and what frame rate its wires carry"
-DESCRIPTION = (
-    "Reads a skin file and runs its drivers over a fake bus that counts the "
-    "bits on the wire. The exit status is 1 if the skin cannot work as the file describes "
-    "it, or if the wires cannot carry the frame rate that the file asks for."
-)
+"""Counted together, since some transactions are not needed in every frame."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -29,11 +26,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def faults(file: SkinFile) -> Iterator[str]:
-    """Why the skin cannot work, a sentence each."""
+    """Reasons why the skin cannot work, each a sentence."""
     top = min(chip.highest for chip in file.chips)
     if file.layout.onset >= top:
         yield (
-            f"no contact can begin: onset_counts is {file.layout.onset}, and a taxel gives at "
+            f"no contact can begin: onset_counts is {file.layout.onset}, but a taxel gives at "
             f"most {top}"
         )
     if any(chip.kind == "mpr121" and chip.sign == 1 for chip in file.chips):
@@ -41,13 +38,13 @@ def faults(file: SkinFile) -> Iterator[str]:
     silent = file.signal.dead_band_sigma == 0.0 and file.signal.dead_band_counts == 0
     if file.layout.onset == 0 and silent:
         yield (
-            "every count of noise begins a contact: set threshold_counts and onset_counts, or "
+            "noise of one count begins a contact: set threshold_counts and onset_counts, or "
             "dead_band_sigma"
         )
 
 
 def remarks(file: SkinFile) -> Iterator[str]:
-    """What is missing and may be meant so, a sentence each."""
+    """Settings that are missing, perhaps on purpose, each a sentence."""
     if file.layout.onset == 0 and not list(faults(file)):
         yield (
             "threshold_counts is missing: anything above the noise is a contact; set "
@@ -59,15 +56,15 @@ def remarks(file: SkinFile) -> Iterator[str]:
             "be used"
         )
     if file.uncovered:
-        yield f"{file.uncovered} taxels have no chip: they are never valid"
+        yield f"taxels without a chip, which are never valid: {file.uncovered}"
     if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
-        yield "pyserial is not installed here: run `pip install pyserial`"
+        yield "pyserial is not installed: run `pip install pyserial`"
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what was found; 1 if the skin cannot work."""
+    """Print mistakes and remarks; 1 if the skin cannot work."""
     output = Output.of(arguments)
     file = load(arguments.skin)
     bits = [count / FRAMES for count in frame_bits(file, FRAMES)]
@@ -75,11 +72,13 @@ def run(arguments: argparse.Namespace) -> int:
     rate, asked = frame_rate(bits, clocks), file.reading.rate_hz
     wrong, said = list(faults(file)), list(remarks(file))
     if rate < asked and file.reading.region_of_interest:
-        said.append(f"full frames come at {rate:.1f} Hz; the chips near a contact at the rate")
+        said.append(
+            f"full frames come at {rate:.1f} Hz; the chips near a contact are read at {asked:g} Hz"
+        )
     elif rate < asked:
         wrong.append(
-            f"asks for {asked:g} Hz, the wires carry {rate:.1f}: use more buses, a faster clock_hz "
-            "or baud, a lower [read] rate_hz, or region_of_interest = true"
+            f"the file asks for {asked:g} Hz, but the wires carry {rate:.1f} Hz: use more buses, a "
+            "faster clock_hz or baud, a lower [read] rate_hz, or region_of_interest = true"
         )
     event = {
         "event": "check",
@@ -109,8 +108,8 @@ def _text(
         for bus, spec in zip(event["buses"], file.buses, strict=True)
     ]
     lines.append(
-        f"The wires carry {event['frame_rate_hz']:g} frames a second; {event['asked_hz']:g} are "
-        "asked for."
+        f"The wires carry {event['frame_rate_hz']:g} frames a second; the file asks for "
+        f"{event['asked_hz']:g}."
     )
     lines += [f"Wrong:  {sentence}" for sentence in wrong]
     lines += [f"Remark: {sentence}" for sentence in said]

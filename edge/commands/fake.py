@@ -1,27 +1,24 @@
-"""`edge-classify fake`: touches to rehearse with, for any skin file."""
+"""Make labelled touches for a skin file, to rehearse before it is wired.
+
+Maps the simulated touches that come with the program onto the geometry of a skin, and writes them
+as labelled recordings, with one more in which nothing touches the skin. Play them with --fake to
+rehearse calibrate, record, export and run. A model that is fitted to them knows nothing about the
+real skin.
+"""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from edge.commands.options import within
 from edge.commands.output import Output
-from edge.errors import InputError
 from edge.fake.touches import still, touches
 from edge.recording import save
 from edge.skin.file import load
 
 TRIALS = 8
 STILL_S = 5.0
-
-
-HELP = "make labelled touches for a skin file, to rehearse with before it is wired"
-DESCRIPTION = (
-    "Maps the simulated touches that come with the program onto the geometry of "
-    "a skin, and writes them as labelled recordings, with one in which nothing touches. Play "
-    "them with --fake to rehearse calibrate, record, export and run. A model fitted on them "
-    "knows nothing of the real skin."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -33,17 +30,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=Path, metavar="DIR", help="the folder to write to"
     )
     parser.add_argument(
-        "--trials", type=int, default=TRIALS, help="how many of each touch (default: %(default)s)"
+        "--trials",
+        type=within(int, 1, 1000),
+        default=TRIALS,
+        help="number of trials of each touch (default: %(default)s)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the variation between trials")
+    parser.add_argument(
+        "--seed", type=within(int, 0, 2**63), default=0, help="seed of the trials' variation"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the recordings, and say what can be done with them."""
-    if not 1 <= arguments.trials <= 1000:
-        raise InputError(f"--trials must be 1 to 1000, not {arguments.trials}")
-    if arguments.seed < 0:
-        raise InputError(f"--seed must be 0 or more, not {arguments.seed}")
+    """Write the recordings, and print the commands to rehearse with."""
     file = load(arguments.skin)
     folder, rest = arguments.out / "touches", arguments.out / "still.npz"
     save(rest, still(file, STILL_S))
@@ -62,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     frames = round(STILL_S * file.reading.rate_hz)
     Output.of(arguments).event(
         event,
-        f"{folder}: {len(paths)} labelled touches of 4 objects\n{rest}: nothing touches\n\n"
+        f"{folder}: {len(paths)} labelled touches of 4 objects\n{rest}: no touch\n\n"
         "Rehearse with them:\n"
         f"  edge-classify calibrate --skin {skin} --fake {rest} --frames {frames}\n"
         f"  edge-classify view --skin {skin} --fake {first}\n"

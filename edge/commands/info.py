@@ -1,4 +1,8 @@
-"""`edge-classify info`: what a model is."""
+"""Describe a model: its tasks, labels, accuracy, features, skin and arm.
+
+Prints a model's tasks with their labels and accuracy, its features and training data, and the skin
+and arm that it needs; also its size, and the time of a decision on this machine.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +25,6 @@ ROUNDS = 200
 LONGEST_LINE = 80
 
 
-HELP = "say what a model is: its tasks, labels, accuracy, features, skin and arm"
-DESCRIPTION = (
-    "Prints what a model file says of itself: what it tells apart and how "
-    "accurately, what it was fitted on, and which skin and arm it needs. Also its size, and "
-    "how long a decision takes on this machine."
-)
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
@@ -41,19 +37,23 @@ def decision_us(model: Model) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print it."""
+    """Print the description."""
     model = Model(arguments.model)
-    about = {"file": arguments.model, "bytes": os.path.getsize(arguments.model)}
-    about["decision_us"] = round(decision_us(model), 1)
-    said = {"event": "model", **about, **json.loads(model.info.to_json())}
-    Output.of(arguments).event(said, text(model.info, said))
+    about = {
+        "event": "model",
+        "file": arguments.model,
+        "bytes": os.path.getsize(arguments.model),
+        "decision_us": round(decision_us(model), 1),
+        **json.loads(model.info.to_json()),
+    }
+    Output.of(arguments).event(about, text(model.info, about))
     return 0
 
 
-def text(info: ModelInfo, said: dict[str, Any]) -> str:
-    """The same for a person."""
+def text(info: ModelInfo, about: dict[str, Any]) -> str:
+    """The description for a person."""
     skin, chain = info.layout, info.chain
-    lines = [f"{said['file']}: {said['bytes'] / 1024:.0f} kB, format {said['format']}", ""]
+    lines = [f"{about['file']}: {about['bytes'] / 1024:.0f} kB, format {about['format']}", ""]
     for name, task in info.tasks.items():
         lines += _wrapped(
             f"{name}: {task.accuracy:.1%} accurate (nested), {task.components} "
@@ -62,7 +62,7 @@ def text(info: ModelInfo, said: dict[str, Any]) -> str:
         )
         lines += _wrapped(", ".join(task.labels), "  ")
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())
-    lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples each of"]
+    lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples of each of"]
     lines += _wrapped(units, "  ")
     if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
@@ -72,11 +72,11 @@ def text(info: ModelInfo, said: dict[str, Any]) -> str:
     for sentence in (
         f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above {skin.threshold_counts} "
         f"counts, onset above {skin.onset}; force in {skin.force_unit}s.",
-        "Arm: none; motion is measured on the skin."
+        "Arm: none; contact motion is measured on the skin."
         if chain is None
         else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}.",
         f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with {versions}.",
-        f"A decision takes {said['decision_us']:g} us on this machine.",
+        f"A decision takes {about['decision_us']:g} us on this machine (median).",
     ):
         lines += _wrapped(sentence)
     return "\n".join(lines)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import logging
 import math
+from collections.abc import Callable
+from contextlib import suppress
 
 from edge.classifier import stopping_rules
 from edge.errors import InputError
@@ -14,15 +16,22 @@ from edge.touch.arm import Chain
 LOG = logging.getLogger(__name__)
 
 
-def seconds(text: str) -> float:
-    """The type of an option that takes a duration: a finite number of seconds above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"must be a number of seconds above 0, not {text!r}")
-    return value
+def within(kind: type, low: float, high: float) -> Callable[[str], float]:
+    """The type of an option that takes an int or a float from `low` to `high`."""
+
+    def parse(text: str) -> float:
+        with suppress(ValueError):
+            value: float = kind(text)
+            if low <= value <= high:
+                return value
+        number = "a whole number" if kind is int else "a number"
+        raise argparse.ArgumentTypeError(f"must be {number} from {low:g} to {high:g}, not {text!r}")
+
+    return parse
+
+
+seconds = within(float, 1e-3, 1e9)
+"""The type of an option that takes a duration."""
 
 
 def add_skin(parser: argparse.ArgumentParser) -> None:
@@ -31,32 +40,27 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fake",
         metavar="REC.npz",
-        help="use no hardware: play this recording onto fake chips, in virtual time; without "
+        help="need no hardware: play this recording onto fake chips, as fast as possible; without "
         "--skin, the chips are chosen to suit the recording",
     )
     parser.add_argument(
-        "--real-time",
-        action="store_true",
-        help="play the recording at the speed at which it was recorded",
+        "--real-time", action="store_true", help="play the recording at its original speed"
     )
     parser.add_argument("--loop", action="store_true", help="play the recording over and over")
     parser.add_argument(
-        "--seconds",
-        type=seconds,
-        default=math.inf,
-        help="stop after this many seconds (default: never)",
+        "--seconds", type=seconds, default=math.inf, help="stop after this time (default: never)"
     )
 
 
 def add_joints(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say where joint angles come from; `source.open_joints` opens it."""
+    """Add the options that name a source of joint angles; `source.open_joints` opens it."""
     from edge.runtime.joint_stream import OLDEST_S  # a replay needs no sockets
 
     parser.add_argument(
         "--joints",
         metavar="stdin|udp:[HOST:]PORT",
-        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}, with "names": '
-        "[joints] if they are not in the arm's order; a port without a host is bound to the "
+        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add "names": '
+        "[joints] if they are not in the arm's order; without HOST, the port listens on the "
         "loopback interface",
     )
     parser.add_argument(
@@ -64,28 +68,26 @@ def add_joints(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=OLDEST_S,
         metavar="SECONDS",
-        help="do not use a pose that is older than this (default: %(default)s)",
+        help="ignore joint angles older than this (default: %(default)s)",
     )
     parser.add_argument(
         "--joints-shared-clock",
         action="store_true",
-        help="the times in the lines are those of this machine's monotonic clock",
+        help="the lines carry the time of this machine's monotonic clock",
     )
 
 
 def add_arm(parser: argparse.ArgumentParser, use: str) -> None:
-    """Add `--arm` and, for a URDF, its two links; `use` completes "the arm that ...".
+    """Add `--arm` and, for a URDF, its two links; `open_arm` reads the arm.
 
-    `open_arm` reads it.
+    Args:
+        parser: of the command.
+        use: completes the help "the arm that carries the skin, ...".
     """
     parser.add_argument(
-        "--arm",
-        metavar="arm.toml|arm.urdf",
-        help=f"the joints of the arm that carries the skin, {use}",
+        "--arm", metavar="arm.toml|arm.urdf", help=f"the arm that carries the skin, {use}"
     )
-    parser.add_argument(
-        "--base", metavar="LINK", help="in a URDF, the link at which the arm begins"
-    )
+    parser.add_argument("--base", metavar="LINK", help="in a URDF, the first link of the arm")
     parser.add_argument("--tip", metavar="LINK", help="in a URDF, the link that carries the skin")
 
 
@@ -95,12 +97,11 @@ def open_arm(arguments: argparse.Namespace) -> Chain | None:
     Raises:
         InputError: the file describes no chain of joints, or `--base` and `--tip` do not suit it.
     """
-    if arguments.arm is None:
-        for name in ("base", "tip"):
-            if getattr(arguments, name) is not None:
-                raise InputError(f"--{name} needs --arm arm.urdf")
-        return None
-    return Chain.from_file(arguments.arm, arguments.base, arguments.tip)
+    if arguments.arm is not None:
+        return Chain.from_file(arguments.arm, arguments.base, arguments.tip)
+    if arguments.base is not None or arguments.tip is not None:
+        raise InputError("--base and --tip need --arm arm.urdf")
+    return None
 
 
 def add_error(parser: argparse.ArgumentParser) -> None:
@@ -109,30 +110,30 @@ def add_error(parser: argparse.ArgumentParser) -> None:
         "--error",
         type=float,
         metavar="RATE",
-        help="decide as soon as labels are wrong at most this often (0.1: one in ten); without "
-        "it, decide at the end of the window",
+        help="decide as early as possible with at most this share of wrong labels (0.1: one in "
+        "ten); without it, decide at the end of the window",
     )
 
 
 def check_error(model: Model, error: float | None) -> None:
-    """Refuse an error rate that no task is certified for; warn where a single task is not.
+    """Log how each task is decided under an error rate; None is not checked.
 
     Raises:
-        InputError: it is outside (0, 1), or the model cannot hold it.
+        InputError: the rate is outside (0, 1), or certified for no task.
     """
     if error is None:
         return
     for task, rule in stopping_rules(model, error).items():
         if rule is None:
             LOG.warning(
-                f"{task}: an error of {error:g} cannot be certified, so it is "
-                f"decided at the full window: {model.info.stopping[task].refusal(error)}"
+                f"{task}: decided at the end of the window, as an error of {error:g} cannot be "
+                f"certified: {model.info.stopping[task].refusal(error)}"
             )
         else:
             how = (
                 f"always after {model.decision_points_s[rule.last]:g} s"
                 if rule.fixed
-                else f"at a confidence of {rule.confidence:g} or more, after {rule.mean_s:.2f} s "
-                "on average in training"
+                else f"at a confidence of at least {rule.confidence:g}, in training after "
+                f"{rule.mean_s:.2f} s on average"
             )
             LOG.info(f"{task}: decided {how}; at most {rule.error:.1%} wrong")

@@ -1,4 +1,8 @@
-"""`edge-classify record`: saves each contact as a labelled trial."""
+"""Wait for contacts and save each as a labelled trial.
+
+Waits for a contact, saves it with a short lead-in as one .npz file, and waits for the next one.
+Existing files are never overwritten. The exit status is 1 if nothing was saved.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.commands.options import add_arm, add_joints, add_skin, open_arm
+from edge.commands.options import add_arm, add_joints, add_skin, open_arm, within
 from edge.commands.output import Output
 from edge.commands.source import open_joints, open_skin
 from edge.errors import InputError
@@ -30,17 +34,12 @@ from edge.touch.track import ContactTracker, TrackSettings
 LOG = logging.getLogger(__name__)
 
 LONGEST_STEM = 60
-"""Characters of a file's name from its labels: with four bytes each, a name has at most 255."""
+"""Most characters of a file's name that come from labels. A name has at most 255 bytes, a character
+at most 4."""
 LEAD_S = 0.2
 LENGTH_S = 2.0
-"""The paper decides 1.2 s after onset; the rest allows longer windows to be tried."""
-
-
-HELP = "wait for contacts and save each as a labelled trial"
-DESCRIPTION = (
-    "Waits for a contact, saves it with a short lead-in as one .npz file, and "
-    "waits for the next. Existing files are never overwritten."
-)
+"""The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
+_DEBOUNCE = TrackSettings().debounce
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -53,34 +52,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=_label,
         metavar="TASK=LABEL",
-        help="what is being touched, such as object=box; repeat it to label several tasks",
+        help="what the skin touches, such as object=box; repeat it for several tasks",
     )
     parser.add_argument(
         "--out",
         default="recordings",
         metavar="FOLDER|FILE.npz",
-        help="a folder for numbered trials (default: %(default)s), or the file for a single trial",
+        help="a folder for numbered trials (default: %(default)s), or a file for one trial",
     )
-    parser.add_argument("--trials", type=int, default=None, help="stop after this many trials")
+    parser.add_argument("--trials", type=within(int, 1, 1e9), help="stop after this many trials")
     parser.add_argument(
         "--lead",
-        type=float,
+        type=within(float, 0.0, 60.0),
         default=LEAD_S,
         help="seconds to keep from before onset (default: %(default)s)",
     )
     parser.add_argument(
         "--length",
-        type=float,
+        type=within(float, 0.1, 600.0),
         default=LENGTH_S,
-        help="seconds to keep from after onset, at most (default: %(default)s)",
+        help="seconds to keep after onset, at most (default: %(default)s)",
     )
     parser.add_argument(
-        "--dof",
-        type=int,
-        default=None,
-        help="with --joints but no --arm: how many angles each line has",
+        "--dof", type=int, help="the number of angles in each line of --joints, without --arm"
     )
-    add_arm(parser, "stored in each trial (default: Cody's)")
+    add_arm(parser, "to be stored in each trial (without it, training assumes Cody's)")
 
 
 def _label(text: str) -> tuple[str, str]:
@@ -93,9 +89,8 @@ def _label(text: str) -> tuple[str, str]:
 class Trials:
     """Cuts a stream of frames into trials, one per contact.
 
-    `push` returns the frames of a trial when it is complete: from the lead-in before onset to
-    the contact's end, or to `length_s` after onset. While a saved contact continues, no other
-    trial begins.
+    A trial lasts from the lead-in before onset to the end of the contact, or to `length_s` after
+    onset. No other trial begins while a saved contact continues.
     """
 
     def __init__(self, tracker: ContactTracker, *, lead_frames: int, length_s: float) -> None:
@@ -105,7 +100,7 @@ class Trials:
         self._saved: Contact | None = None
 
     def push(self, frame: Frame) -> list[Frame] | None:
-        """Take in a frame."""
+        """Take in a frame; returns the frames of a trial that this frame completes."""
         contact = next(iter(self._tracker.push(frame)), None)
         if self._frames is None:
             self._before.append(frame)
@@ -122,17 +117,14 @@ class Trials:
         return None
 
     def rest(self) -> list[Frame] | None:
-        """The frames so far of a trial that has begun; then wait for the next contact."""
+        """End the trial that is under way, if any, and return its frames."""
         frames, self._frames = self._frames, None
         self._before.clear()
         return frames
 
 
-_DEBOUNCE = TrackSettings().debounce
-
-
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
-    """Frames as a recording; NaN for the joint angles of a frame in which they were not known."""
+    """A recording of the frames, with NaN for joint angles that were not known."""
     valid = np.array(
         [np.ones(f.counts.shape, bool) if f.valid is None else f.valid for f in frames]
     )
@@ -149,17 +141,22 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
 
 
 def trial_path(out: str, labels: dict[str, str]) -> Path:
-    """The file for the next trial: `out` itself, or the first free number in that folder.
+    """The file for the next trial: `out` itself, or a file with the first free number in `out`.
 
     Raises:
-        InputError: `out` names a file that exists already.
+        InputError: `out` names a file that exists, or that no folder can hold.
     """
     path = Path(out)
     if path.suffix == ".npz":
-        if path.exists():
-            raise InputError(f"{path}: exists already; choose another name or remove it")
-        return path
-    # A name that begins with a dot is hidden, and a folder's listing passes over it.
+        try:
+            path.lstat()
+        except FileNotFoundError:
+            return path
+        except (OSError, ValueError) as error:  # such as a name of 300 characters
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{path}: cannot be written: {reason}") from None
+        raise InputError(f"{path}: exists already; choose another name or remove it")
+    # A listing of the folder omits names that begin with a dot.
     stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
     taken = {p.name for p in path.glob(f"{stem}-*.npz")} if path.is_dir() else set()
     number = 1
@@ -172,26 +169,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
     labels = dict(arguments.label)
     if not labels:
-        raise InputError(
-            "give --label TASK=LABEL: nothing can be learnt from a trial without a label"
-        )
+        raise InputError("give --label TASK=LABEL; a trial without a label teaches nothing")
     if len(labels) < len(arguments.label):
         raise InputError("--label names a task twice")
-    if not 0.0 <= arguments.lead <= 60.0 or not 0.1 <= arguments.length <= 600.0:
-        raise InputError("--lead must be 0 to 60 seconds, --length 0.1 to 600")
     single = Path(arguments.out).suffix == ".npz"
     wanted = 1 if single else arguments.trials
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
     if arguments.dof not in (None, dof):
-        raise InputError(f"--dof {arguments.dof}: {arguments.arm} has {dof} joints")
+        raise InputError(f"--dof is {arguments.dof}, but {arguments.arm} has {dof} joints")
     if arguments.joints is not None and dof is None:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
     virtual = arguments.fake is not None and not arguments.real_time
     with (
         open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
-        # Until here a signal ends the program at once: there is nothing to lose yet.
+        # Before this point a signal ends the program at once, as nothing can be lost.
         stop_on(signal.SIGINT, signal.SIGTERM) as stop,
         open_joints(arguments, opened, arm, dof) as joints,
         Lines(
@@ -200,11 +193,11 @@ def run(arguments: argparse.Namespace) -> int:
         ) as lines,
     ):
         if arm is not None and arguments.joints is None:
-            have = opened.playback.dof if opened.playback is not None else None
-            if have != dof:
+            given = opened.playback.dof if opened.playback is not None else None
+            if given != dof:
                 raise InputError(
-                    f"{opened.source} gives {have or 'no'} joint angles, but the arm of "
-                    f"{arguments.arm} has {dof}; name their source with --joints"
+                    f"{opened.source} gives {given or 'no'} joint angles, but {arguments.arm} has "
+                    f"{dof} joints; name another source with --joints"
                 )
         names = None if arm is None else arm.names
         if arguments.joints is None and opened.playback is not None:
@@ -230,22 +223,22 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             recorder.save(trials.rest(), complete=False)
     if not recorder.saved:
-        LOG.warning("there was no contact, so nothing was saved")
+        LOG.warning("there was no contact; nothing was saved")
     return 0 if recorder.saved else 1
 
 
 @dataclass
 class Recorder:
-    """Saves trials, with what they have in common.
+    """Saves trials under the next free names, with their shared metadata.
 
     Attributes:
-        out: the folder, or the file of a single trial.
+        out: the folder, or the file for a single trial.
         labels: {task: label} of every trial.
-        meta: what else their metadata say.
-        names: of the joints, where they are known.
-        lines: where to say what was saved.
-        posed: joint angles are expected; frames without them deserve a warning.
-        saved: how many trials so far.
+        meta: further metadata of every trial.
+        names: the joints' names, or None if they are unknown.
+        lines: where the `saved` events go.
+        posed: whether to warn about frames without joint angles.
+        saved: the number of trials saved so far.
     """
 
     out: str
@@ -271,24 +264,20 @@ class Recorder:
             try:
                 save(path, trial, overwrite=False)
                 break
-            except NameTaken:
-                # Another recorder in this folder was faster: the next name that is free.
+            except NameTaken:  # another recorder in this folder was faster
                 continue
         self.saved += 1
         if without and self.posed:
-            LOG.warning("%s: %d of %d frames have no joint angles", path, without, len(frames))
-        self.lines.write(
-            [
-                {
-                    "event": "saved",
-                    "file": str(path),
-                    "labels": self.labels,
-                    "frames": len(frames),
-                    "seconds": round(frames[-1].t - frames[0].t, 3),
-                    "joints": trial.joints is not None,
-                    **({"frames_without_joints": without} if 0 < without < len(frames) else {}),
-                    "missing_taxels": trial.valid is not None,
-                    "complete": complete,
-                }
-            ]
-        )
+            LOG.warning(f"{path}: {without} of {len(frames)} frames have no joint angles")
+        event = {
+            "event": "saved",
+            "file": str(path),
+            "labels": self.labels,
+            "frames": len(frames),
+            "seconds": round(frames[-1].t - frames[0].t, 3),
+            "joints": trial.joints is not None,
+            **({"frames_without_joints": without} if 0 < without < len(frames) else {}),
+            "missing_taxels": trial.valid is not None,
+            "complete": complete,
+        }
+        self.lines.write([event])

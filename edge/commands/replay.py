@@ -1,4 +1,8 @@
-"""`edge-classify replay`: decides on recordings, as the board would."""
+"""Decide on recordings, frame by frame.
+
+Decides on recordings as `edge-classify run` decides live. Files that cannot be used are named on
+stderr and skipped; the exit status is then 2.
+"""
 
 from __future__ import annotations
 
@@ -17,21 +21,13 @@ from edge.recording import Recording, find, load
 LOG = logging.getLogger(__name__)
 
 
-HELP = "decide on recordings, frame by frame"
-DESCRIPTION = (
-    "Decides on recordings as `edge-classify run` decides live. A file that "
-    "cannot be used is named on stderr and the others are still replayed; the exit status "
-    "is then 2."
-)
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
         "--summary",
         action="store_true",
-        help="print the accuracy and a confusion matrix for each task, if recordings are labelled",
+        help="print each task's accuracy and confusion matrix, for labelled recordings",
     )
     add_error(parser)
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
@@ -40,10 +36,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def decide(
     model: Model, recording: Recording, name: str, error: float | None = None
 ) -> list[dict[str, Any]]:
-    """All events of one recording as lines, with early decisions if an error rate is given.
+    """All events of one recording as JSON objects, with early decisions if `error` is given.
 
     Raises:
-        InputError: the recording does not suit the model; the sentence names `name`.
+        InputError: the recording does not suit the model; the message begins with `name`.
     """
     if model.info.chain is not None:
         recording = recording.for_joints(model.info.chain.names, name)

@@ -1,4 +1,9 @@
-"""`edge-classify run`: reads the skin and decides, live."""
+"""Read the skin and decide, live.
+
+Reads the skin and reports contacts, decisions, and chips that fail or recover. Ctrl-C or SIGTERM
+ends it cleanly after the current frame, a second one at once. It tells systemd when it is ready and
+that it is alive.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +29,6 @@ from edge.touch.track import MAX_CONTACTS
 LOG = logging.getLogger(__name__)
 
 
-HELP = "read the skin and decide, live"
-DESCRIPTION = (
-    "Reads the skin and reports contacts, decisions, and chips that fail or "
-    "recover. Ctrl-C or SIGTERM ends it cleanly after the current frame; a second signal "
-    "terminates it at once. Under systemd it reports that it is ready and alive."
-)
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
@@ -42,51 +39,44 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--without-joints",
         choices=("flag", "skin"),
         default="flag",
-        help="if joint angles are missing at a contact's onset: flag the decision missing_pose "
-        "(flag, the default), or measure that contact's motion on the skin and flag the decision "
-        "skin_motion (skin)",
+        help="if joint angles are missing at a contact's onset: `flag` (the default) decides "
+        "without them, flagged missing_pose; `skin` measures the contact's motion on the skin, "
+        "flagged skin_motion",
     )
     parser.add_argument(
         "--udp",
         metavar="HOST:PORT",
-        help="also send each event there, as a datagram of one JSON line",
+        help="also send each event to this address, as a datagram of one JSON line",
     )
     parser.add_argument(
         "--map",
         metavar="FILE",
-        help="follow several contacts at once, and append each with its position to FILE",
+        help="follow several contacts at once, and append each to FILE with its position",
     )
 
 
 def chip_event(status: ChipStatus, t: float) -> dict[str, Any]:
-    """A chip that failed or recovered, as an event."""
-    event = {
-        "event": "chip",
-        "t": t,
-        "bus": status.bus,
-        "place": status.route,
-        "state": status.state,
-    }
+    """The event of a chip that has failed or recovered."""
+    event = {"event": "chip", "t": t, "bus": status.bus, "place": status.route}
+    event["state"] = status.state
     return {**event, "error": status.error} if status.error else event
 
 
 def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
-    """How well the loop kept its period, and the lines that were lost on the way, as an event."""
+    """The last event: how well the loop kept its period, and how many lines were lost."""
+    periods = schedule.periods
+    percentiles = (50, 99, 99.9) if periods.n else ()
     return {
         "event": "end",
         "frames": frames,
         "missed_ticks": schedule.missed,
-        "period_ms": {
-            f"p{p:g}": round(schedule.periods.percentile(p) * 1e3, 2) for p in (50, 99, 99.9)
-        }
-        if schedule.periods.n
-        else {},
+        "period_ms": {f"p{p:g}": round(periods.percentile(p) * 1e3, 2) for p in percentiles},
         **({"lost": lost} if lost else {}),
     }
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, decide and print until the recording, the user or the service manager ends it."""
+    """Read, decide and print until the recording ends, or the user or systemd stops it."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
     chain, dof = model.info.chain, model.info.dof
@@ -99,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
             form=Output.of(arguments).line,
             patient=lambda: virtual and not stop.asked,
         )
-        # Until here a signal ends the program at once: there is nothing to lose yet.
+        # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
         stack.enter_context(lines)
         on_skin = arguments.without_joints == "skin"
@@ -117,12 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
         touch_map = None if arguments.map is None else map_writer(arguments.map, model.info)
         if touch_map is not None:
             lines.add(touch_map)
-        loop = Loop(
-            skin,
-            joints=joints if dof is not None else None,
-            lasts_s=opened.lasts_s,
-            stop=stop,
-        )
+        poses = None if dof is None else joints
+        loop = Loop(skin, joints=poses, lasts_s=opened.lasts_s, stop=stop)
 
         def emit(events: list[dict[str, Any]]) -> None:
             lines.write(events)

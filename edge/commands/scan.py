@@ -1,4 +1,9 @@
-"""`edge-classify scan`: which chips answer, and where they are on the skin."""
+"""Show which chips answer, as a map of the skin.
+
+Sets up every chip, and prints each chip's state and a map of the skin: # is a taxel whose chip
+answers, . one whose chip does not, and a blank one without a chip. The exit status is 1 if a chip
+does not answer.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +18,6 @@ from edge.skin.file import SkinFile
 from edge.skin.skin import ChipStatus
 from edge.skin.wiring import UNUSED
 
-HELP = "show which chips answer, as a map of the skin"
-DESCRIPTION = (
-    "Sets up every chip, and prints the state of each and a map of the "
-    "taxels. The exit status is 1 if a chip does not answer."
-)
-
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -26,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:
-    """One line per row of the skin: `#` answers, `.` does not, a space has no chip."""
+    """One line per row: `#` if a taxel's chip answers, `.` if not, blank without a chip."""
     marks = np.full(file.layout.rows * file.layout.cols, " ")
     for status in statuses:
         for taxel in status.taxels:

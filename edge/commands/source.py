@@ -1,4 +1,4 @@
-"""Opening the skin and the joint angles that a command's options name, real or fake."""
+"""Opens the skin and the source of joint angles that a command's options name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LOG = logging.getLogger(__name__)
 
 
 def touch_counts(model: Model | None, file: SkinFile) -> int | None:
-    """The model's threshold in the counts of a skin.
+    """The model's contact threshold in the counts of a skin; None without a model.
 
     Raises:
         InputError: the model was made for another skin.
@@ -42,10 +42,10 @@ class Opened:
     """A skin that is being read.
 
     Attributes:
-        skin: started.
-        lasts_s: for how many seconds there is something to read.
-        playback: the recording that is being played, where the skin is fake.
-        source: names the skin or the recording in events and recordings.
+        skin: set up and ready to be read.
+        lasts_s: how many seconds to read for.
+        playback: the recording that a fake skin plays; None for a real skin.
+        source: names the skin or the recording in messages and recordings.
     """
 
     skin: Skin
@@ -68,9 +68,9 @@ def open_skin(
     Args:
         arguments: with the options of `options.add_skin`.
         calibrated: refuse a real skin that has no calibration.
-        paced: play a recording no faster than it was recorded, whatever the options say.
-        model: a taxel above its threshold counts as touched, if that is lower than the skin's.
-        arm: whose joint angles a recording must give, in the order of its joints.
+        paced: play a recording at its original speed, whatever the options say.
+        model: its contact threshold is used if it is lower than the skin's.
+        arm: whose joint angles a recording must have; they are put into the arm's order.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
@@ -81,18 +81,19 @@ def open_skin(
             recording = load(arguments.fake)
             if arm is not None:
                 recording = recording.for_joints(arm.names, arguments.fake)
-            if arguments.skin is None:
-                file = skin_file(recording.layout)
-            else:
-                file = skinfile.load(arguments.skin)
+            file = (
+                skin_file(recording.layout)
+                if arguments.skin is None
+                else skinfile.load(arguments.skin)
+            )
             clock = PacedClock() if paced or arguments.real_time else VirtualClock()
             touch = touch_counts(model, file)
             skin, playback = play(
                 file, recording, loop=arguments.loop, clock=clock, touch_counts=touch
             )
             stack.enter_context(skin)
-            lasts = min(playback.ends, arguments.seconds)
-            opened = Opened(skin, lasts, playback, f"fake {arguments.fake}")
+            lasts_s = min(playback.ends, arguments.seconds)
+            opened = Opened(skin, lasts_s, playback, f"fake {arguments.fake}")
         else:
             if arguments.loop or arguments.real_time:
                 raise InputError("--loop and --real-time need --fake, a recording to play")
@@ -106,12 +107,8 @@ def open_skin(
             if status.error:
                 LOG.warning("%s; left out for now", status.error)
         LOG.debug(
-            "%s: %d x %d taxels, %d chips on %d buses at %g Hz",
-            opened.source,
-            *file.layout.shape,
-            len(file.chips),
-            len(file.buses),
-            file.reading.rate_hz,
+            f"{opened.source}: {file.layout.rows} x {file.layout.cols} taxels, {len(file.chips)} "
+            f"chips on {len(file.buses)} buses at {file.reading.rate_hz:g} Hz"
         )
         yield opened
 
@@ -123,13 +120,13 @@ def open_joints(
     arm: Chain | None,
     dof: int | None = None,
 ) -> Iterator[JointSource | None]:
-    """The source of joint angles that the options name; a fake skin has its recording's.
+    """The source of joint angles that the options name, or else the recording being played.
 
     Args:
         arguments: with the options of `options.add_joints`.
         opened: the skin that is being read.
-        arm: whose joint angles are wanted, or None.
-        dof: how many angles a line must have where the arm is not known.
+        arm: whose joint angles are wanted, or None if it is unknown.
+        dof: how many angles a line must then have.
 
     Raises:
         InputError: the options contradict each other.
@@ -139,7 +136,7 @@ def open_joints(
         return
     dof = dof if arm is None else arm.dof
     if dof is None:
-        raise InputError("--joints: the model measures motion without joint angles; leave it out")
+        raise InputError("the model uses no joint angles; leave --joints out")
     kind, _, address = arguments.joints.partition(":")
     source: Any
     listener: Any = None
@@ -164,23 +161,19 @@ def open_joints(
         if listener is not None:
             listener.close()
             for name, count in source.others.items():
-                LOG.warning(
-                    "--joints: %d datagrams of a second sender, %s, were ignored", count, name
-                )
+                LOG.warning(f"--joints: ignored {count} datagrams from a second sender, {name}")
         if stream.malformed:
             LOG.warning(
-                "--joints: %d lines could not be used; of the last: %s",
-                stream.malformed,
-                stream.problem,
+                f"--joints: unusable lines: {stream.malformed}; the last one: {stream.problem}"
             )
 
 
 def check_joints(model: Model, arguments: argparse.Namespace, opened: Opened) -> None:
-    """Refuse a source without the joint angles that the model needs.
+    """Refuse a source of frames without the joint angles that the model needs.
 
     Raises:
         InputError: it has none, or a different number of them.
     """
     if arguments.joints is None:
-        playback = opened.playback
-        require_joints(model, None if playback is None else playback.dof, opened.source)
+        dof = None if opened.playback is None else opened.playback.dof
+        require_joints(model, dof, opened.source)

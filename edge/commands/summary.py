@@ -11,7 +11,7 @@ from edge.classifier import AS_TRAINED
 from edge.errors import printable
 from edge.model.info import Task
 
-NONE = "(none)"
+UNDECIDED = "(none)"
 """The column of trials without a decision."""
 
 
@@ -19,7 +19,6 @@ class Summary:
     """Compares each recording's first decision for each task with its label."""
 
     def __init__(self, tasks: Mapping[str, Task]) -> None:
-        self._tasks = tasks
         self._pairs: dict[str, Counter[tuple[str, str]]] = {task: Counter() for task in tasks}
         self.recordings = 0
         self.as_trained = 0
@@ -28,65 +27,56 @@ class Summary:
     def add(self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]) -> None:
         """Take in the events of one recording and its labels."""
         self.recordings += 1
+        decisions = [event for event in events if event["event"] == "decision"]
+        self.as_trained += any(AS_TRAINED in decision["flags"] for decision in decisions)
         first: dict[str, str] = {}
-        as_trained = False
-        for event in events:
-            if event["event"] == "decision":
-                first.setdefault(event["task"], printable(event["label"] or NONE))
-                as_trained |= AS_TRAINED in event["flags"]
-        self.as_trained += as_trained
-        for task in self._tasks:
-            if task in labels:
-                self._pairs[task][printable(labels[task]), first.get(task, NONE)] += 1
-
-    def accuracy(self, task: str) -> tuple[int, int]:
-        """(right, labelled) recordings of a task."""
-        pairs = self._pairs[task]
-        return sum(n for (truth, said), n in pairs.items() if truth == said), pairs.total()
+        for decision in decisions:
+            first.setdefault(decision["task"], printable(decision["label"] or UNDECIDED))
+        for task in self._pairs.keys() & labels:
+            self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
 
     def text(self) -> str:
-        """One table per task: rows are what was touched, columns what was decided."""
-        parts = [f"{self.recordings} recordings"]
+        """One table for each task: a row for each true label, a column for each decided one."""
+        paragraphs = [_count(self.recordings, "recording")]
         if self.as_trained:
-            parts.append(
-                f"{self.as_trained} of them have the coordinates of a training trial to the last "
-                "bit and are most likely the same recordings, so this accuracy does not apply to "
-                "new touches; the nested accuracy that `make export` printed does"
+            paragraphs.append(
+                f"{self.as_trained} of {_count(self.recordings, 'recording')} match a training "
+                "trial to the last bit, so they are most likely training data, and the accuracy "
+                "below does not apply to new touches. The nested accuracy, which `make export` "
+                "and `edge-classify info` print, does."
             )
-        for task in self._tasks:
-            right, total = self.accuracy(task)
+        for task, pairs in self._pairs.items():
+            total, name = pairs.total(), printable(task)
             if total == 0:
-                parts.append(f"{printable(task)}: no recording has a label")
+                paragraphs.append(f"{name}: no recording has a label")
                 continue
+            right = sum(n for (truth, decided), n in pairs.items() if truth == decided)
             low, high = wilson(right, total)
-            parts.append(
-                f"{printable(task)}: {right} of {total} right, {right / total:.2%} "
-                f"(95 % interval {low:.1%} to {high:.1%})\n" + self._matrix(task)
+            paragraphs.append(
+                f"{name}: {right} of {total} right, {right / total:.2%} (95 % interval "
+                f"{low:.1%} to {high:.1%})\n" + _matrix(pairs)
             )
-        return "\n\n".join(parts)
+        return "\n\n".join(paragraphs)
 
-    def _matrix(self, task: str) -> str:
-        pairs = self._pairs[task]
-        truths = sorted({truth for truth, _ in pairs})
-        said = sorted({label for _, label in pairs} | set(truths))
-        width = max(map(len, truths))
-        # The columns of a wide matrix are numbered, so that 36 objects still fit on a screen.
-        short = sum(len(label) + 2 for label in said) > 100
-        heads = [str(i + 1) for i in range(len(said))] if short else said
-        sizes = [max(len(head), 3) for head in heads]
-        lines = [
-            " " * (width + (5 if short else 0))
-            + "".join(f"  {h:>{s}}" for h, s in zip(heads, sizes, strict=True))
-        ]
-        for truth in truths:
-            number = f"{said.index(truth) + 1:>3}  " if short else ""
-            cells = [str(pairs[truth, label] or ".") for label in said]
-            lines.append(
-                number
-                + f"{truth:<{width}}"
-                + "".join(f"  {c:>{s}}" for c, s in zip(cells, sizes, strict=True))
-            )
-        return "\n".join(lines)
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def _matrix(pairs: Counter[tuple[str, str]]) -> str:
+    truths = sorted({truth for truth, _ in pairs})
+    decided = sorted({label for _, label in pairs} | set(truths))
+    # The columns of a wide matrix are numbered, so that 36 objects fit on a screen.
+    numbered = sum(len(label) + 2 for label in decided) > 100
+    heads = [str(i + 1) for i in range(len(decided))] if numbered else decided
+    names = [f"{decided.index(t) + 1:>3}  {t}" if numbered else t for t in truths]
+    width = max(map(len, names))
+    rows = [[str(pairs[truth, label] or ".") for label in decided] for truth in truths]
+    return "\n".join(
+        f"{name:<{width}}"
+        + "".join(f"  {cell:>{max(len(h), 3)}}" for cell, h in zip(cells, heads, strict=True))
+        for name, cells in zip(["", *names], [heads, *rows], strict=True)
+    )
 
 
 def wilson(right: int, total: int, z: float = 1.959963984540054) -> tuple[float, float]:

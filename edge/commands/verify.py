@@ -1,4 +1,9 @@
-"""`edge-classify verify`: whether this machine computes what the workstation did."""
+"""Check that this machine computes the workstation's results.
+
+Runs the frames and feature vectors of a golden file on this machine, and compares every result with
+the stored one: integers must be equal, floats within their stated bounds. The exit status is 1 if a
+result differs.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +18,11 @@ from edge.model.verify import FLOAT64, verify
 LOG = logging.getLogger(__name__)
 
 
-HELP = "check that this machine computes what the workstation did"
-DESCRIPTION = (
-    "Runs the frames and feature vectors of a golden file on this machine and "
-    "compares every result with the stored one: integers must be equal, and floats agree "
-    "within their stated bounds. The exit status is 1 if one differs."
-)
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
-        "--golden", required=True, help="golden.npz, which was written together with the model"
+        "--golden", required=True, help="golden.npz, written together with the model"
     )
 
 

@@ -1,4 +1,9 @@
-"""`python -m train import`: other labs' data to a folder of recordings."""
+"""Turn another lab's data into recordings.
+
+Writes one recording per trial; existing files of the same name are replaced. Where the data give no
+thresholds, those that `python -m train thresholds` proposes are written. To add a format, see
+train/importers/__init__.py.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +23,6 @@ from train.commands.thresholds import found, proposed
 from train.importers import names
 
 ZERO_FRAMES = 3
-
-
-HELP = "turn another lab's data into recordings"
-DESCRIPTION = (
-    "Writes one recording per trial; existing files of the same name are "
-    "replaced. Where the data give no thresholds, those that `python -m train thresholds` proposes "
-    "are written. "
-    "To add a format, see train/importers/__init__.py."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

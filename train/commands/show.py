@@ -1,4 +1,10 @@
-"""`python -m train show`: a recording, or a map of touch, as a picture."""
+"""Draw a recording or a map of touch.
+
+Draws a recording: frames over time with the region found, and the three features; with --scene,
+what happens, seen from the side. Draws several recordings side by side, with the decisions of
+--model. Draws a map that `edge-classify run --map` wrote: where things were touched, and what they
+were.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +13,6 @@ import sys
 from pathlib import Path
 
 from edge.errors import InputError
-
-HELP = "draw a recording or a map of touch"
-DESCRIPTION = (
-    "Draws a recording: frames over time with the region found, and the three "
-    "features; with --scene, what happens, seen from the side. Draws several "
-    "recordings side by side, with the decisions of --model. Draws a map that "
-    "`edge-classify run --map` wrote: where things were touched, and what they were."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,15 +1,13 @@
-"""`python -m train simulate`: a scene to recordings, or what the scene calls for."""
+"""Simulate a scene into recordings.
+
+Simulates the touches that a scene file describes, and only the effects that it calls for. The same
+scene gives the same files, whatever the batch or the machine.
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
-
-HELP = "simulate a scene into recordings"
-DESCRIPTION = (
-    "Simulates the touches that a scene file describes, and only the effects that "
-    "it calls for. The same scene gives the same files, whatever the batch or the machine."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,9 @@
-"""`python -m train split`: recordings of several contacts to one recording a contact."""
+"""Cut recordings into one for each contact.
+
+Writes each contact of each recording to a file of its own, named after the recording and the
+contact's number. The labels are those of meta.contacts, a list of one set of labels for each
+contact, or else the recording's.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +21,6 @@ from train.dataset import labels_of, read
 
 LEAD_S = 0.25
 """Kept of what lies before a contact, where no other contact does."""
-
-
-HELP = "cut recordings into one for each contact"
-DESCRIPTION = (
-    "Writes each contact of each recording to a file of its own, named after the "
-    "recording and the contact's number. The labels are those of meta.contacts, a list of one "
-    "set of labels for each contact, or else the recording's."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

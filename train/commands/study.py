@@ -1,15 +1,13 @@
-"""`python -m train study`: the paper's analyses on a data set."""
+"""Repeat every analysis of the paper on a data set, beside the paper's own numbers.
+
+Writes OUT/report.html (nothing outside it is linked), each plot as PNG and each table as CSV.
+"""
 
 from __future__ import annotations
 
 import argparse
 import os
 from pathlib import Path
-
-HELP = "repeat every analysis of the paper on a data set, beside the paper's own numbers"
-DESCRIPTION = (
-    "Writes OUT/report.html (nothing outside it is linked), each plot as PNG and each table as CSV."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

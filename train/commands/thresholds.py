@@ -1,4 +1,9 @@
-"""`python -m train thresholds`: what a skin's own noise says of where contact begins."""
+"""Propose thresholds from the recordings' own noise.
+
+Takes the first 0.1 s of each recording for noise, proposes a threshold 2 times above the level that
+one in ten recordings exceeds and an onset 1.5 times above that, and says how many contacts other
+thresholds find.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +25,6 @@ MARGIN = 2.0
 """The threshold lies so many times above the largest noise."""
 ONSET = 1.5
 """The onset lies so many times above the threshold, so that a force that hovers is one contact."""
-
-
-HELP = "propose thresholds from the recordings' own noise"
-DESCRIPTION = (
-    f"Takes the first {QUIET_S:g} s of each recording for noise, proposes a "
-    f"threshold {MARGIN:g} times above the level that one in ten recordings exceeds and an "
-    f"onset {ONSET:g} times above that, and says how many contacts other thresholds find."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,16 +1,14 @@
-"""`python -m train tradeoff`: what accuracy costs in time."""
+"""Show what accuracy costs in time: waiting, the wire, arithmetic.
+
+Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each table as CSV, and
+front.json, which `python -m export --front` reads.
+"""
 
 from __future__ import annotations
 
 import argparse
 import os
 from pathlib import Path
-
-HELP = "show what accuracy costs in time: waiting, the wire, arithmetic"
-DESCRIPTION = (
-    "Writes OUT/report.html (nothing outside it is linked), each plot as PNG, "
-    "each table as CSV, and front.json, which `python -m export --front` reads."
-)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

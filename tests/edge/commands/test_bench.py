@@ -10,7 +10,6 @@ from edge.cli import main
 from edge.commands import bench
 from edge.commands.bench import summary, touch
 from edge.model.model import Model
-from edge.recording import Recording
 from edge.skin.file import shipped
 from edge.touch.track import ContactTracker, first_contact
 
@@ -48,20 +47,6 @@ def test_a_cold_start_is_the_median_of_several_in_milliseconds(monkeypatch):
     assert bench.cold_start_ms("model.onnx") == 250.0
 
 
-def test_the_processor_is_the_first_that_is_named(monkeypatch):
-    class File:
-        def __init__(self, name):
-            self.name = name
-
-        def read_text(self, **_):
-            if "device-tree" in self.name:
-                raise FileNotFoundError
-            return "processor\t: 0\nmodel name\t: first\nmodel name\t: second\n"
-
-    monkeypatch.setattr(bench, "Path", File)
-    assert bench.kind() == "first"
-
-
 def test_the_model_is_named_by_its_digest(board, exported):
     data = (exported / "model.onnx").read_bytes()
     assert board["model"]["sha256"] == hashlib.sha256(data).hexdigest()
@@ -89,15 +74,7 @@ def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
     info = Model(exported / "model.onnx").info
     frames = touch(Model(exported / "model.onnx"), info.window_s)
     tracker = ContactTracker(info.layout, info.tracking, chain=info.chain, horizon_s=info.window_s)
-    import numpy as np
-
-    recording = Recording(
-        t=np.array([f.t for f in frames]),
-        frames=np.stack([f.counts for f in frames]),
-        joints=np.stack([f.joints for f in frames]),
-        meta={"skin": info.layout.to_dict()},
-    )
-    onset, series = first_contact(recording, tracker)
+    onset, series = first_contact(frames, tracker)
     assert onset == 0.0
     assert series.t[-1] == pytest.approx(info.window_s)
     assert series.area[-1] > series.area[0] > 1
@@ -107,7 +84,6 @@ def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        (["--rounds", "3"], "--rounds must be 20 to 1000000, not 3"),
         (["--skin", "missing.toml"], "missing.toml"),
         (["--model", "missing.onnx"], "missing.onnx: no such model"),
     ],

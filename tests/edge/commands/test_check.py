@@ -43,7 +43,7 @@ def test_a_pad_that_says_little_is_told_what_is_missing(check):
         (
             "cols = 4",
             "cols = 4\nthreshold_counts = 2000",
-            "no contact can begin: onset_counts is 2000, and a taxel gives at most 1023",
+            "no contact can begin: onset_counts is 2000, but a taxel gives at most 1023",
         ),
         (
             'kind = "mpr121"',
@@ -62,13 +62,42 @@ def test_noise_without_a_threshold_or_a_dead_band_is_wrong(check):
     text = PAD.replace('kind = "mpr121"', 'kind = "block"')
     status, remarks = check(text.replace("[[bus]]", "[signal]\ndead_band_sigma = 0\n[[bus]]"))
     assert status == 1
-    assert remarks[0].startswith("every count of noise begins a contact")
+    assert remarks[0].startswith("noise of one count begins a contact")
 
 
-def test_a_serial_port_given_as_an_i2c_bus_is_refused(check):
-    status, err = check(PAD.replace("device = 1", 'device = "/dev/ttyACM0"'))
-    assert status == 2
-    assert 'write serial = "/dev/ttyACM0" instead' in err
+def test_check_counts_what_the_wire_carries(edge, skin):
+    status, (event,), err = edge("check", skin)
+    assert status == 0
+    assert (event["taxels"], event["chips"]) == (384, 32)
+    assert event["frame_rate_hz"] == 125.1
+    assert event["remarks"] == [f"not calibrated yet: run `edge-classify calibrate --skin {skin}`"]
+    assert err == ""
+
+
+@pytest.mark.parametrize(
+    ("more", "status", "rate", "said"),
+    [
+        ("", 1, 47.0, "asks for 100 Hz, but the wires carry 47.0 Hz"),
+        ("verify_mux = false\n", 1, 48.0, "but the wires carry 48.0 Hz"),
+        ("region_of_interest = true\n", 0, 47.0, "the chips near a contact are read at 100 Hz"),
+    ],
+)
+def test_check_says_where_one_bus_is_too_slow(edge, skin, more, status, rate, said):
+    text = skin.read_text().replace("verify_mux = true", "")
+    head, *buses = text.split("[[bus]]")
+    channel = 0
+    chips = ""
+    for bus in buses:
+        rows = [line for line in bus.splitlines() if line.startswith("  {")]
+        for row in rows:
+            old = int(row.split("channel = ")[1].split(",")[0])
+            chips += row.replace(f"channel = {old}", f"channel = {channel + old}") + "\n"
+        channel += len(rows) // 4
+    one = buses[0].split("chips = [")[0] + "chips = [\n" + chips + "]\n"
+    skin.write_text(head.replace("[read]\n", f"[read]\n{more}") + "[[bus]]" + one)
+    got, (event,), err = edge("check", skin)
+    assert (got, event["frame_rate_hz"], err) == (status, rate, "")
+    assert said in " ".join(event["remarks"])
 
 
 @pytest.mark.parametrize("name", ["cody", "mpr121", "matrix"])

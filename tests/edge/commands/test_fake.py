@@ -43,20 +43,3 @@ def test_what_to_rehearse_next_is_said_at_a_terminal(tmp_path, monkeypatch, caps
     asked = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
     (frames,) = (s for s in capsys.readouterr().out.splitlines() if s.strip().startswith(asked))
     assert int(frames.split()[-1]) == len(load(still).t)
-
-
-def test_a_skin_must_be_named(tmp_path, capsys):
-    with pytest.raises(SystemExit, match="2"):
-        main(["fake", "--out", str(tmp_path)])
-    assert "the following arguments are required: --skin" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [(["--trials", "0"], "--trials must be 1 to 1000"), (["--seed", "-1"], "--seed must be 0")],
-)
-def test_a_bad_option_is_one_sentence(more, said, tmp_path, capsys):
-    skin = str(skinfile.shipped("mpr121"))
-    assert main(["fake", "--skin", skin, "--out", str(tmp_path), *more]) == 2
-    assert said in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())

@@ -1,4 +1,4 @@
-"""Trials keep the arm that carried the skin, named by a TOML file or two links of a URDF."""
+"""Options that several commands share: numbers with limits, and the arm that carries the skin."""
 
 import json
 from dataclasses import replace
@@ -16,6 +16,21 @@ URDF = """<robot name="two"><link name="base"/><link name="upper"/><link name="s
   <joint name="elbow" type="revolute"><parent link="upper"/><child link="skin"/>
     <origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
     <limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["fake", "--trials", "0"], "--trials: must be a whole number from 1 to 1000, not '0'"),
+        (["fake", "--seed", "1.5"], "--seed: must be a whole number from 0 to 9.2"),
+        (["record", "--length", "nan"], "--length: must be a number from 0.1 to 600, not 'nan'"),
+        (["run", "--seconds", "soon"], "--seconds: must be a number from 0.001 to 1e+09"),
+    ],
+)
+def test_a_number_beyond_its_limits_is_refused(options, said, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(options)
+    assert said in capsys.readouterr().err
 
 
 @pytest.fixture
@@ -61,10 +76,10 @@ def test_a_trial_keeps_the_chain_of_a_toml_file(files):
         (["--arm", "arm.toml", "--tip", "skin"], "--base and --tip are for a .urdf file"),
         (["--arm", "none.toml"], "none.toml: cannot be read"),
         (["--arm", "still.toml"], "still.toml: joint a: its axis is zero"),
-        (["--tip", "skin"], "--tip needs --arm arm.urdf"),
+        (["--tip", "skin"], "--base and --tip need --arm arm.urdf"),
         (
             ["--arm", "arm.urdf", "--base", "base", "--tip", "skin", "--dof", "3"],
-            "--dof 3: arm.urdf has 2 joints",
+            "--dof is 3, but arm.urdf has 2 joints",
         ),
     ],
 )

@@ -30,7 +30,7 @@ def test_a_folder_is_replayed_and_summed_up(replay, recordings):
     assert all(e["label"] == e["expected"] for e in decisions if e["task"] == "category")
     assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
     assert "rigid-fixed            8           ." in err
-    assert "16 of them have the coordinates of a training trial to the last bit" in err
+    assert "16 of 16 recordings match a training trial to the last bit" in err
 
 
 def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_path):

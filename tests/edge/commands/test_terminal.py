@@ -60,7 +60,7 @@ def test_the_caption_is_for_a_person():
     valid = np.ones((4, 4), dtype=bool)
     valid[0] = False
     assert terminal.caption(frame(valid=valid), [], LAYOUT).endswith(
-        "no contact  |  4 taxels cannot be read"
+        "no contact  |  4 of 16 taxels cannot be read"
     )
 
 

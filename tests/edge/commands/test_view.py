@@ -1,23 +1,6 @@
 """`view`, as a user runs it over the fake: a picture at a bounded rate."""
 
-import io
-import os
-
 from edge.commands import view
-from edge.skin.loop import Stop
-
-
-def test_view_gives_a_picture_up_where_nobody_reads_once_it_is_told_to_end():
-    reading, writing = os.pipe()
-    with open(reading, "rb") as reader, open(writing, "w") as out:
-        stop = Stop()
-        send = view.sender(out, stop)
-        send("▀" * 10)
-        assert reader.read(30).decode() == "▀" * 10
-        stop.asked = True
-        send("a" * 10**6)
-        out.close()
-        assert 0 < len(reader.read()) < 10**6
 
 
 def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
@@ -42,15 +25,3 @@ def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch
     monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ["."])
     assert edge("view", "--fake", recordings / "hard_0.npz", "--rate", 5, text=True)[0] == 0
     assert [round(t - drawn[0], 2) for t in drawn] == [round(0.2 * i, 2) for i in range(9)]
-
-
-def test_view_sends_each_picture_at_once_where_no_file_is_behind_its_output():
-    class Shown(io.StringIO):
-        shown = ""
-
-        def flush(self):
-            self.shown = self.getvalue()
-
-    out = Shown()
-    view.sender(out, Stop())("a picture")
-    assert out.shown == "a picture"
