@@ -49,7 +49,6 @@ THROUGH = {
     "edge/commands/source.py": "edge/commands/test_live_commands.py",
     "edge/commands/summary.py": "edge/commands/test_replay_verify.py",
     "edge/config.py": "edge/skin/test_file.py",
-    "edge/touch/grid.py": "edge/touch/test_region.py",
     "train/commands/tradeoff.py": "train/tradeoff/test_tradeoff.py",
     "train/importers/mcap.py": "train/importers/test_log_importers.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",

@@ -160,16 +160,14 @@ class ModelInfo:
                     f"{FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
+            tracking.get("connectivity", 4)  # earlier versions wrote it
             points = meta.numbers("decision_points_s", default=())
             rules = meta.table("stopping") if points else ConfigTable({}, where)
             novelty = meta.table("novelty") if points else None
             info = cls(
                 tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
                 layout=SkinLayout.from_dict(meta.get("skin"), where=where),
-                tracking=TrackSettings(
-                    tracking.whole("debounce", allowed=range(1, 1001)),
-                    tracking.whole("connectivity", allowed=(4, 8)),
-                ),
+                tracking=TrackSettings(tracking.whole("debounce", allowed=range(1, 1001))),
                 window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
                 samples=meta.whole("samples", allowed=range(2, 10_001)),
                 features=meta.texts("features"),

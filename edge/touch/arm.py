@@ -22,10 +22,10 @@ MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: a fixed step (`origin`), then the motion about or along `axis`, then another.
+    """One joint: a fixed step (`origin`), the motion about or along `axis`, another fixed step.
 
-    A URDF gives `origin_xyz` and `origin_rpy`; an arm that is written as "turn, then go on"
-    (Cody's) gives `translate`. Lengths in metres, angles in radians; limits for `q`.
+    A URDF gives `origin_xyz` and `origin_rpy`. An arm written as "turn, then go on", like Cody's,
+    gives `translate`. Lengths are in metres, angles in radians; `limits` are those of the angle.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Joint:
 
 
 class _Link(NamedTuple):
-    """A moving joint in plain numbers: the fixed step before it, and its axis."""
+    """A moving joint in plain numbers: its axis, and the fixed step before it."""
 
     slides: bool
     direction: Vector
@@ -65,39 +65,24 @@ class Chain:
         self.joints = tuple(joints)
         self.base, self.tip = base, tip
         self._moving: list[Joint] = []
-        # Each moving joint's step is still + f sway + g swing: f = sin q and g = 1 - cos q turn
-        # about the axis (Rodrigues), f = q and g = 0 slide along it.
-        still: list[NDArray[np.float64]] = []
-        sway: list[NDArray[np.float64]] = []
-        swing: list[NDArray[np.float64]] = []
+        self._links: list[_Link] = []
+        # The step of a moving joint at angle q is S0 + f S1 + g S2. A turn about the axis has
+        # f = sin q and g = 1 - cos q (Rodrigues), a slide along it f = q and g = 0.
+        steps: list[tuple[NDArray[np.float64], ...]] = []
         fixed = np.eye(4)
         for joint in self.joints:
             _check_joint(joint)
             fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
             if joint.kind != "fixed":
-                first, second = _generators(joint)
                 self._moving.append(joint)
-                still.append(fixed)
-                sway.append(fixed @ first)
-                swing.append(fixed @ second)
+                self._links.append(_link(joint, fixed))
+                steps.append((fixed, *(fixed @ generator for generator in _generators(joint))))
                 fixed = np.eye(4)
             fixed = fixed @ _transform(joint.translate, ZERO)
-        self._still, self._sway, self._swing = (
-            np.array(steps).reshape(-1, 4, 4) for steps in (still, sway, swing)
-        )
+        self._steps = np.array(steps).reshape(-1, 3, 4, 4)
         self._after = fixed
         self._tip = tuple(fixed[:3].ravel().tolist())
-        self._links = tuple(
-            _Link(
-                j.kind == "prismatic",
-                _direction(j),
-                None if (step[:3, :3] == np.eye(3)).all() else tuple(step[:3, :3].ravel().tolist()),
-                tuple(step[:3, 3].tolist()),
-            )
-            for j, step in zip(self._moving, still, strict=True)
-        )
         self._slides = np.array([j.kind == "prismatic" for j in self._moving], dtype=bool)
-        self._any_slide = bool(self._slides.any())
 
     @property
     def dof(self) -> int:
@@ -143,10 +128,10 @@ class Chain:
             bad = np.argwhere(~np.isfinite(angles))[0][-1]
             raise InputError(f"the angle of joint {self.names[bad]} is not finite")
         half = np.sin(0.5 * angles)
-        f, g = np.sin(angles), 2.0 * half * half
-        if self._any_slide:
-            f, g = np.where(self._slides, angles, f), np.where(self._slides, 0.0, g)
-        steps = self._still + f[..., None, None] * self._sway + g[..., None, None] * self._swing
+        f = np.where(self._slides, angles, np.sin(angles))
+        g = np.where(self._slides, 0.0, 2.0 * half * half)
+        still, first, second = self._steps[:, 0], self._steps[:, 1], self._steps[:, 2]
+        steps = still + f[..., None, None] * first + g[..., None, None] * second
         pose = self._after
         for i in range(self.dof - 1, -1, -1):
             pose = steps[..., i, :, :] @ pose
@@ -157,8 +142,8 @@ class Chain:
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
         """Where a point of the tip lies in the base's frame: `pose(q)` times it, in plain floats.
 
-        One point turned joint by joint takes a fraction of what the whole pose takes, and rounds
-        no more than it.
+        To turn one point joint by joint is much faster than to work out the pose, and rounds no
+        more.
 
         Args:
             q: (dof,) as for `pose`.
@@ -169,7 +154,7 @@ class Chain:
         """
         angles = np.asarray(q).tolist()
         if len(angles) != self.dof or not math.isfinite(sum(map(abs, angles))):
-            self.pose(q)  # says what is wrong
+            self.pose(q)  # raises
         x, y, z = position
         a, b, c, tx, d, e, h, ty, i, j, k, tz = self._tip
         x, y, z = (
@@ -245,7 +230,8 @@ class Chain:
         """Read a chain from a TOML file, or from a URDF file between two of its links.
 
         Raises:
-            InputError: as `from_toml` and `from_urdf`; a URDF needs both links, a TOML file none.
+            InputError: as `from_toml` and `from_urdf`; links are given for a TOML file, or one
+                is not given for a URDF.
         """
         if Path(path).suffix.lower() in (".urdf", ".xml"):
             if base is None or tip is None:
@@ -297,7 +283,7 @@ def _check_joint(joint: Joint) -> None:
         raise InputError(
             f"joint {joint.name}: type {joint.kind!r} is not one of {', '.join((*MOVING, 'fixed'))}"
         )
-    numbers = (*joint.axis, *joint.origin_xyz, *joint.origin_rpy, *joint.translate)
+    numbers = (math.hypot(*joint.axis), *joint.origin_xyz, *joint.origin_rpy, *joint.translate)
     if not all(math.isfinite(x) for x in numbers):
         raise InputError(f"joint {joint.name}: a number is not finite")
     if joint.kind != "fixed" and math.hypot(*joint.axis) < 1e-9:
@@ -309,17 +295,20 @@ def _check_joint(joint: Joint) -> None:
         )
 
 
+def _link(joint: Joint, before: NDArray[np.float64]) -> _Link:
+    turn = None if (before[:3, :3] == np.eye(3)).all() else tuple(before[:3, :3].ravel().tolist())
+    return _Link(joint.kind == "prismatic", _direction(joint), turn, tuple(before[:3, 3].tolist()))
+
+
 def _direction(joint: Joint) -> Vector:
     """The joint's axis at length 1."""
-    # A power of two brings the axis near that length, whose square neither over- nor underflows.
-    power = -math.frexp(max(map(abs, joint.axis)))[1]
-    x, y, z = (math.ldexp(part, power) for part in joint.axis)
+    x, y, z = joint.axis
     length = math.hypot(x, y, z)
     return x / length, y / length, z / length
 
 
 def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """K and K^2 of a turn about the joint's axis; of a slide its direction and nothing."""
+    """K and K^2 of a turn about the joint's axis; for a slide its direction and zero."""
     x, y, z = _direction(joint)
     first = np.zeros((4, 4))
     if joint.kind == "prismatic":
@@ -345,7 +334,7 @@ def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
 def _joint_from(table: ConfigTable, index: int) -> Joint:
     name = table.text("name", f"joint {index}")
     if table.has("name"):
-        # A number in the chain is none that a URDF tells, whose joints stand in any order.
+        # The joints of a URDF have no order, so an error names the joint and not its number.
         table.prefix = f"joint {shown(name)}: "
     steps: dict[str, Vector] = {}
     for key in ("origin_xyz", "origin_rpy", "translate"):

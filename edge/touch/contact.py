@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,13 @@ from edge.errors import InputError
 from edge.touch.arm import Chain, Vector
 from edge.touch.frame import Frame
 from edge.touch.layout import RELEASE_S, SkinLayout
-from edge.touch.measurer import COLS, FORCE, ROWS, Measurer
+from edge.touch.measures import COLS, FORCE, ROWS, Measurer
 from edge.touch.region import ActiveTaxels, Region
+
+CLOCK_ROUNDING_S = 1e-6
+"""Shorter than a frame, and longer than the rounding of a clock that counts 1e9 seconds."""
+PLAIN = 4
+"""Whole numbers of every frame before those of the zones: peak, area, sums of rows, of columns."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +39,10 @@ class FeatureSeries:
         ended: the contact ended with the last frame.
         release_s: a contact is over once it has not been felt for so long; until then it has
             only lifted off.
-        zones: {zone: (n, 8)} what was measured there, see `edge.touch.measures`.
-        regions: (n,) regions of the frame, or None.
+        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        turn: columns of a whole turn where the skin wraps, or None.
-        taxels: (n, cells) counts of each cell of the skin (`edge.touch.cells`), or None.
+        turn: columns of a full turn where the skin wraps, or None.
+        taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`), or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or None.
         threshold_counts: a taxel above it is active.
         pitch: distance between rows of taxels, metres; 1 taxel where it is unknown.
@@ -53,7 +57,6 @@ class FeatureSeries:
     ended: bool = False
     release_s: float = RELEASE_S
     zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
-    regions: NDArray[np.int64] | None = None
     force_motion: NDArray[np.float64] | None = None
     turn: int | None = None
     taxels: NDArray[np.int64] | None = None
@@ -66,11 +69,11 @@ class FeatureSeries:
         return self._frames(slice(None, None, every))
 
     def felt(self, window_s: float) -> FeatureSeries:
-        """The frames that tell of the contact, up to the first one at the window's end.
+        """The frames in which the contact is felt, up to the first one at the window's end.
 
-        A board decides with that frame, so what comes later may not count. Frames in which the
-        contact has lifted off tell nothing of it, as it may go on: they are left out, unless it
-        has been away for `release_s`. Then it was over when it lifted off, which they tell.
+        A board decides with that frame, so later ones must not count. Frames in which the contact
+        has lifted off are left out, as it may go on. But once it has been away for `release_s`,
+        the contact was over when it lifted off, and these frames stay.
         """
         n = min(int(self.t.searchsorted(window_s)) + 1, self.t.size)
         felt = self.area[:n] > 0
@@ -83,52 +86,27 @@ class FeatureSeries:
 
     def _frames(self, pick: slice | NDArray[np.intp]) -> FeatureSeries:
         changes: dict[str, Any] = {
-            name: rows[pick] for name in PER_FRAME if (rows := getattr(self, name)) is not None
+            name: value[pick] for name, value in vars(self).items() if isinstance(value, np.ndarray)
         }
         changes["zones"] = {zone: rows[pick] for zone, rows in self.zones.items()}
         return replace(self, **changes)
 
     @property
     def integers(self) -> NDArray[np.int64]:
-        """(n, m) all that was counted: peak, area, sums, the zones, the regions, the cells."""
-        more = [rows for rows in (self.regions, self.taxels) if rows is not None]
-        return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *more])
-
-    @property
-    def max_force(self) -> NDArray[np.float64]:
-        """(n,) newtons, or counts where the scale is unknown."""
-        scale = 1.0 if self.counts_per_newton is None else self.counts_per_newton
-        return np.asarray(self.peak / scale, dtype=np.float64)
-
-    @property
-    def contact_area(self) -> NDArray[np.int64]:
-        """(n,) taxels."""
-        return self.area
-
-    @property
-    def contact_motion(self) -> NDArray[np.float64]:
-        """(n,) metres (taxels where the pitch is unknown)."""
-        return self.motion
+        """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
+        cells = [] if self.taxels is None else [self.taxels]
+        return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *cells])
 
 
-PER_FRAME = (
-    "t",
-    "peak",
-    "area",
-    "sums",
-    "motion",
-    "regions",
-    "force_motion",
-    "taxels",
-    "joints",
-)
-"""What a series has one row a frame of, besides its zones."""
-CLOCK_ROUNDING_S = 1e-6
-"""Less than a frame lasts, and more than is lost by a clock that counts 1e9 seconds."""
-ROWS_AT_FIRST = 256
-"""Frames that a contact has room for before its table grows: over two seconds at 100 Hz."""
-PLAIN = 4
-"""Whole numbers of every frame, before what the measurer adds: peak, area, sums of rows, cols."""
+class _Row(NamedTuple):
+    """What one frame adds to a series."""
+
+    t: float
+    motion: float
+    force_motion: float
+    counted: NDArray[np.int64]
+    taxels: NDArray[np.int64] | None
+    joints: NDArray[np.float64] | None
 
 
 class Contact:
@@ -141,7 +119,7 @@ class Contact:
         chain: the arm that its motion is measured with; None where it is measured on the skin.
         ended: no more frames will come.
         missing_taxels: a frame lacked taxels that are not known to be dead.
-        missing_pose: a frame came without the joint angles that motion needs.
+        missing_pose: a frame came without the joint angles that a feature needs.
         region: the region followed so far.
         joints: the joint angles (dof,) when the region was last seen; None where not known.
     """
@@ -155,18 +133,7 @@ class Contact:
         self.region: Region | None = None
         self.joints: NDArray[np.float64] | None = None
         self._measurer = measurer
-        self._rows = np.zeros(
-            ROWS_AT_FIRST,
-            dtype=[
-                ("t", np.float64),
-                ("motion", np.float64),
-                ("force_motion", np.float64),
-                ("counted", np.int64, (PLAIN + measurer.width,)),
-                ("taxels", np.int64, (0 if measurer.cells is None else measurer.cells.count,)),
-                ("joints", np.float64, (measurer.joints,)),
-            ],
-        )
-        self._n = 0
+        self._rows: list[_Row] = []
         self._starts: dict[str, Vector] = {}
 
     def add(self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float) -> None:
@@ -178,26 +145,33 @@ class Contact:
             region: the contact's; None where nothing of it is above the threshold.
             age_s: when the region was read, seconds from onset, at least 0.
         """
-        if self._n and age_s <= self.age_s:
+        measurer = self._measurer
+        if self._rows and age_s <= self.age_s:
             # Two readings of one instant: the later one counts.
             age_s = self.age_s
             self._forget_last()
-        if self._n == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
-        called = self._measurer
-        more = called.measure(active, region) if called.width else []
-        if region is None:
-            motions, sums = self._last_motions(), (0, 0)
-        else:
+        zones = measurer.measure(active, region)
+        plain = [0] * PLAIN
+        motion, force_motion = 0.0, 0.0
+        if region is not None:
             self.region, self.joints = region, frame.joints
-            motions, sums = self._moved(frame, region, more)
-        peak, area = (0, 0) if region is None else (region.peak, region.area)
-        taxels = () if called.cells is None else called.cells.read(frame)
-        joints = self._joints_of(frame) if called.joints else ()
-        self._rows[self._n] = (age_s, *motions, (peak, area, *sums, *more), taxels, joints)
-        self._n += 1
+            plain[:2] = region.peak, region.area
+            if measurer.motion:
+                plain[2:] = region.sums
+                motion = self._distance("motion", region.centroid, frame.joints)
+            if measurer.force_motion:
+                # The contact's zone comes first.
+                row, col = zones[ROWS] / zones[FORCE], zones[COLS] / zones[FORCE]
+                centroid = row, col % self.layout.cols
+                force_motion = self._distance("force_motion", centroid, frame.joints)
+        elif self._rows:
+            motion, force_motion = self._rows[-1].motion, self._rows[-1].force_motion
+        counted = np.array(plain + zones, dtype=np.int64)
+        cells = None if measurer.cells is None else measurer.cells.read(frame)
+        joints = self._joints_of(frame) if measurer.joints else None
+        self._rows.append(_Row(age_s, motion, force_motion, counted, cells, joints))
         self.age_s = age_s
 
     def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
@@ -209,51 +183,26 @@ class Contact:
                 f"a frame has {len(frame.joints)} joint angles, "
                 f"the features were measured with {self._measurer.joints}"
             )
-        if not np.isfinite(frame.joints).all():
-            bad = int(np.argmin(np.isfinite(frame.joints)))
-            raise InputError(f"angle {bad} of a frame's joints is not finite")
-        return frame.joints
+        finite = np.isfinite(frame.joints)
+        if not finite.all():
+            raise InputError(f"angle {int(finite.argmin())} of a frame's joints is not finite")
+        return frame.joints.copy()
 
     def _forget_last(self) -> None:
-        self._n -= 1
-        for which in ("motion", "force_motion"):
-            if not np.isfinite(self._rows[which][: self._n]).any():
-                self._starts.pop(which, None)
-
-    def _last_motions(self) -> tuple[float, float]:
-        if not self._n:
-            return 0.0, 0.0
-        last = self._rows[self._n - 1]
-        return last["motion"], last["force_motion"]
-
-    def _moved(
-        self, frame: Frame, region: Region, more: list[int]
-    ) -> tuple[tuple[float, float], tuple[int, int]]:
-        """How far the two centroids have moved, and the sums that the plain one comes from."""
-        called = self._measurer
-        if not (called.motion or called.force_motion):
-            return (0.0, 0.0), (0, 0)
-        if self.chain is not None and frame.joints is None:
-            self.missing_pose = True
-        motion = force_motion = 0.0
-        sums = (0, 0)
-        if called.motion:
-            sums = region.sums
-            motion = self._distance("motion", region.centroid, frame.joints)
-        if called.force_motion:
-            # The contact's zone comes first.
-            centroid = more[ROWS] / more[FORCE], more[COLS] / more[FORCE] % self.layout.cols
-            force_motion = self._distance("force_motion", centroid, frame.joints)
-        return (motion, force_motion), sums
+        self._rows.pop()
+        for name in tuple(self._starts):
+            if not any(math.isfinite(getattr(row, name)) for row in self._rows):
+                del self._starts[name]
 
     def _distance(
-        self, which: str, centroid: tuple[float, float], joints: NDArray[np.float64] | None
+        self, name: str, centroid: tuple[float, float], joints: NDArray[np.float64] | None
     ) -> float:
         """Distance from where this centroid was first seen; NaN where the pose is not known."""
         position = self._located(centroid, joints)
         if position is None:
+            self.missing_pose = True
             return math.nan
-        return math.dist(position, self._starts.setdefault(which, position))
+        return math.dist(position, self._starts.setdefault(name, position))
 
     def _located(
         self, centroid: tuple[float, float], joints: NDArray[np.float64] | None
@@ -276,24 +225,24 @@ class Contact:
 
     def series(self) -> FeatureSeries:
         """What was measured so far; later frames leave it as it is."""
-        rows = self._rows[: self._n].copy()
-        called, counted = self._measurer, rows["counted"]
-        more = counted[:, PLAIN:]
+        measurer, rows = self._measurer, self._rows
+        counted = np.array([row.counted for row in rows]).reshape(-1, PLAIN + measurer.width)
+        zones = counted[:, PLAIN:]
+        force_motion = np.array([row.force_motion for row in rows])
         return FeatureSeries(
-            t=rows["t"],
+            t=np.array([row.t for row in rows]),
             peak=counted[:, 0],
             area=counted[:, 1],
             sums=counted[:, 2:PLAIN],
-            motion=rows["motion"],
+            motion=np.array([row.motion for row in rows]),
             counts_per_newton=self.layout.counts_per_newton,
             ended=self.ended,
             release_s=self.layout.release_s,
-            zones={zone: more[:, columns] for zone, columns in called.columns.items()},
-            regions=more[:, -1] if called.regions else None,
-            force_motion=rows["force_motion"] if called.force_motion else None,
+            zones={zone: zones[:, columns] for zone, columns in measurer.columns.items()},
+            force_motion=force_motion if measurer.force_motion else None,
             turn=self.layout.cols if self.layout.wraps else None,
-            taxels=None if called.cells is None else rows["taxels"],
-            joints=rows["joints"] if called.joints else None,
+            taxels=None if measurer.cells is None else np.array([row.taxels for row in rows]),
+            joints=np.array([row.joints for row in rows]) if measurer.joints else None,
             threshold_counts=self.layout.threshold_counts,
             pitch=self.layout.pitch[0],
         )

@@ -13,17 +13,26 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch import measures
-from edge.touch.cells import Cells
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from edge.touch.measurer import AREA, COLS, COLS_COLS, FORCE, PEAK, ROWS, ROWS_COLS, ROWS_ROWS
-from edge.touch.measures import Feature
+from edge.touch.measures import (
+    AREA,
+    COLS,
+    COLS_COLS,
+    FORCE,
+    PEAK,
+    ROWS,
+    ROWS_COLS,
+    ROWS_ROWS,
+    Cells,
+    Feature,
+)
 
 FEATURES = measures.PAPER
 SAMPLES = 40
 WINDOW_S = 1.2
 MOTION_FLOOR = 0.1
-"""Motion below it, in distances between taxels, is that of a centroid over noise."""
+"""Motion that counts as noise of the centroid, in distances between taxels."""
 
 
 def widths(
@@ -31,8 +40,8 @@ def widths(
 ) -> tuple[int, ...]:
     """How many values of a vector each feature takes, in their order.
 
-    A course takes `samples`, or as many as its name says, of each cell or joint; what is one
-    number for the window takes 1 of each.
+    A course takes `samples` values, or as many as its name says, for each cell or joint. A feature
+    that is one number for the window takes 1 for each.
 
     Args:
         names: of the features.
@@ -43,17 +52,12 @@ def widths(
     Raises:
         InputError: a feature does not exist.
     """
-    cells = (
-        Cells(layout).count
-        if any(measures.feature(n).quantity == "taxel_force" for n in names)
-        else 0
+    types = [measures.feature(name) for name in names]
+    cells = Cells(layout).count if any(f.quantity == "taxel_force" for f in types) else 0
+    rows = [joints if f.of_joints else cells if f.wide else 1 for f in types]
+    return tuple(
+        n if f.single else n * (f.samples or samples) for f, n in zip(types, rows, strict=True)
     )
-    out = []
-    for name in names:
-        feature = measures.feature(name)
-        rows = joints if feature.of_joints else cells if feature.wide else 1
-        out.append(rows if feature.single else rows * (feature.samples or samples))
-    return tuple(out)
 
 
 def feature_vector(
@@ -72,18 +76,18 @@ def feature_vector(
     >>> edge.feature_vector(series, window_s=1.2).shape
     (120,)
 
-    A course is taken at `samples` times, or as many as its name says, uniform in the window; of
-    cells or joints one after another; see `widths`. Between frames by linear interpolation, so
-    that jitter and dropped frames do not shift the samples. What cannot be known in a frame
-    (where nothing lies; how far it moved, without the arm's pose; anything, while the contact has
-    lifted off for less than `release_s`) is interpolated between the frames that know it, held
-    after the last of them, and 0 where none does. Force and area of a contact that has ended are
-    0 from its lift-off on. Frames after the first one at the window's end do not count: on the
-    board, they have yet to come.
+    A course is sampled at `samples` times, or as many as its name says, uniform in the window.
+    Cells and joints follow one after another; see `widths`. Samples are interpolated linearly
+    between frames, so jitter and dropped frames do not shift them. A value that is not known in
+    some frames is interpolated between those that know it, held after the last of them, and 0
+    where no frame knows it. Such values are the centroid of an empty zone, motion without the
+    arm's pose, and everything while the contact has lifted off for less than `release_s`. Force
+    and area of a contact that has ended are 0 from its lift-off on. Frames after the first one at
+    the window's end do not count, as the board does not have them yet.
 
-    Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus
-    a floor, so that it stays finite where nothing is: the least force of a taxel in contact, one
-    taxel, a tenth of the distance between taxels; 1 where it follows another transform.
+    Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus a
+    floor, so that it stays finite at 0. The floor is the smallest force of a taxel in contact, one
+    taxel, or a tenth of the distance between taxels; it is 1 after another transform.
 
     Args:
         series: the contact.
@@ -108,54 +112,17 @@ def feature_vector(
     if series.t.size == 0:
         raise InputError("the contact has no frame")
     course = _Course(series, window_s)
-    blocks = []
-    with np.errstate(over="ignore"):  # what is then infinite is refused
-        for (wide, own, transforms, summary), alike in groupby(wanted, key=_kind):
-            group, times = tuple(alike), own or samples
-            if wide:
-                blocks += [_finish(*course.wide(f, times), transforms, summary) for f in group]
-            else:
-                blocks.append(_finish(*course.narrow(group, times), transforms, summary))
-    return np.concatenate(blocks)
+    # Overflow to infinity is refused by `_Course.sampled` and by the model.
+    with np.errstate(over="ignore"):
+        return np.concatenate(
+            [course.block(tuple(group), samples) for _, group in groupby(wanted, key=_kind)]
+        )
 
 
-def _kind(feature: Feature) -> tuple[bool, int, tuple[str, ...], str]:
-    """Features that are worked out in one go."""
-    return feature.wide, feature.samples, feature.transforms, feature.summary
-
-
-def _finish(
-    values: NDArray[np.float64],
-    floors: NDArray[np.float64],
-    step: float,
-    together: bool,
-    transforms: tuple[str, ...],
-    summary: str,
-) -> NDArray[np.float64]:
-    """Samples (rows, n) a `step` apart, transformed and summed up, one row after another.
-
-    Args:
-        floors: (rows, 1) what a logarithm adds to the values.
-        together: the rows are the cells or joints of one feature, with one largest value.
-    """
-    for transform in transforms:
-        if transform == "log":
-            values = np.log(values + floors)
-        elif transform == "sqrt":
-            values = np.copysign(np.sqrt(np.abs(values)), values)
-        else:
-            largest = np.abs(values).max(axis=None if together else 1, keepdims=True)
-            values = np.divide(values, largest, out=np.zeros_like(values), where=largest > 0.0)
-        floors = np.ones_like(floors)
-    if summary == "rate":
-        values = np.gradient(values, step, axis=1)
-    elif summary == "mean":
-        values = values.mean(axis=1)
-    elif summary == "deviation":
-        values = values.std(axis=1)
-    elif summary == "roughness":
-        values = np.abs(np.diff(values, axis=1)).mean(axis=1)
-    return values.reshape(-1)
+def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
+    """Features of equal kind are worked out as the rows of one array; a wide one stands alone."""
+    name = feature.name if feature.wide else ""
+    return name, feature.samples, feature.transforms, feature.summary
 
 
 class _Course:
@@ -163,98 +130,97 @@ class _Course:
 
     def __init__(self, series: FeatureSeries, window_s: float) -> None:
         self._series, self._window_s = series, window_s
-        self._zones: dict[str, _Zone] = {}
-        self._wide: dict[tuple[bool, int], NDArray[np.float64]] = {}
-        scale = series.counts_per_newton or 1.0
-        self._force_floor = (series.threshold_counts + 1) / scale
+        self._scale = series.counts_per_newton or 1.0
+        self._zones = {name: _Zone(sums, series) for name, sums in series.zones.items()}
+        self._force_floor = (series.threshold_counts + 1) / self._scale
         self._length_floor = MOTION_FLOOR * series.pitch
 
-    def narrow(
-        self, group: tuple[Feature, ...], samples: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, bool]:
-        """Features of one value a frame: samples, floors, the step, and that rows stand alone."""
-        series = self._series
-        times, step = self._times(samples)
-        values = np.array([self._measured(feature) for feature in group])
-        known = np.isfinite(values)
-        whole = known.all(axis=1)
-        if whole.all():
-            sampled = _resample(times, series.t, values)
+    def block(self, group: tuple[Feature, ...], samples: int) -> NDArray[np.float64]:
+        """Values of features of one kind, one after another."""
+        first = group[0]
+        samples = first.samples or samples
+        step = self._window_s / (samples - 1)
+        values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
+        floors = np.array([[self._floor(feature)] for feature in group])
+        for transform in first.transforms:
+            if transform == "log":
+                values = np.log(values + floors)
+            elif transform == "sqrt":
+                values = np.copysign(np.sqrt(np.abs(values)), values)
+            else:
+                # The cells or joints of one feature share one largest value.
+                largest = np.abs(values).max(axis=None if first.wide else 1, keepdims=True)
+                values = np.divide(values, largest, out=np.zeros_like(values), where=largest > 0.0)
+            floors = np.ones_like(floors)
+        if first.summary == "rate":
+            values = np.gradient(values, step, axis=1)
+        elif first.summary == "mean":
+            values = values.mean(axis=1)
+        elif first.summary == "deviation":
+            values = values.std(axis=1)
+        elif first.summary == "roughness":
+            values = np.abs(np.diff(values, axis=1)).mean(axis=1)
+        return values.reshape(-1)
+
+    def _sampled(
+        self, group: tuple[Feature, ...], times: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(rows, times) features of one value a frame, or the cells or joints of one feature."""
+        first, t = group[0], self._series.t
+        if first.wide:
+            wide = self._series.joints if first.of_joints else self._series.taxels
+            if wide is None:
+                raise _not_measured(first)
+            values: NDArray[Any] = wide.T
         else:
-            for feature, row in zip(group, values, strict=True):
+            values = np.array([self._measured(f) for f in group], dtype=np.float64)
+        known = np.isfinite(values)
+        complete = known.all(axis=1)
+        if complete.all():
+            sampled = _resample(times, t, values)
+        else:
+            for feature, row in zip(group, values, strict=False):
                 if np.isinf(row).any():
                     raise InputError(
                         f"{feature.name} is too large for a number of 64 bits; look at the skin's "
                         "counts_per_newton and pitch_m"
                     )
-            sampled = np.zeros((len(group), samples))
-            sampled[whole] = _resample(times, series.t, values[whole])
-            for i in np.flatnonzero(~whole & known.any(axis=1)):
-                sampled[i] = _resample(times, series.t[known[i]], values[i, known[i]])
-        # Features of a group have their transforms in common.
-        logs = "log" in group[0].transforms
-        floors = np.array([[self._floor(feature) if logs else 0.0] for feature in group])
-        return sampled, floors, step, False
-
-    def wide(
-        self, feature: Feature, samples: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, bool]:
-        """A feature of many values a frame, likewise; its rows have one largest value."""
-        series = self._series
-        times, step = self._times(samples)
-        key = feature.of_joints, len(times)
-        if key not in self._wide:
-            rows = series.joints if feature.of_joints else series.taxels
-            if rows is None:
-                raise _not_measured(feature)
-            seen = np.isfinite(rows).all(axis=1)
-            self._wide[key] = np.zeros((rows.shape[1], len(times)))
-            if seen.any():
-                self._wide[key] = _resample(times, series.t[seen], rows[seen].T)
-        sampled = self._wide[key]
-        if feature.quantity == "joint_change":
-            sampled = sampled - sampled[:, :1]
-        elif not feature.of_joints:
-            sampled = sampled / (series.counts_per_newton or 1.0)
-        return sampled, np.full((len(sampled), 1), self._floor(feature)), step, True
-
-    def _times(self, samples: int) -> tuple[NDArray[np.float64], float]:
-        step = self._window_s / (samples - 1)
-        return np.arange(samples, dtype=np.float64) * step, step
+            sampled = np.zeros((len(values), len(times)))
+            sampled[complete] = _resample(times, t, values[complete])
+            for i in np.flatnonzero(~complete & known.any(axis=1)):
+                sampled[i] = _resample(times, t[known[i]], values[i, known[i]])
+        if first.quantity == "taxel_force":
+            return sampled / self._scale
+        return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
 
     def _floor(self, feature: Feature) -> float:
-        quantity = feature.quantity
-        if quantity in ("max_force", "force", "pressure", "taxel_force"):
+        if feature.quantity in ("max_force", "force", "pressure", "taxel_force"):
             return self._force_floor
-        if quantity in ("motion", "force_motion"):
+        if feature.quantity in ("motion", "force_motion"):
             return self._length_floor
-        return 0.0 if quantity == "stiffness" else 1.0
+        return 0.0 if feature.quantity == "stiffness" else 1.0
 
-    def _measured(self, feature: Feature) -> NDArray[np.float64]:
+    def _measured(self, feature: Feature) -> NDArray[Any]:
         """(n,) the feature's value in every frame; NaN where it cannot be known."""
-        series, zone, quantity = self._series, feature.zone, feature.quantity
+        series, name, quantity = self._series, feature.zone, feature.quantity
+        zone = self._zones.get(name)
         values: NDArray[Any] | None = None
         if quantity == "motion":
             values = series.motion
         elif quantity == "force_motion":
             values = series.force_motion
-        elif quantity == "regions":
-            values = series.regions
-        elif (zone, quantity) == ("contact", "max_force"):
-            values = series.max_force
-        elif (zone, quantity) == ("contact", "area"):
+        elif (name, quantity) == ("contact", "max_force"):
+            values = series.peak / self._scale
+        elif (name, quantity) == ("contact", "area"):
             values = series.area
-        elif zone in series.zones:
-            if zone not in self._zones:
-                self._zones[zone] = _Zone(series.zones[zone], series)
-            if quantity != "stiffness":
-                values = getattr(self._zones[zone], quantity)()
-            elif series.force_motion is not None:
-                force = self._zones[zone].force() + self._force_floor
-                values = force / (series.force_motion + self._length_floor)
+        elif zone is not None and quantity != "stiffness":
+            values = getattr(zone, quantity)()
+        elif zone is not None and series.force_motion is not None:
+            force = zone.force() + self._force_floor
+            values = force / (series.force_motion + self._length_floor)
         if values is None:
             raise _not_measured(feature)
-        return np.asarray(values, dtype=np.float64)
+        return values
 
 
 def _not_measured(feature: Feature) -> InputError:
@@ -262,7 +228,7 @@ def _not_measured(feature: Feature) -> InputError:
 
 
 class _Zone:
-    """The quantities of one zone, from the sums measured there (n, 8)."""
+    """The quantities of one zone, from its whole numbers (n, 8)."""
 
     def __init__(self, sums: NDArray[np.int64], series: FeatureSeries) -> None:
         self._sums, self._turn = sums, series.turn
@@ -279,7 +245,7 @@ class _Zone:
         return self._sums[:, AREA]
 
     def pressure(self) -> NDArray[np.float64]:
-        """Force over area; 0 where nothing lies."""
+        """Force over area; 0 for an empty zone."""
         area = self._sums[:, AREA]
         return np.asarray(self._force / (np.maximum(area, 1) * self._scale))
 
@@ -287,14 +253,14 @@ class _Zone:
         return self._centroid(ROWS)
 
     def around(self) -> NDArray[np.float64]:
-        centre, there = self._centroid(COLS), self._force > 0
+        centroid, known = self._centroid(COLS), self._force > 0
         if self._turn is not None:
-            # A contact that crosses the seam goes on, it does not jump to the other end.
-            seen = centre[there] % self._turn
-            if 2.0 * np.abs(seen[1:] - seen[:-1]).max(initial=0.0) >= self._turn:
-                seen = np.unwrap(seen, period=self._turn)
-            centre[there] = seen
-        return centre
+            # A contact that crosses the seam goes on; it does not jump to the other end.
+            cols = centroid[known] % self._turn
+            if 2.0 * np.abs(cols[1:] - cols[:-1]).max(initial=0.0) >= self._turn:
+                cols = np.unwrap(cols, period=self._turn)
+            centroid[known] = cols
+        return centroid
 
     def spread_along(self) -> NDArray[np.float64]:
         return np.sqrt(self._central[0])
@@ -309,10 +275,10 @@ class _Zone:
         return np.sqrt(self._larger)
 
     def width(self) -> NDArray[np.float64]:
-        """By the determinant over the larger eigenvalue, as their difference would cancel.
+        """Root of the smaller eigenvalue: the determinant over the larger one.
 
-        What rounding leaves of the determinant of a perfect line is below 2^-25 of the skin's
-        larger side.
+        The difference of the eigenvalues' terms would cancel. For a perfect line, rounding leaves
+        less than 2^-25 of the skin's larger side.
         """
         along, around, slant = self._central
         determinant = np.maximum(along * around - slant * slant, 0.0)
@@ -320,25 +286,25 @@ class _Zone:
         return np.sqrt(np.divide(determinant, larger, out=np.zeros_like(larger), where=larger > 0))
 
     def _centroid(self, column: int) -> NDArray[np.float64]:
-        """NaN where nothing lies."""
-        centre = np.full(len(self._sums), np.nan)
-        np.divide(self._sums[:, column], self._force, out=centre, where=self._force > 0)
-        return centre
+        """NaN for an empty zone."""
+        centroid = np.full(len(self._sums), np.nan)
+        np.divide(self._sums[:, column], self._force, out=centroid, where=self._force > 0)
+        return centroid
 
     @cached_property
     def _central(self) -> tuple[NDArray[np.float64], ...]:
-        """Variances along and around and the covariance; 0 where nothing lies.
+        """Variances along and around and the covariance; 0 for an empty zone.
 
         Times force squared they are whole numbers, so nothing cancels.
         """
         bound = int(self._sums.max(initial=0)) * int(self._force.max(initial=0))
-        # Skins whose sums squared leave 64 bits take Python's integers.
+        # Products beyond 64 bits, of large skins, take Python's integers.
         s = self._sums if bound < 1 << 62 else self._sums.astype(object)
         scale = np.maximum(self._force, 1).astype(np.float64)
         triples = (ROWS_ROWS, ROWS, ROWS), (COLS_COLS, COLS, COLS), (ROWS_COLS, ROWS, COLS)
         return tuple(
-            (s[:, FORCE] * s[:, both] - s[:, one] * s[:, other]).astype(np.float64) / scale / scale
-            for both, one, other in triples
+            (s[:, FORCE] * s[:, product] - s[:, a] * s[:, b]).astype(np.float64) / scale / scale
+            for product, a, b in triples
         )
 
     @cached_property
@@ -351,10 +317,10 @@ class _Zone:
 def _resample(
     times: NDArray[np.float64], t: NDArray[np.float64], values: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """Values (..., n) at `t` to `times`, which stay within their neighbours whatever the step.
+    """Values (..., n) at `t`, interpolated to `times`; they never overshoot their neighbours.
 
-    The fraction of a step is divided out before it meets the values, where a slope over a very
-    short step could overflow.
+    The fraction of a step is computed before it multiplies a difference of values, as a slope over
+    a very short step could overflow.
     """
     after = t.searchsorted(times, side="right")
     np.maximum(after, 1, out=after)

@@ -1,31 +1,38 @@
-"""What can be measured on a contact, by name.
+"""What is measured on a contact: features by name, and the whole numbers of each frame.
 
-A feature's name is a zone and a quantity, `skin_force` or `left_width`; the paper's three keep
-their own names. Transforms go before it (`log_`, `sqrt_`, `relative_`; the one next to the name
-is applied first) and a summary of its course after it (`_rate`, `_mean`, `_deviation`,
-`_roughness`): `sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`. With `@10`
-at its end it is taken at ten times of the window, whatever the model's number of samples. A frame
-is measured only where a feature asked for calls for it.
+A feature's name is a zone and a quantity, such as `skin_force` or `left_width`; the paper's three
+features keep their own names. Transforms stand before the name (`log_`, `sqrt_`, `relative_`; the
+one next to the name is applied first). A summary of its course stands after it (`_rate`, `_mean`,
+`_deviation`, `_roughness`): `sqrt_left_force`, `relative_skin_force_rate`,
+`sqrt_taxel_force_mean`. `@10` at the end takes the feature at ten times of the window, whatever the
+model's number of samples.
 
-Zones: `contact` is the region that is followed, `second` the largest region besides it, `skin`
-all active taxels, `left` and `right` those in the first and second half of the columns (the two
-pads of a hand, the two sides of a forearm). What is weighted is weighted by force.
+Zones: `contact` is the region that is followed, `skin` all active taxels, `left` and `right` the
+active taxels in the first and second half of the columns (the two pads of a hand, the two sides of
+a forearm). Centroids and spreads are weighted by force. Only zones that some feature needs are
+measured.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from edge.errors import InputError
+from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.region import ActiveTaxels, Region, best_cut
 
 PAPER = ("max_force", "contact_area", "contact_motion")
 """The three features of the paper's section III-B, in its order."""
 
-ZONES = ("contact", "second", "skin", "left", "right")
+ZONES = ("contact", "skin", "left", "right")
 QUANTITIES = {
     "max_force": "largest force of a taxel",
     "force": "sum of the taxels' forces",
@@ -44,30 +51,35 @@ ALONE = {
     "contact_motion": ("contact", "motion"),
     "force_motion": ("contact", "force_motion"),
     "stiffness": ("skin", "stiffness"),
-    "regions": ("skin", "regions"),
     "taxel_force": ("skin", "taxel_force"),
     "joint_change": ("arm", "joint_change"),
     "joint_angle": ("arm", "joint_angle"),
 }
 """Names that are not a zone and a quantity."""
 WIDE = ("taxel_force", "joint_change", "joint_angle")
-"""Quantities of many values a frame: one a cell of the skin (`edge.touch.cells`) or a joint."""
+"""Quantities of many values a frame: one for each cell of the skin (`Cells`) or each joint."""
 MOVING = ("motion", "force_motion", "stiffness")
 """Quantities that are measured in the world's frame where joint angles are known."""
 SIGNED = ("around", "slant", "joint_change", "joint_angle")
 """Quantities that may be negative, and so have no logarithm."""
 
 TRANSFORMS = ("log", "sqrt", "relative")
-"""Transforms of a feature's value: the logarithm of the value and a floor (see
+"""Transforms of a feature's value: the logarithm of the value plus a floor (see
 `edge.touch.features`), the square root with the value's sign, and the value over its largest
 magnitude within the window."""
 SUMMARIES = ("rate", "mean", "deviation", "roughness")
-"""Summaries of its course: the change a second; and one number for the window: mean, standard
-deviation, mean step from sample to sample."""
+"""Summaries of a feature's course. The rate is a course itself, of the change a second. The others
+are one number for the window: mean, standard deviation, mean step from sample to sample."""
 _NAME = re.compile(
     rf"((?:(?:{'|'.join(TRANSFORMS)})_)*)(.+?)(?:_({'|'.join(SUMMARIES)}))?(?:@(\d+))?"
 )
 MOST_SAMPLES = 10_000
+MOST_CELLS = 256
+"""A skin of more taxels is pooled into cells."""
+PEAK, AREA, FORCE, ROWS, COLS, ROWS_ROWS, ROWS_COLS, COLS_COLS = range(8)
+"""Columns of the whole numbers of a zone: largest count, taxels, sum of counts, and the sums of
+counts times row, column, row squared, row times column, column squared."""
+ZONE_WIDTH = 8
 
 
 @dataclass(frozen=True)
@@ -75,12 +87,12 @@ class Feature:
     """A feature type.
 
     Attributes:
-        name: what users select it by.
+        name: users select it by this name.
         zone: one of `ZONES`, or `arm`.
         quantity: one of `QUANTITIES`, or of those of `ALONE`.
-        transforms: of its value, the first to be applied first.
-        summary: one of `SUMMARIES`, or empty: its course.
-        samples: times at which it is taken; 0: as many as the model's.
+        transforms: of its value, in the order in which they are applied.
+        summary: one of `SUMMARIES`, or empty for its course.
+        samples: times at which it is taken; 0 for the model's number.
     """
 
     name: str
@@ -100,7 +112,6 @@ class Feature:
             "motion": layout.length_unit,
             "force_motion": layout.length_unit,
             "stiffness": f"{layout.force_unit}/{layout.length_unit}",
-            "regions": "region",
             "slant": "taxel^2",
             "joint_change": "radian",
             "joint_angle": "radian",
@@ -111,39 +122,33 @@ class Feature:
 
     @property
     def moves(self) -> bool:
-        """It is measured in the world's frame where joint angles are known."""
+        """Whether it is measured in the world's frame where joint angles are known."""
         return self.quantity in MOVING
 
     @property
     def wide(self) -> bool:
-        """It has many values a frame."""
+        """Whether it has many values a frame."""
         return self.quantity in WIDE
 
     @property
     def of_joints(self) -> bool:
-        """It is made of the joint angles."""
+        """Whether it is made of the joint angles."""
         return self.zone == "arm"
 
     @property
     def single(self) -> bool:
-        """It is one number for the whole window (of each cell or joint)."""
+        """Whether it is one number for the window (for each cell or joint)."""
         return self.summary not in ("", "rate")
 
     @property
-    def extent(self) -> bool:
-        """It calls for the largest force or the number of taxels of its zone."""
-        return self.quantity in ("max_force", "area", "pressure")
-
-    @property
-    def summed(self) -> bool:
-        """It calls for the sum of forces of its zone."""
-        return self.weighted or self.quantity in ("force", "pressure", "stiffness")
-
-    @property
-    def weighted(self) -> bool:
-        """It calls for sums weighted by force over the taxels of its zone."""
-        plain = ("max_force", "area", "force", "pressure")
-        return self.quantity in QUANTITIES and self.quantity not in plain
+    def zones(self) -> tuple[str, ...]:
+        """The zones whose sums it needs, besides the region's own peak and area."""
+        if self.quantity == "stiffness":
+            return "skin", "contact"
+        if self.quantity == "force_motion":
+            return ("contact",)
+        with_region = self.zone == "contact" and self.quantity in ("max_force", "area")
+        return () if with_region or self.quantity not in QUANTITIES else (self.zone,)
 
 
 def names() -> list[str]:
@@ -160,8 +165,8 @@ def feature(name: str) -> Feature:
     Raises:
         InputError: there is no such feature; the sentence offers the nearest names.
     """
-    parts = _NAME.fullmatch(name)
-    prefix, base, summary, times = parts.groups("") if parts else ("", name, "", "")
+    match = _NAME.fullmatch(name)
+    prefix, base, summary, times = match.groups("") if match else ("", name, "", "")
     transforms = tuple(reversed(prefix.split("_")[:-1]))
     zone, _, quantity = base.partition("_")
     if base in ALONE:
@@ -186,7 +191,7 @@ def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
     """The feature types of several names.
 
     Raises:
-        InputError: there is none, one of them does not exist, or one is named twice.
+        InputError: no name is given, one of them does not exist, or one is given twice.
     """
     if not wanted:
         raise InputError(f"no feature named; the paper's are {', '.join(PAPER)}")
@@ -194,3 +199,98 @@ def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
     if twice:
         raise InputError(f"the feature {min(twice)} is named twice; leave one out")
     return tuple(feature(name) for name in wanted)
+
+
+class Cells:
+    """The cells of a skin: its taxels, or square blocks of them where there are many.
+
+    A cell's value is the sum of all its counts, those below the threshold included; taxels that
+    could not be read are left out. The side of a block is the smallest power of two that leaves at
+    most `MOST_CELLS` of them. Blocks without a living taxel are no cells.
+
+    Attributes:
+        side: taxels along a block's side; 1 where every taxel is a cell.
+        count: number of cells, row by row.
+    """
+
+    def __init__(self, layout: SkinLayout) -> None:
+        side = 1
+        while math.ceil(layout.rows / side) * math.ceil(layout.cols / side) > MOST_CELLS:
+            side *= 2
+        self.side = side
+        self._rows = np.arange(0, layout.rows, side)
+        self._cols = np.arange(0, layout.cols, side)
+        self._alive = np.flatnonzero(self._pooled(layout.alive))
+        self.count = len(self._alive)
+
+    def read(self, frame: Frame) -> NDArray[np.int64]:
+        """(count,) sums of a frame."""
+        counts = frame.counts if frame.valid is None else frame.counts * frame.valid
+        return self._pooled(counts).take(self._alive)
+
+    def _pooled(self, counts: NDArray[np.generic]) -> NDArray[np.int64]:
+        lines = np.add.reduceat(counts.astype(np.int64), self._rows, axis=0)
+        return np.asarray(np.add.reduceat(lines, self._cols, axis=1))
+
+
+class Measurer:
+    """Measures the frames of one skin at the zones that some features need.
+
+    Attributes:
+        motion: whether the contact's centroid is followed.
+        force_motion: whether its force-weighted centroid is followed.
+        zones: the zones measured, in the order of `ZONES`.
+        width: how many whole numbers `measure` returns for a frame.
+        columns: {zone: its part of them}.
+        cells: the skin's cells where a feature needs them, else None.
+        joints: number of joint angles kept of each frame; 0 where no feature needs them.
+    """
+
+    def __init__(self, layout: SkinLayout, wanted: Sequence[str], joints: int = 0) -> None:
+        types = features(wanted)
+        self._wraps = layout.wraps
+        self.motion = any(f.quantity == "motion" for f in types)
+        self.force_motion = any(f.quantity in ("force_motion", "stiffness") for f in types)
+        self.cells = Cells(layout) if any(f.quantity == "taxel_force" for f in types) else None
+        self.joints = joints if any(f.of_joints for f in types) else 0
+        self.zones = tuple(zone for zone in ZONES if any(zone in f.zones for f in types))
+        self.width = ZONE_WIDTH * len(self.zones)
+        self.columns = {
+            zone: slice(ZONE_WIDTH * i, ZONE_WIDTH * (i + 1)) for i, zone in enumerate(self.zones)
+        }
+        half = layout.cols // 2
+        self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
+        rows, cols = np.arange(layout.rows), np.arange(layout.cols)
+        self._rows = np.stack([rows**0, rows, rows**2])
+        # Columns as counted from each cut of the circle, and their squares.
+        turned = np.where(cols < cols[:, None], cols + layout.cols, cols)
+        self._cols = np.stack([turned**0, turned, turned**2], axis=2)
+
+    def measure(self, active: ActiveTaxels, contact: Region | None) -> list[int]:
+        """`ZONE_WIDTH` whole numbers of each zone.
+
+        Args:
+            active: the frame's active taxels.
+            contact: the region followed; None where no taxel of it is active.
+        """
+        if contact is None:
+            return [0] * self.width
+        row: list[int] = []
+        for zone in self.zones:
+            counts = active.counts * (contact.mask if zone == "contact" else active.mask)
+            half = self._halves.get(zone)
+            if half is not None:
+                counts = counts[:, half]
+            row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
+            row += self._moments(counts, half)
+        return row
+
+    def _moments(self, counts: NDArray[np.uint16], half: slice | None) -> tuple[int, ...]:
+        """`FORCE` to `COLS_COLS` of counts (rows, columns), of a half or of the entire skin."""
+        lines = self._rows @ counts  # of each column: counts, times row, times row squared
+        if half is not None:
+            basis = self._cols[0, half]
+        else:
+            basis = self._cols[best_cut(lines[0].tolist()) if self._wraps else 0]
+        (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (lines @ basis).tolist()
+        return force, rows, cols, rows_rows, rows_cols, cols_cols

@@ -1,18 +1,169 @@
 """Contact regions of a frame: threshold, connected components, the largest one.
 
-A frame's active taxels are the bits of one integer (see `edge.touch.grid`). Everything that is
-counted here is an integer and the same on every machine.
+The active taxels of a frame are the bits of one Python integer, so neighbours are shifts, sets are
+ands and ors, and areas are population counts. A row takes cols + 1 bits: its last bit is always
+clear and keeps a shift or a carry from running into the next row. Every result is an integer and
+the same on every machine.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch.grid import Grid, grid
+
+PLAIN_STEPS = 6
+"""Steps of one taxel that a flood takes before it goes on by runs of taxels."""
+
+
+class Grid:
+    """Sets of taxels of a rows x cols grid; `wraps` joins its last column to its first.
+
+    Taxels that share an edge are neighbours.
+    """
+
+    def __init__(self, rows: int, cols: int, wraps: bool) -> None:
+        self.rows, self.cols, self.wraps = rows, cols, wraps
+        self.stride = stride = cols + 1
+        first = sum(1 << (row * stride) for row in range(rows))
+        self._columns = [first << col for col in range(cols)]
+        line = (1 << cols) - 1
+        self._row_planes = [
+            sum(line << (row * stride) for row in range(rows) if row >> plane & 1)
+            for plane in range((rows - 1).bit_length())
+        ]
+        self._col_planes = [
+            sum(self._columns[col] for col in range(cols) if col >> plane & 1)
+            for plane in range((cols - 1).bit_length())
+        ]
+        half = cols // 2
+        self._outside_half = [
+            sum(self._columns) ^ sum(self._columns[start : start + half])
+            for start in (half // 2, 0, cols - half)
+        ]
+
+    def pack(self, active: NDArray[np.bool_]) -> int:
+        """The set of a bool array (rows, stride) whose last column is False."""
+        return int.from_bytes(np.packbits(active, None, "little").tobytes(), "little")
+
+    def unpack(self, bits: int) -> NDArray[np.bool_]:
+        """The set as a bool array (rows, cols)."""
+        size = self.rows * self.stride
+        packed = np.frombuffer(bits.to_bytes((size + 7) // 8, "little"), dtype=np.uint8)
+        flat = np.unpackbits(packed, count=size, bitorder="little").view(np.bool_)
+        return flat.reshape(self.rows, self.stride)[:, : self.cols]
+
+    def bit(self, index: int) -> int:
+        """The taxel of a flat index (row * cols + col)."""
+        return 1 << (index // self.cols * self.stride + index % self.cols)
+
+    def index(self, bits: int) -> int:
+        """Lowest flat index (row * cols + col) of a set."""
+        row, col = divmod((bits & -bits).bit_length() - 1, self.stride)
+        return row * self.cols + col
+
+    def neighbours(self, bits: int) -> int:
+        """The taxels next to one of `bits`; bits outside the grid may be set too."""
+        beside = bits << 1 | bits >> 1 | bits << self.stride | bits >> self.stride
+        first, last = bits & self._columns[0], bits & self._columns[-1]
+        if self.wraps and (first or last):
+            return beside | first << self.cols - 1 | last >> self.cols - 1
+        return beside
+
+    def flood(self, seed: int, within: int) -> int:
+        """All taxels of `within` that are connected to `seed`."""
+        region = seed
+        for _ in range(PLAIN_STEPS):
+            grown = (region | self.neighbours(region)) & within
+            if grown == region:
+                return region
+            region = grown
+        # A large or winding region: each round now fills runs of taxels in the four directions
+        # (to higher columns by the carry of an addition), and a step of one taxel crosses the
+        # seam.
+        left = _doublings(within, 1, self.cols, down=False)
+        down = _doublings(within, self.stride, self.rows, down=True)
+        up = _doublings(within, self.stride, self.rows, down=False)
+        while True:
+            grown = region | within & ~(within + region)
+            for shift, free in left:
+                grown |= grown >> shift & free
+            for shift, free in down:
+                grown |= grown << shift & free
+            for shift, free in up:
+                grown |= grown >> shift & free
+            grown |= self.neighbours(grown) & within
+            if grown == region:
+                return region
+            region = grown
+
+    def row_sum(self, bits: int) -> int:
+        """Sum of the rows of all taxels of `bits`."""
+        return _sum_of_planes(self._row_planes, bits)
+
+    def col_sum(self, bits: int) -> int:
+        """Sum of the columns of all taxels of `bits`; 0 <= sum < cols * area.
+
+        Where the skin wraps, columns are counted from `best_cut` of the taxels. A set that spans
+        less than half a turn has the mean of its unrolled columns, wherever the seam lies.
+        """
+        total = _sum_of_planes(self._col_planes, bits)
+        if not self.wraps or not all(bits & outside for outside in self._outside_half):
+            return total
+        areas = [(bits & column).bit_count() for column in self._columns]
+        area = sum(areas)
+        total += self.cols * sum(areas[: best_cut(areas)])
+        return total - self.cols * area if total >= self.cols * area else total
+
+
+def best_cut(weights: Sequence[int]) -> int:
+    """The column at which to cut a circle so that the weights' variance is least.
+
+    Columns below the cut count as one turn higher. The mean of the columns so counted is the
+    intrinsic mean of the circle. Of equally good cuts the lowest is taken.
+
+    Args:
+        weights: of each column, whole numbers.
+    """
+    turn, total = len(weights), sum(weights)
+    weighted = [(col, weight) for col, weight in enumerate(weights) if weight]
+    first = sum(col * weight for col, weight in weighted)
+    second = sum(col * col * weight for col, weight in weighted)
+    best, lowest = 0, total * second - first * first
+    for col, weight in weighted:
+        first += turn * weight
+        second += turn * (turn + 2 * col) * weight
+        variance = total * second - first * first
+        if variance < lowest:
+            best, lowest = col + 1, variance
+    return best
+
+
+def _sum_of_planes(planes: Sequence[int], bits: int) -> int:
+    """Sum of a coordinate over `bits`, whose plane n holds the taxels with bit n of it set."""
+    return sum((bits & plane).bit_count() << n for n, plane in enumerate(planes))
+
+
+def _doublings(within: int, step: int, count: int, *, down: bool) -> list[tuple[int, int]]:
+    """Shifts of 1, 2, 4, ... steps, each with the taxels that it may fill (Kogge and Stone)."""
+    rounds: list[tuple[int, int]] = []
+    shift, free = step, within
+    while shift < step * count and free:
+        rounds.append((shift, free))
+        free &= free << shift if down else free >> shift
+        shift *= 2
+    return rounds
+
+
+@lru_cache(maxsize=16)
+def grid(rows: int, cols: int, wraps: bool) -> Grid:
+    """The grid of a shape; its masks are constants, so each is made once."""
+    return Grid(rows, cols, wraps)
 
 
 class Region:
@@ -24,22 +175,16 @@ class Region:
         bits: the taxels as the bits of an integer (see `Grid`).
     """
 
-    __slots__ = ("_grid", "_mask", "_sums", "area", "bits", "peak")
-
-    def __init__(self, of: Grid, bits: int, peak: int) -> None:
-        self._grid = of
-        self._sums: tuple[int, int] | None = None
-        self._mask: NDArray[np.bool_] | None = None
+    def __init__(self, on: Grid, bits: int, peak: int) -> None:
+        self._grid = on
         self.bits = bits
         self.area = bits.bit_count()
         self.peak = peak
 
-    @property
+    @cached_property
     def sums(self) -> tuple[int, int]:
         """(sum of rows, sum of columns) over the taxels: `area` times the centroid."""
-        if self._sums is None:
-            self._sums = self._grid.row_sum(self.bits), self._grid.col_sum(self.bits)
-        return self._sums
+        return self._grid.row_sum(self.bits), self._grid.col_sum(self.bits)
 
     @property
     def centroid(self) -> tuple[float, float]:
@@ -47,12 +192,10 @@ class Region:
         rows, cols = self.sums
         return rows / self.area, cols / self.area
 
-    @property
+    @cached_property
     def mask(self) -> NDArray[np.bool_]:
         """(rows, cols), True on the region's taxels."""
-        if self._mask is None:
-            self._mask = self._grid.unpack(self.bits)
-        return self._mask
+        return self._grid.unpack(self.bits)
 
     @property
     def index(self) -> int:
@@ -61,8 +204,7 @@ class Region:
 
     def touches(self, other: Region) -> bool:
         """Whether a taxel of this region is next to, or the same as, one of the other's."""
-        of = self._grid
-        return bool((self.bits | of.touching(self.bits, of.wraps and of.cols > 1)) & other.bits)
+        return bool((self.bits | self._grid.neighbours(self.bits)) & other.bits)
 
     def __repr__(self) -> str:
         row, col = self.centroid
@@ -72,11 +214,11 @@ class Region:
 class ActiveTaxels:
     """The taxels of one frame above the threshold, and the regions that they form.
 
-    A frame is thresholded once, and only where something asks for it; whatever is found in it
-    is kept.
+    Attributes:
+        counts: (rows, cols) of the frame.
+        mask: (rows, cols), True on the active taxels.
+        bits: the active taxels as the bits of an integer (see `Grid`).
     """
-
-    __slots__ = ("_bits", "_grid", "_mask", "_regions", "_threshold", "_valid", "counts")
 
     def __init__(
         self,
@@ -85,12 +227,11 @@ class ActiveTaxels:
         *,
         valid: NDArray[np.bool_] | None = None,
         wraps: bool = True,
-        connectivity: int = 4,
     ) -> None:
         """Take the arguments of `find_regions`.
 
         Raises:
-            InputError: the arrays' types or shapes make no sense.
+            InputError: an array has the wrong type or shape.
         """
         if counts.ndim != 2 or counts.dtype.kind not in "ui":
             raise InputError(
@@ -100,71 +241,50 @@ class ActiveTaxels:
             raise InputError(f"valid must be bool {counts.shape}, not {valid.dtype} {valid.shape}")
         rows, cols = counts.shape
         self.counts = counts
-        self._grid = grid(rows, cols, wraps, connectivity)
-        self._threshold, self._valid = threshold, valid
-        self._mask: NDArray[np.bool_] | None = None
-        self._bits: int | None = None
-        self._regions: list[Region] | None = None
+        self._grid = grid(rows, cols, wraps)
+        padded = np.zeros((rows, self._grid.stride), dtype=np.bool_)
+        self.mask = padded[:, :cols]
+        try:
+            np.greater(counts, threshold, out=self.mask)
+        except ValueError:
+            raise InputError(
+                f"threshold must be one number or {counts.shape}, not {np.shape(threshold)}"
+            ) from None
+        if valid is not None:
+            self.mask &= valid
+        self.bits = self._grid.pack(padded)
 
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """(rows, cols), True on the active taxels."""
-        if self._mask is None:
-            of = self._grid
-            active = np.zeros((of.rows, of.stride), dtype=np.bool_)
-            inside = active[:, : of.cols]
-            try:
-                np.greater(self.counts, self._threshold, out=inside)
-            except ValueError:
-                raise InputError(
-                    f"threshold must be one number or {self.counts.shape}, "
-                    f"not {np.shape(self._threshold)}"
-                ) from None
-            if self._valid is not None:
-                inside &= self._valid
-            self._bits = of.pack(active)
-            self._mask = inside
-        return self._mask
+    @cached_property
+    def _components(self) -> list[int]:
+        """The bits of each region."""
+        components, rest = [], self.bits
+        while rest:
+            components.append(self._grid.flood(rest & -rest, rest))
+            rest ^= components[-1]
+        return components
 
-    @property
-    def bits(self) -> int:
-        """The active taxels as the bits of an integer (see `Grid`)."""
-        if self._bits is None:
-            _ = self.mask
-        assert self._bits is not None
-        return self._bits
-
+    @cached_property
     def regions(self) -> list[Region]:
-        """All regions, as `find_regions` gives them."""
-        if self._regions is None:
-            of, bits = self._grid, self.bits
-            regions: list[Region] = []
-            while bits:
-                found = of.flood(bits & -bits, bits)
-                bits ^= found
-                regions.append(Region(of, found, _peak(of, self.counts, found)))
-            regions.sort(key=lambda region: (-region.area, -region.peak, region.index))
-            self._regions = regions
-        return self._regions
+        """All regions, as `find_regions` returns them."""
+        regions = map(self._region, self._components)
+        return sorted(regions, key=lambda region: (-region.area, -region.peak, region.index))
 
     def largest(self, previous: Region | None = None) -> Region | None:
-        """The largest region, as `largest_region` gives it."""
-        counts = self.counts
-        index = int(counts.argmax())
-        highest = int(counts.item(index))
-        if isinstance(self._threshold, int) and highest <= self._threshold:
+        """The largest region, as `largest_region` returns it."""
+        if not self.bits:
             return None
-        of, bits = self._grid, self.bits
-        if not bits:
-            return None
-        # The region with the frame's peak is nearly always the largest one: it comes first, and
-        # what is left is looked at only where it is large enough to matter.
-        top = of.bit(index)
-        found = of.flood(top if bits & top else bits & -bits, bits)
-        rest = bits ^ found
-        if rest.bit_count() >= found.bit_count():
-            found = _largest(of, counts, found, rest, previous)
-        return Region(of, found, highest if found & top else _peak(of, counts, found))
+        # The region with the frame's peak is nearly always larger than all others together.
+        index = int(self.counts.argmax())
+        bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
+        if 2 * bits.bit_count() > self.bits.bit_count():
+            return Region(self._grid, bits, int(self.counts.item(index)))
+        area = max(map(int.bit_count, self._components))
+        tied = [self._region(c) for c in self._components if c.bit_count() == area]
+        before = 0 if previous is None else previous.bits
+        return min(tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index))
+
+    def _region(self, bits: int) -> Region:
+        return Region(self._grid, bits, int(self.counts[self._grid.unpack(bits)].max()))
 
 
 def find_regions(
@@ -173,7 +293,6 @@ def find_regions(
     *,
     valid: NDArray[np.bool_] | None = None,
     wraps: bool = True,
-    connectivity: int = 4,
 ) -> list[Region]:
     """All regions of connected taxels above the threshold.
 
@@ -188,14 +307,12 @@ def find_regions(
         threshold: one number, or one a taxel; a taxel above it is active.
         valid: bool (rows, cols); a taxel that is not valid is never active.
         wraps: the last column touches the first.
-        connectivity: 4 or 8.
 
     Returns:
-        Largest area first; equal areas by higher peak, then by lower index.
+        Regions of taxels that share an edge. The largest area comes first, then the higher peak,
+        then the lower index.
     """
-    return ActiveTaxels(
-        counts, threshold, valid=valid, wraps=wraps, connectivity=connectivity
-    ).regions()
+    return ActiveTaxels(counts, threshold, valid=valid, wraps=wraps).regions
 
 
 def largest_region(
@@ -204,7 +321,6 @@ def largest_region(
     *,
     valid: NDArray[np.bool_] | None = None,
     wraps: bool = True,
-    connectivity: int = 4,
     previous: Region | None = None,
 ) -> Region | None:
     """The region of the largest area (paper, section III-B), or None where no taxel is active.
@@ -218,53 +334,4 @@ def largest_region(
     Equal areas go to the larger overlap with `previous` (the region followed so far), then to
     the higher peak, then to the lower index. The other arguments are those of `find_regions`.
     """
-    return ActiveTaxels(
-        counts, threshold, valid=valid, wraps=wraps, connectivity=connectivity
-    ).largest(previous)
-
-
-def _peak(of: Grid, counts: NDArray[Any], bits: int) -> int:
-    return int(counts[of.unpack(bits)].max())
-
-
-def _largest(of: Grid, counts: NDArray[Any], found: int, rest: int, previous: Region | None) -> int:
-    """The largest region among `found` and those of `rest`."""
-    lone = of.lone(rest)
-    area = found.bit_count()
-    if area == 1 and lone == rest:
-        return _settle_lone(of, counts, found | lone, previous)
-    rest ^= lone  # smaller than some region here
-    tied = [found]
-    while rest and rest.bit_count() >= area:
-        other = of.flood(rest & -rest, rest)
-        rest ^= other
-        size = other.bit_count()
-        if size > area:
-            area, tied = size, [other]
-        elif size == area:
-            tied.append(other)
-    return tied[0] if len(tied) == 1 else _settle(of, counts, tied, previous)
-
-
-def _settle_lone(of: Grid, counts: NDArray[Any], bits: int, previous: Region | None) -> int:
-    """The one of many taxels on their own: overlap, then peak, then lowest index."""
-    if previous is not None:
-        bits = bits & previous.bits or bits
-    mask = of.unpack(bits)
-    return of.bit(int(np.argmax(mask & (counts == counts[mask].max()))))
-
-
-def _settle(of: Grid, counts: NDArray[Any], tied: list[int], previous: Region | None) -> int:
-    """The one of several regions of equal area: overlap, then peak, then lowest index."""
-    if previous is not None:
-        overlaps = [(bits & previous.bits).bit_count() for bits in tied]
-        most = max(overlaps)
-        tied = [bits for bits, overlap in zip(tied, overlaps, strict=True) if overlap == most]
-    union = 0
-    for bits in tied:
-        union |= bits
-    mask = of.unpack(union)
-    high = np.zeros((of.rows, of.stride), dtype=np.bool_)
-    np.logical_and(mask, counts == counts[mask].max(), out=high[:, : of.cols])
-    peaks = of.pack(high)
-    return min((bits for bits in tied if bits & peaks), key=lambda bits: bits & -bits)
+    return ActiveTaxels(counts, threshold, valid=valid, wraps=wraps).largest(previous)

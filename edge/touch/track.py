@@ -11,45 +11,41 @@ from edge.touch.arm import Chain
 from edge.touch.contact import CLOCK_ROUNDING_S, Contact, FeatureSeries, region_time, released
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measurer import Measurer
-from edge.touch.measures import PAPER
+from edge.touch.measures import PAPER, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 MAX_CONTACTS = 8
-"""Contacts to follow at once where every region counts: a skin that flickers must not stall the
-loop."""
+"""Contacts followed at once where every region counts. The limit keeps a flickering skin from
+stalling the loop."""
 
 
 @dataclass(frozen=True)
 class TrackSettings:
-    """How a contact begins and is followed; training and the board use the same.
+    """How a contact begins; training and the board use the same settings.
 
-    The skin's layout says from which counts on, and after how long without any it ends.
+    The skin's layout has the counts at which it begins and the time after which it ends.
     """
 
     debounce: int = 2
-    """Frames in a row whose peak is above the skin's onset count before a contact is believed;
-    its onset is the first of them."""
-    connectivity: int = 4
+    """Frames in a row whose peak is above the skin's onset count before a contact is confirmed.
+    The first of them is its onset."""
 
     def __post_init__(self) -> None:
         value = self.debounce
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1000:
             raise InputError(f"debounce must be a whole number of 1 to 1000, not {value!r}")
-        if self.connectivity not in (4, 8):
-            raise InputError(f"connectivity must be 4 or 8, not {self.connectivity!r}")
 
 
 class RegionTrack:
-    """One region's way from its onset over contact to its end.
+    """Follows one region from its onset to the end of its contact.
 
     A contact begins with the first of `debounce` frames in a row whose region has a peak above
-    the skin's onset count, and ends when no taxel of it has been above the threshold for the
-    skin's `release_s`. Two thresholds make one contact of a force that hovers at one of them, and
-    the time makes one contact of an arm that bounces off a rigid thing and comes back.
+    the skin's onset count. It ends when no taxel of it has been above the threshold for the skin's
+    `release_s`. With two thresholds, a force that hovers at one of them stays one contact. With the
+    time, an arm that bounces off a rigid thing and comes back makes one contact.
 
     Attributes:
-        contact: what is followed, believed yet or not; None before it and after its end.
+        contact: the contact followed, confirmed or not; None before it and after its end.
     """
 
     def __init__(self, settings: TrackSettings, layout: SkinLayout, horizon_s: float) -> None:
@@ -73,7 +69,7 @@ class RegionTrack:
         self.contact, self._confirmed, self._run = contact, False, 0
 
     def push(self, frame: Frame, active: ActiveTaxels, region: Region | None) -> Contact | None:
-        """Take in a frame and its region; the contact from the frame that confirms it on."""
+        """The contact, from the frame that confirms it on, else None; takes in a frame."""
         contact = self.contact
         if contact is None:
             return None
@@ -102,11 +98,11 @@ class RegionTrack:
 class ContactTracker:
     """Finds contacts in a stream of frames and follows them.
 
-    With one contact at most, it is the largest region of each frame, wherever that lies (paper,
-    section III-B). With more, every region is a contact of its own: it goes on with the contact
-    that it shares the most taxels with, or else with one that it touches. Where two contacts grow
-    into one region, the older one keeps it and the other ends; where a region parts in two, the
-    larger share goes on and the other part begins anew.
+    With `max_contacts` of 1, the contact is the largest region of each frame, wherever it lies
+    (paper, section III-B). With more, every region is a contact of its own. A region continues the
+    contact that it shares most taxels with, or else one that it touches. Where two contacts grow
+    into one region, the older one keeps it and the other ends. Where a region splits, the larger
+    share continues the contact and the other share begins a new one.
 
     Attributes:
         layout: the skin, with its thresholds.
@@ -134,15 +130,15 @@ class ContactTracker:
             chain: with it, motion is measured in the base's frame from each frame's joint
                 angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no more.
-            features: what the series is to hold (see `edge.touch.measures`); what is not called
-                for is not measured.
+            features: names of the features that the series is for (see `edge.touch.measures`);
+                nothing else is measured.
             joints: joint angles of a frame, where a feature is made of them.
             max_contacts: how many are followed at once, the largest first.
-            motion_on_skin: a contact whose first frame has no joint angles has its motion
-                measured on the skin; else it is unknown where they lack.
+            motion_on_skin: measure motion on the skin for a contact whose first frame has no
+                joint angles; else its motion is unknown in frames without them.
 
         Raises:
-            InputError: a feature does not exist, or not one contact is to be followed.
+            InputError: a feature does not exist, or `max_contacts` is below 1.
         """
         if max_contacts < 1:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
@@ -159,8 +155,8 @@ class ContactTracker:
         """Take in a frame.
 
         Returns:
-            The contacts that this frame belongs to, oldest first, each from the frame that
-            confirms it to the one that ends it (its `ended` is then True).
+            The confirmed contacts that this frame belongs to, oldest first. A contact that ends
+            with this frame is among them, with `ended` True.
 
         Raises:
             InputError: the frame's shape is not the skin's, its time goes back, or a time or
@@ -168,25 +164,15 @@ class ContactTracker:
         """
         self._check(frame)
         active = ActiveTaxels(
-            frame.counts,
-            self.layout.threshold_counts,
-            valid=frame.valid,
-            wraps=self.layout.wraps,
-            connectivity=self._settings.connectivity,
+            frame.counts, self.layout.threshold_counts, valid=frame.valid, wraps=self.layout.wraps
         )
-        if self._max_contacts == 1:
-            pairs = self._largest(active)
-        else:
-            pairs = self._every(active)
-        contacts = []
+        pairs = self._largest(active) if self._max_contacts == 1 else self._every(active)
         for track, region in pairs:
             if region is not None and track.awaits(region):
                 track.begin(self._contact(frame, region))
-            contact = track.push(frame, active, region)
-            if contact is not None:
-                contacts.append(contact)
+        contacts = [track.push(frame, active, region) for track, region in pairs]
         self._tracks = [track for track, _ in pairs if track.contact is not None]
-        return contacts
+        return [contact for contact in contacts if contact is not None]
 
     def _check(self, frame: Frame) -> None:
         if frame.counts.shape != self.layout.shape:
@@ -211,8 +197,8 @@ class ContactTracker:
         return [(track, self.region)]
 
     def _every(self, active: ActiveTaxels) -> list[tuple[RegionTrack, Region | None]]:
-        """Each track with its region, then new ones for regions that no track goes on with."""
-        regions = active.regions()
+        """Each track with its region, then new tracks for regions that continue no track."""
+        regions = active.regions
         self.region = regions[0] if regions else None
         shares = _shared(self._tracks, regions)
         pairs = [
@@ -239,25 +225,22 @@ def _shared(tracks: list[RegionTrack], regions: list[Region]) -> dict[int, int]:
     """{track: region} by the most taxels in common, then the older, then the larger region."""
     pairs = []
     for i, track in enumerate(tracks):
-        before = track.region
-        if before is None:
-            continue
         for j, region in enumerate(regions):
-            if common := (before.bits & region.bits).bit_count():
-                pairs.append((0, -common, i, j))
-            elif before.touches(region):
-                pairs.append((1, 0, i, j))
-    found: dict[int, int] = {}
-    for _, _, i, j in sorted(pairs):
-        if i not in found and j not in found.values():
-            found[i] = j
-    return found
+            before = track.region
+            common = 0 if before is None else (before.bits & region.bits).bit_count()
+            if common or (before is not None and before.touches(region)):
+                pairs.append((-common, i, j))
+    shares: dict[int, int] = {}
+    for _, i, j in sorted(pairs):
+        if i not in shares and j not in shares.values():
+            shares[i] = j
+    return shares
 
 
 def first_contact(
     frames: Iterable[Frame], tracker: ContactTracker
 ) -> tuple[float, FeatureSeries] | None:
-    """Onset in seconds and series of the first contact, or None where there is none.
+    """Onset in seconds and series of the first contact, or None without contact.
 
     Frames after its end, or beyond the tracker's horizon, are not read.
 

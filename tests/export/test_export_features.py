@@ -10,7 +10,14 @@ from edge.errors import InputError
 from edge.model.model import Model
 from export.__main__ import main
 
-SIX = ["skin_force", "right_length", "left_width", "skin_slant", "regions", "contact_area_rate@10"]
+SIX = [
+    "skin_force",
+    "right_length",
+    "left_width",
+    "skin_slant",
+    "skin_area",
+    "contact_area_rate@10",
+]
 
 
 @pytest.fixture(scope="module")

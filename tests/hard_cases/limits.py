@@ -82,8 +82,8 @@ def clock_usual() -> str:
     return f"float32 times at 1.7e9 s: {len(np.unique(t))} of {len(t)} frames are told apart"
 
 
-COURSES = ("log_max_force", "sqrt_max_force", "log_second_force", "sqrt_second_force")
-"""Of the contact, and of a second region that is not there: a logarithm of its floor alone."""
+COURSES = ("log_max_force", "sqrt_max_force", "log_right_force", "sqrt_right_force")
+"""Of the contact, and of the untouched right half, whose logarithm is that of the floor."""
 
 
 def transform_error(counts: int, scale: float) -> float:

@@ -9,7 +9,7 @@ from train.pipeline import Choice, ContactClassifier
 from train.projection import Projection
 from train.scaling import scale_of
 
-SIX = ("skin_force", "contact_motion", "left_length", "max_force", "regions", "contact_area")
+SIX = ("skin_force", "contact_motion", "left_length", "max_force", "skin_area", "contact_area")
 
 
 def vectors(features: int, samples: int, n: int = 30, seed: int = 0) -> np.ndarray:
@@ -28,7 +28,7 @@ def test_method_v_brings_motion_to_the_range_of_force_and_area_wherever_it_stand
     assert gain[1] * largest[1] == pytest.approx(max(largest[3], largest[5]))
 
 
-@pytest.mark.parametrize("names", [("skin_force", "regions"), ("contact_motion", "regions")])
+@pytest.mark.parametrize("names", [("skin_force", "skin_area"), ("contact_motion", "skin_area")])
 def test_method_v_without_the_papers_features_is_no_scaling(names):
     assert scale_of(vectors(2, 4), "V", names)[1].tolist() == [1.0, 1.0]
 

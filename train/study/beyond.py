@@ -182,9 +182,9 @@ def section(context: Context) -> Section:
         title="Features and methods, trials left out",
     )
     text = [
-        "The paper's three features are not all that a skin tells. Named sets of features (see "
-        "`edge/touch/feature_sets/`) on principal components (PCA) or discriminants (LDA), beside "
-        "outside methods on every taxel, on the same folds. Every number of ours is nested: "
+        "The paper's three features are not all that a skin tells. Named feature sets (in "
+        "`edge/touch/feature_sets.py`) on principal components (PCA) or discriminants (LDA), "
+        "beside outside methods on every taxel, on the same folds. Every number of ours is nested: "
         "shrinkage, components and k are chosen by the other folds alone; the outside methods take "
         "their usual settings.",
         _best(results, y),

@@ -14,9 +14,17 @@ from edge.touch.arm import Chain
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measurer import Measurer
-from edge.touch.measures import QUANTITIES, ZONES, feature, features, names
-from edge.touch.region import ActiveTaxels, find_regions
+from edge.touch.measures import (
+    MOST_CELLS,
+    QUANTITIES,
+    ZONES,
+    Cells,
+    Measurer,
+    feature,
+    features,
+    names,
+)
+from edge.touch.region import ActiveTaxels, largest_region
 from edge.touch.track import ContactTracker
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -58,16 +66,12 @@ def taxels_of(counts, mask) -> dict[tuple[int, int], int]:
 def expected(layout: SkinLayout, frame: Frame) -> dict[str, list[int]]:
     counts = frame.counts
     active = (counts > layout.threshold_counts) & (True if frame.valid is None else frame.valid)
-    regions = find_regions(
-        counts, layout.threshold_counts, valid=frame.valid, wraps=layout.wraps, connectivity=4
-    )
-    empty = np.zeros(layout.shape, dtype=bool)
-    left = empty.copy()
+    largest = largest_region(counts, layout.threshold_counts, valid=frame.valid, wraps=layout.wraps)
+    left = np.zeros(layout.shape, dtype=bool)
     left[:, : layout.cols // 2] = True
     turn = layout.cols if layout.wraps else None
     return {
-        "contact": weighted_sums(taxels_of(counts, regions[0].mask), turn),
-        "second": weighted_sums(taxels_of(counts, regions[1].mask if regions[1:] else empty), turn),
+        "contact": weighted_sums(taxels_of(counts, largest.mask), turn),
         "skin": weighted_sums(taxels_of(counts, active), turn),
         "left": weighted_sums(taxels_of(counts, active & left), None),
         "right": weighted_sums(taxels_of(counts, active & ~left), None),
@@ -97,12 +101,10 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(seed, density, hig
     assert measurer.zones == ZONES
     row = measurer.measure(active, contact)
     if contact is None:
-        assert row == [0] * 41
+        assert row == [0] * 32
         return
     seen = {zone: row[8 * i : 8 * i + 8] for i, zone in enumerate(ZONES)}
     assert seen == expected(layout, frame)
-    regions = find_regions(frame.counts, 10, valid=frame.valid, wraps=wraps, connectivity=4)
-    assert row[-1] == len(regions)
 
 
 @pytest.mark.parametrize("wraps", [False, True])
@@ -181,7 +183,7 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
         assert value(FLAT, counts, f"skin_{quantity}") == pytest.approx(
             float(truth), rel=4e-15, abs=1e-14
         )
-    # The determinant of a thin contact cancels: see edge.touch.features._Place.width.
+    # The determinant of a thin contact cancels: see `edge.touch.features._Zone.width`.
     assert value(FLAT, counts, "skin_width") == pytest.approx(float(shorter), abs=7 * 2.0**-25)
 
 
@@ -227,7 +229,7 @@ def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
         counts[1, 1] = 60 if i < 4 else 0
         counts[i % 4, 5] = right
         frames.append(Frame(i / 4, counts))
-    wanted = ["right_along", "right_force", "second_area"]
+    wanted = ["right_along", "right_force", "right_area"]
     vector = feature_vector(series_of(FLAT, frames, wanted), 1.25, 6, wanted).reshape(3, 6)
     assert vector[0].tolist() == [2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
     assert vector[1].tolist() == [0.0, 0.0, 0.4, 0.8, 0.0, 0.0]
@@ -242,12 +244,11 @@ def test_a_rate_is_the_change_a_second_of_the_sampled_values():
         counts = np.zeros((5, 7), dtype=np.uint16)
         counts[1, 1] = 100 + 20 * i
         frames.append(Frame(i / 10, counts))
-    wanted = ["max_force", "max_force_rate", "regions", "regions_rate"]
-    vector = feature_vector(series_of(FLAT, frames, wanted), 1.0, 5, wanted).reshape(4, 5)
+    wanted = ["max_force", "max_force_rate", "contact_area_rate"]
+    vector = feature_vector(series_of(FLAT, frames, wanted), 1.0, 5, wanted).reshape(3, 5)
     assert vector[0] == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0])
     assert vector[1] == pytest.approx([2.0] * 5)
-    assert vector[2].tolist() == [1.0] * 5
-    assert vector[3].tolist() == [0.0] * 5
+    assert vector[2].tolist() == [0.0] * 5
 
 
 def test_force_motion_follows_the_force_where_the_area_stays():
@@ -280,9 +281,9 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
     first, second = np.zeros((2, 5, 7), dtype=np.uint16)
     first[1, 1], second[1, 1:3] = 50, 70
     frames = [Frame(0.0, first), Frame(0.1, first), Frame(0.1, second)]
-    wanted = [*ALL[:3], "skin_force", "force_motion", "regions"]
+    wanted = [*ALL[:3], "skin_force", "force_motion"]
     series = series_of(FLAT, frames, wanted)
-    assert series.integers.shape == (2, 4 + 8 * 2 + 1)
+    assert series.integers.shape == (2, 4 + 8 * 2)
     assert series.zones["skin"][:, 2].tolist() == [50, 140]
     assert series.force_motion.shape == series.motion.shape == (2,)
 
@@ -295,14 +296,10 @@ def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
     counts = np.zeros((5, 7), dtype=np.uint16)
     counts[1, 1] = 50
     frames = [Frame(t, counts, joints=np.zeros(5)) for t in (0.0, 0.5)]
-    monkeypatch.setattr(ActiveTaxels, "regions", refuse)
-    series_of(FLAT, frames, ["skin_force", "left_length"])
     monkeypatch.setattr(Chain, "point", refuse)
     series = series_of(FLAT, frames, ["skin_force"], chain=Chain.cody())
     assert list(series.zones) == ["skin"]
     monkeypatch.setattr(Measurer, "_moments", refuse)
-    series_of(FLAT, frames, ["right_max_force", "left_area"])
-    monkeypatch.setattr(Measurer, "measure", refuse)
     series = series_of(FLAT, frames, ["max_force", "contact_area", "contact_motion"])
     assert series.zones == {}
     with pytest.raises(AssertionError, match="no feature called"):
@@ -311,7 +308,7 @@ def test_what_no_feature_calls_for_is_not_measured(monkeypatch):
 
 def test_the_papers_three_are_the_default_and_come_first():
     assert FEATURES == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
-    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 7
+    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 6
     assert [feature(name).name for name in ALL] == ALL
 
 
@@ -320,9 +317,7 @@ def test_units_are_those_of_the_skin():
     units = {
         "max_force": "newton",
         "left_force_rate": "newton/s",
-        "second_area": "taxel",
         "skin_slant": "taxel^2",
-        "regions": "region",
         "force_motion": "metre",
         "skin_pressure": "newton/taxel",
         "stiffness": "newton/metre",
@@ -349,7 +344,7 @@ def test_units_are_those_of_the_skin():
         (["sqrt_log_joint_change"], "may be negative and has no logarithm; take sqrt_joint_change"),
         (["log_skin_slant_mean"], "may be negative"),
         ([], "no feature named"),
-        (["max_force", "regions", "max_force"], "max_force is named twice"),
+        (["max_force", "skin_area", "max_force"], "max_force is named twice"),
     ],
 )
 def test_a_wrong_name_is_one_sentence(wanted, sentence):
@@ -364,7 +359,6 @@ def test_a_feature_that_was_not_measured_is_one_sentence():
     series = series_of(FLAT, [Frame(t, counts) for t in (0.0, 0.5)], ["max_force"])
     for name in (
         "skin_force",
-        "regions",
         "force_motion",
         "stiffness",
         "taxel_force",
@@ -383,3 +377,42 @@ def test_of_equal_cuts_the_lowest_also_beyond_64_bits(shape):
         active, active.largest()
     )
     assert Fraction(row[4], row[2]) == Fraction(cols - 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("shape", "side", "count"),
+    [((16, 16), 1, 256), ((16, 24), 2, 96), ((1, 257), 2, 129), ((13, 13), 1, 169)],
+)
+def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(shape, side, count):
+    cells = Cells(SkinLayout(*shape))
+    assert (cells.side, cells.count) == (side, count)
+    assert count <= MOST_CELLS
+
+
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 1 << 32),
+    shape=st.sampled_from([(3, 5), (16, 24), (17, 31), (1, 700)]),
+)
+def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(seed, shape):
+    rng = np.random.default_rng(seed)
+    rows, cols = shape
+    dead = rng.choice(rows * cols, size=rng.integers(0, rows * cols // 2), replace=False)
+    layout = SkinLayout(rows, cols, dead=tuple(sorted(dead.tolist())))
+    counts = rng.integers(0, 65536, shape).astype(np.uint16)
+    valid = None if seed % 4 == 0 else rng.random(shape) < 0.8
+    cells = Cells(layout)
+    expected = []
+    for top in range(0, rows, cells.side):
+        for left in range(0, cols, cells.side):
+            square = [
+                (r, c)
+                for r in range(top, min(top + cells.side, rows))
+                for c in range(left, min(left + cells.side, cols))
+            ]
+            if any(layout.alive[taxel] for taxel in square):
+                expected.append(
+                    sum(int(counts[taxel]) for taxel in square if valid is None or valid[taxel])
+                )
+    assert cells.read(Frame(0.0, counts, valid=valid)).tolist() == expected
+    assert len(expected) == cells.count

@@ -12,9 +12,6 @@ from hypothesis.extra import numpy as hnp
 from edge.errors import InputError
 from edge.touch.region import find_regions, largest_region
 
-CROSS = scipy.ndimage.generate_binary_structure(2, 1)
-SQUARE = scipy.ndimage.generate_binary_structure(2, 2)
-
 
 def frame(*taxels: tuple[int, int], shape=(16, 24), value=100) -> np.ndarray:
     out = np.zeros(shape, dtype=np.uint16)
@@ -23,14 +20,13 @@ def frame(*taxels: tuple[int, int], shape=(16, 24), value=100) -> np.ndarray:
     return out
 
 
-def reference_masks(active: np.ndarray, wraps: bool, connectivity: int) -> list[np.ndarray]:
+def reference_masks(active: np.ndarray, wraps: bool) -> list[np.ndarray]:
     """scipy's components; where the skin wraps, those that meet across the seam are joined."""
-    structure = CROSS if connectivity == 4 else SQUARE
     if not wraps:
-        labels, n = scipy.ndimage.label(active, structure)
+        labels, n = scipy.ndimage.label(active)
         return [labels == i + 1 for i in range(n)]
     cols = active.shape[1]
-    labels, n = scipy.ndimage.label(np.hstack([active, active]), structure)
+    labels, n = scipy.ndimage.label(np.hstack([active, active]))
     masks: list[np.ndarray] = []
     for i in range(n):
         mask = (labels[:, :cols] == i + 1) | (labels[:, cols:] == i + 1)
@@ -81,7 +77,7 @@ SHAPES = {
 }
 
 
-def by_scipy(counts, threshold, valid, wraps, connectivity):
+def by_scipy(counts, threshold, valid, wraps):
     """All regions as (area, peak, lowest index, sum of rows, taxels), and the largest.
 
     The largest area comes first, then the higher peak, then the lower index.
@@ -90,7 +86,7 @@ def by_scipy(counts, threshold, valid, wraps, connectivity):
     if valid is not None:
         active &= valid
     regions = []
-    for mask in reference_masks(active, wraps, connectivity):
+    for mask in reference_masks(active, wraps):
         lowest = int(np.flatnonzero(mask.ravel())[0])
         rows = int(np.nonzero(mask)[0].sum())
         regions.append((int(mask.sum()), int(counts[mask].max()), lowest, rows, mask.tobytes()))
@@ -98,35 +94,34 @@ def by_scipy(counts, threshold, valid, wraps, connectivity):
     return regions, regions[0] if regions else None
 
 
-def by_us(counts, threshold, valid, wraps, connectivity):
+def by_us(counts, threshold, valid, wraps):
     """The same from `find_regions` and `largest_region`."""
 
     def described(region):
         return region.area, region.peak, region.index, region.sums[0], region.mask.tobytes()
 
-    options = {"valid": valid, "wraps": wraps, "connectivity": connectivity}
+    options = {"valid": valid, "wraps": wraps}
     regions = find_regions(counts, threshold, **options)
     largest = largest_region(counts, threshold, **options)
     return [*map(described, regions)], None if largest is None else described(largest)
 
 
-@pytest.mark.parametrize("connectivity", [4, 8])
 @pytest.mark.parametrize("wraps", [False, True])
 @pytest.mark.parametrize("name", SHAPES)
-def test_adversarial_frames_agree_with_scipy(name, wraps, connectivity):
-    given = SHAPES[name], 50, None, wraps, connectivity
+def test_adversarial_frames_agree_with_scipy(name, wraps):
+    given = SHAPES[name], 50, None, wraps
     assert by_us(*given) == by_scipy(*given)
 
 
 @settings(max_examples=300)
-@given(st.data(), st.integers(1, 18), st.integers(1, 26), st.booleans(), st.sampled_from([4, 8]))
-def test_random_frames_agree_with_scipy(data, rows, cols, wraps, connectivity):
+@given(st.data(), st.integers(1, 18), st.integers(1, 26), st.booleans())
+def test_random_frames_agree_with_scipy(data, rows, cols, wraps):
     seed = data.draw(st.integers(0, 2**32 - 1))
     density = data.draw(st.sampled_from([0.05, 0.3, 0.5, 0.6, 0.7, 0.95]))
     rng = np.random.default_rng(seed)
     counts = rng.integers(51, 54, (rows, cols)) * (rng.random((rows, cols)) < density)
     valid = rng.random((rows, cols)) < 0.9 if data.draw(st.booleans()) else None
-    given = counts.astype(np.uint16), 50, valid, wraps, connectivity
+    given = counts.astype(np.uint16), 50, valid, wraps
     assert by_us(*given) == by_scipy(*given)
 
 
@@ -217,7 +212,6 @@ def test_full_scale_counts_everywhere_do_not_overflow():
         (np.zeros((2, 2)), {}, "whole numbers"),
         (np.zeros(4, dtype=np.uint16), {}, "whole numbers"),
         (np.zeros((2, 2), np.uint16), {"valid": np.ones((2, 3), bool)}, "valid"),
-        (np.ones((2, 2), np.uint16), {"connectivity": 6}, "connectivity"),
     ],
 )
 def test_bad_arguments_are_named(counts, keywords, word):

@@ -1,0 +1,101 @@
+"""Features that go together, by name. To add a set, add an entry to `SETS`.
+
+`paper`: the paper's three features (section III-B).
+
+| feature | unit | from |
+|---|---|---|
+| `max_force` | newton (count) | the largest count of the region |
+| `contact_area` | taxel | its number of taxels |
+| `contact_motion` | metre (taxel) | its sums of rows and columns over its area; the pose |
+
+`contact`: how force grows, with area and with motion. It recognises objects that were not in the
+training data. Logarithms turn a product into a sum, so objects that differ by a factor differ by a
+shift. Five times are enough for such smooth courses; more of them fit the objects trained on.
+
+| feature | unit | from |
+|---|---|---|
+| `log_max_force` | log(newton) | the largest count of the region |
+| `log_skin_force` | log(newton) | the sum of active counts |
+| `relative_skin_force`, its `_rate` | 1, 1/s | the same |
+| `log_contact_area`, `relative_contact_area` | log(taxel), 1 | the region's number of taxels |
+| `log_contact_pressure` | log(newton/taxel) | the region's sum of counts over its area |
+| `force_motion`, its `_rate` | metre, metre/s | its sums of counts times row, column; the pose |
+| `log_stiffness` | log(newton/metre) | the skin's sum of counts over force-weighted motion |
+
+`moments`: how force lies on the two halves of the skin and on all of it, as square roots. Forces
+spread over decades; their square roots lie evenly, as those of counts do.
+
+| quantity, of `left`, `right` and `skin` | unit, under the root | from |
+|---|---|---|
+| `max_force` | newton (count) | the zone's largest count |
+| `force` | newton (count) | its sum of counts |
+| `area` | taxel | its number of active taxels |
+| `along`, `around` | taxel | sums of counts times row, column |
+| `spread_along`, `spread_around`, `length`, `width` | taxel | the same, and times their squares |
+| `slant` | taxel^2 | and times row times column |
+
+`taxels`: every taxel in its place, or cells of several where the skin is large
+(`edge.touch.measures.Cells`). `sqrt_taxels`: the same of their square roots.
+
+| feature, of each cell | unit | from |
+|---|---|---|
+| `taxel_force`, at ten times | newton (count) | the cell's sum of counts |
+| `taxel_force_mean`, `taxel_force_deviation` | newton (count) | the same, over the window |
+| `taxel_force_roughness` | newton (count) | its mean change from sample to sample |
+
+`joints`: how far each joint yields, which depends on the object touched. `posture`: the angles
+themselves. They give a gripper the object's size, and an arm its place. Where each object stood in
+its own place, posture recognises it for a reason that holds in that room only.
+
+| feature, of each joint | unit | from |
+|---|---|---|
+| `joint_change`, at ten times | radian | the recording's angles, from onset on |
+| `joint_change_rate` | radian/s | the same |
+| `joint_angle`, at ten times | radian | the angles themselves |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from edge.touch.measures import PAPER, QUANTITIES
+
+_TAXELS = (
+    "taxel_force@10",
+    "taxel_force_mean",
+    "taxel_force_deviation",
+    "taxel_force_roughness",
+)
+
+SETS: dict[str, tuple[str, ...]] = {
+    "paper": PAPER,
+    "contact": (
+        "log_max_force@5",
+        "log_skin_force@5",
+        "log_contact_area@5",
+        "log_contact_pressure@5",
+        "log_stiffness@5",
+        "force_motion@5",
+        "force_motion_rate@5",
+        "relative_skin_force@5",
+        "relative_contact_area@5",
+        "relative_skin_force_rate@5",
+    ),
+    "moments": tuple(
+        f"sqrt_{zone}_{quantity}@20"
+        for zone in ("left", "right", "skin")
+        for quantity in QUANTITIES
+        if quantity != "pressure"
+    ),
+    "taxels": _TAXELS,
+    "sqrt_taxels": tuple(f"sqrt_{name}" for name in _TAXELS),
+    "joints": ("joint_change@10", "joint_change_rate@10"),
+    "posture": ("joint_angle@10",),
+}
+"""{set: names of its features, see `edge.touch.measures`}."""
+
+
+def expand(names: Sequence[str]) -> tuple[str, ...]:
+    """The features of several sets, or single features, in their order, each once."""
+    expanded = (feature for name in names for feature in SETS.get(name, (name,)))
+    return tuple(dict.fromkeys(expanded))
