@@ -177,8 +177,6 @@ def run(arguments: argparse.Namespace) -> int:
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
-    if arguments.dof not in (None, dof):
-        raise InputError(f"--dof is {arguments.dof}, but {arguments.arm} has {dof} joints")
     if arguments.joints is not None and dof is None:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
     virtual = arguments.fake is not None and not arguments.real_time

@@ -17,13 +17,12 @@ from typing import Any
 from edge.classifier import Classifier
 from edge.commands.options import add_error, add_joints, add_skin, check_error
 from edge.commands.output import Output
-from edge.commands.source import check_joints, open_joints, open_skin
+from edge.commands.source import check_joints, chip_event, open_joints, open_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
 from edge.runtime.systemd import Notifier
 from edge.runtime.touch_map import events_on_map, map_writer
 from edge.skin.loop import Loop, Schedule, stop_on
-from edge.skin.skin import ChipStatus
 from edge.touch.track import MAX_CONTACTS
 
 LOG = logging.getLogger(__name__)
@@ -53,13 +52,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="follow several contacts at once, and append each to FILE with its position",
     )
-
-
-def chip_event(status: ChipStatus, t: float) -> dict[str, Any]:
-    """The event of a chip that has failed or recovered."""
-    event = {"event": "chip", "t": t, "bus": status.bus, "place": status.route}
-    event["state"] = status.state
-    return {**event, "error": status.error} if status.error else event
 
 
 def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
@@ -123,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames += 1
             notifier.alive()
-            emit([chip_event(status, frame.t) for status in skin.changes()])
+            emit([chip_event(status, t=frame.t) for status in skin.changes()])
             emit([event.to_dict() for event in classifier.push(frame)])
         notifier.stopping()
         emit([event.to_dict() for event in classifier.finish()])

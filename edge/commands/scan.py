@@ -13,7 +13,7 @@ import numpy as np
 
 from edge.commands.options import add_skin
 from edge.commands.output import Output
-from edge.commands.source import open_skin
+from edge.commands.source import chip_event, open_skin
 from edge.skin.file import SkinFile
 from edge.skin.skin import ChipStatus
 from edge.skin.wiring import UNUSED
@@ -42,17 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
         statuses = opened.skin.status()
         for status in statuses:
             if output.as_json or status.state != "running":
-                output.event(
-                    {
-                        "event": "chip",
-                        "bus": status.bus,
-                        "place": status.route,
-                        "kind": status.kind,
-                        "state": status.state,
-                        "error": status.error or None,
-                    },
-                    f"{status.kind}: {status.error or status.state}",
-                )
+                text = f"{status.kind}: {status.error or status.state}"
+                output.event(chip_event(status, kind=status.kind), text)
         output.text(skin_map(opened.skin.file, statuses))
     missing = sum(status.state != "running" for status in statuses)
     output.text(f"{len(statuses) - missing} of {len(statuses)} chips answer")

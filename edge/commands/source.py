@@ -6,7 +6,7 @@ import argparse
 import logging
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,24 +17,19 @@ from edge.model.model import Model, require_joints
 from edge.recording import load
 from edge.runtime import joint_stream
 from edge.skin import file as skinfile
-from edge.skin.file import SkinFile
 from edge.skin.loop import JointSource
-from edge.skin.skin import Skin
+from edge.skin.skin import ChipStatus, Skin
 from edge.touch.arm import Chain
 from edge.touch.layout import for_device
 
 LOG = logging.getLogger(__name__)
 
 
-def touch_counts(model: Model | None, file: SkinFile) -> int | None:
-    """The model's contact threshold in the counts of a skin; None without a model.
-
-    Raises:
-        InputError: the model was made for another skin.
-    """
-    if model is None:
-        return None
-    return for_device(model.info.layout, file.layout).threshold_counts
+def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
+    """The event of a chip's state, with `more` keys."""
+    event = {"event": "chip", **more, "bus": status.bus, "place": status.route}
+    event["state"] = status.state
+    return {**event, "error": status.error} if status.error else event
 
 
 @dataclass(frozen=True)
@@ -76,41 +71,36 @@ def open_skin(
         InputError: the options or the skin's file cannot be used.
         EdgeError: the skin cannot be read.
     """
-    with ExitStack() as stack:
-        if arguments.fake is not None:
-            recording = load(arguments.fake)
-            if arm is not None:
-                recording = recording.for_joints(arm.names, arguments.fake)
-            file = (
-                skin_file(recording.layout)
-                if arguments.skin is None
-                else skinfile.load(arguments.skin)
-            )
-            clock = PacedClock() if paced or arguments.real_time else VirtualClock()
-            touch = touch_counts(model, file)
-            skin, playback = play(
-                file, recording, loop=arguments.loop, clock=clock, touch_counts=touch
-            )
-            stack.enter_context(skin)
-            lasts_s = min(playback.ends, arguments.seconds)
-            opened = Opened(skin, lasts_s, playback, f"fake {arguments.fake}")
-        else:
-            if arguments.loop or arguments.real_time:
-                raise InputError("--loop and --real-time need --fake, a recording to play")
-            if arguments.skin is None:
-                raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
-            file = skinfile.load(arguments.skin)
-            touch = touch_counts(model, file)
-            skin = stack.enter_context(Skin.open(file, calibrated=calibrated, touch_counts=touch))
-            opened = Opened(skin, arguments.seconds, None, arguments.skin)
+    recording = playback = None
+    if arguments.fake is not None:
+        recording = load(arguments.fake)
+        if arm is not None:
+            recording = recording.for_joints(arm.names, arguments.fake)
+    elif arguments.loop or arguments.real_time:
+        raise InputError("--loop and --real-time need --fake, a recording to play")
+    if arguments.skin is not None:
+        file = skinfile.load(arguments.skin)
+    elif recording is not None:
+        file = skin_file(recording.layout)
+    else:
+        raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
+    touch = None if model is None else for_device(model.info.layout, file.layout).threshold_counts
+    lasts_s, source = arguments.seconds, arguments.skin
+    if recording is None:
+        skin = Skin.open(file, calibrated=calibrated, touch_counts=touch)
+    else:
+        clock = PacedClock() if paced or arguments.real_time else VirtualClock()
+        skin, playback = play(file, recording, loop=arguments.loop, clock=clock, touch_counts=touch)
+        lasts_s, source = min(playback.ends, lasts_s), f"fake {arguments.fake}"
+    with skin:
         for status in skin.status():
             if status.error:
-                LOG.warning("%s; left out for now", status.error)
+                LOG.warning(f"{status.error}; left out for now")
         LOG.debug(
-            f"{opened.source}: {file.layout.rows} x {file.layout.cols} taxels, {len(file.chips)} "
-            f"chips on {len(file.buses)} buses at {file.reading.rate_hz:g} Hz"
+            f"{source}: {file.layout.rows} x {file.layout.cols} taxels, {len(file.chips)} chips on "
+            f"{len(file.buses)} buses at {file.reading.rate_hz:g} Hz"
         )
-        yield opened
+        yield Opened(skin, lasts_s, playback, source)
 
 
 @contextmanager

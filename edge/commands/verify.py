@@ -27,30 +27,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print one line per quantity; 1 if one differs."""
+    """Print one line per result; 1 if one differs."""
     output = Output.of(arguments)
     checks = verify(Model(arguments.model), arguments.golden)
     width = max(len(check.name) for check in checks)
     for check in checks:
         line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
         line["passed"] = check.passed
+        text = (
+            f"{'ok' if check.passed else 'DIFFERS':<8} {check.name:<{width}} {check.rows:>6} rows"
+        )
         if check.worst < float("inf"):
             line["share_of_bound"] = round(check.worst, 6)
         if check.row is not None:
             line |= {"worst_row": check.row, "seen": check.seen, "expected": check.expected}
-        verdict = "ok" if check.passed else "DIFFERS"
-        output.event(line, f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows")
-    failed = [check for check in checks if not check.passed]
-    for check in failed:
+        if not check.passed:
+            text += f"; the worst is row {check.row}: {check.seen} instead of {check.expected}"
+        output.event(line, text)
+    failed = [check.name for check in checks if not check.passed]
+    if FLOAT64 in failed:
         LOG.error(
-            f"{check.name} differs, worst in row {check.row}: "
-            f"{check.seen} instead of {check.expected}"
+            "vectors that only float64 can distinguish have equal distances: this machine runs the "
+            "model in float32; it must use float64, as ONNX Runtime does"
         )
-    if any(check.name == FLOAT64 for check in failed):
-        LOG.error(
-            "vectors that only float64 tells apart have the same distances: what runs the model "
-            "computes in float32; it must compute in float64, as ONNX Runtime does"
-        )
-    if not failed:
-        output.text(f"{len(checks)} quantities agree with the golden file")
+    if failed:
+        LOG.error(f"results that differ from the golden file: {', '.join(failed)}")
+    else:
+        output.text(f"all {len(checks)} results agree with the golden file")
     return 1 if failed else 0

@@ -77,10 +77,6 @@ def test_a_trial_keeps_the_chain_of_a_toml_file(files):
         (["--arm", "none.toml"], "none.toml: cannot be read"),
         (["--arm", "still.toml"], "still.toml: joint a: its axis is zero"),
         (["--tip", "skin"], "--base and --tip need --arm arm.urdf"),
-        (
-            ["--arm", "arm.urdf", "--base", "base", "--tip", "skin", "--dof", "3"],
-            "--dof is 3, but arm.urdf has 2 joints",
-        ),
     ],
 )
 def test_an_arm_that_cannot_be_used_is_refused(files, options, said, capsys, monkeypatch):
