@@ -1,26 +1,26 @@
 """Cut recordings into one for each contact.
 
-Writes each contact of each recording to a file of its own, named after the recording and the
-contact's number. The labels are those of meta.contacts, a list of one set of labels for each
-contact, or else the recording's.
+Writes each contact of each recording to its own file, named after the recording and the contact's
+number. Its labels come from meta.contacts, a list with the labels of each contact, or else are
+those of the recording.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
-from edge.errors import InputError
+from edge.files import parsing
 from edge.recording import Recording, save
+from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
 from train.dataset import labels_of, read
 
 LEAD_S = 0.25
-"""Kept of what lies before a contact, where no other contact does."""
+"""Kept of the time before a contact, as far as no other contact lies there."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -33,47 +33,40 @@ def run(arguments: argparse.Namespace) -> int:
     """Cut and write."""
     raw = read(arguments.data, progress=True)
     count = 0
-    both = list(zip(raw.paths, raw.recordings, strict=True))
-    for path, recording in tqdm(both, desc="splitting", unit=" recordings"):
-        try:
-            parts = split(recording)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
-        for i, part in enumerate(parts):
-            save(arguments.out / f"{path.stem}-{i:02d}.npz", part)
-        count += len(parts)
-    print(f"{count} recordings in {arguments.out}")
+    pairs = list(zip(raw.paths, raw.recordings, strict=True))
+    for path, recording in tqdm(pairs, desc="splitting", unit=" recordings"):
+        with parsing(str(path), "a recording to split"):
+            contacts = split(recording)
+        for i, contact in enumerate(contacts):
+            save(arguments.out / f"{path.stem}-{i:02d}.npz", contact)
+        count += len(contacts)
+    print(f"recordings written to {arguments.out}: {count}")
     return 0
 
 
 def split(recording: Recording) -> list[Recording]:
-    """A recording of each contact, from a moment before it to the next one's."""
+    """A recording of each contact, from `LEAD_S` before its onset to its end."""
     tracker = ContactTracker(recording.layout)
-    spans: dict[int, list[float]] = {}
-    kept = []
+    ends_s: dict[Contact, float] = {}
     for frame in recording:
-        for contact in tracker.push(frame):
-            kept.append(contact)  # so that no identity is given twice
-            spans.setdefault(id(contact), [contact.onset_s, frame.t])[1] = frame.t
-    labels = labels_of(recording, len(spans))
-    if len(labels) < len(spans):
-        labels = [recording.labels] * len(spans)
-    parts, free = [], -np.inf
-    for (onset_s, end_s), own in zip(spans.values(), labels, strict=True):
-        t = recording.t
-        a = int(np.searchsorted(t, max(onset_s - LEAD_S, free), side="right"))
-        b = int(np.searchsorted(t, end_s, side="right"))
-        meta = {k: v for k, v in recording.meta.items() if k != "contacts"}
-        valid = recording.valid
-        parts.append(
-            replace(
-                recording,
-                t=t[a:b],
-                frames=recording.frames[a:b],
-                joints=None if recording.joints is None else recording.joints[a:b],
-                valid=valid[a:b] if valid is not None and valid.ndim == 3 else valid,
+        ends_s |= dict.fromkeys(tracker.push(frame), frame.t)
+    labels = labels_of(recording, len(ends_s))
+    if len(labels) < len(ends_s):
+        labels = [recording.labels] * len(ends_s)
+    t, valid, joints = recording.t, recording.valid, recording.joints
+    meta = {key: value for key, value in recording.meta.items() if key != "contacts"}
+    contacts, previous_end_s = [], -np.inf
+    for (contact, end_s), own in zip(ends_s.items(), labels, strict=True):
+        start_s = max(contact.onset_s - LEAD_S, previous_end_s)
+        span = slice(*np.searchsorted(t, (start_s, end_s), side="right"))
+        contacts.append(
+            Recording(
+                t=t[span],
+                frames=recording.frames[span],
+                joints=None if joints is None else joints[span],
+                valid=valid[span] if valid is not None and valid.ndim == 3 else valid,
                 meta={**meta, "labels": own},
             )
         )
-        free = end_s
-    return parts
+        previous_end_s = end_s
+    return contacts

@@ -1,8 +1,8 @@
 """Propose thresholds from the recordings' own noise.
 
-Takes the first 0.1 s of each recording for noise, proposes a threshold 2 times above the level that
-one in ten recordings exceeds and an onset 1.5 times above that, and says how many contacts other
-thresholds find.
+Takes the first 0.1 s of each recording as noise. Proposes a threshold of twice the level that one
+in ten recordings exceeds, and an onset of 1.5 times that threshold. Counts the contacts that these
+and other thresholds give.
 """
 
 from __future__ import annotations
@@ -13,18 +13,17 @@ from collections.abc import Sequence
 import numpy as np
 from tqdm import tqdm
 
-from edge.errors import InputError
 from edge.recording import Recording
 from edge.touch.layout import for_device
 from edge.touch.track import ContactTracker
 from train.dataset import contacts, read, with_thresholds
 
 QUIET_S = 0.1
-"""Taken as before the contact, from the start of each recording."""
+"""The time from the start of each recording that is taken to lie before the contact."""
 MARGIN = 2.0
-"""The threshold lies so many times above the largest noise."""
+"""Ratio of the threshold to the noise."""
 ONSET = 1.5
-"""The onset lies so many times above the threshold, so that a force that hovers is one contact."""
+"""Ratio of the onset to the threshold, so that a force that fluctuates is one contact."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -35,8 +34,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:
     """Threshold and onset in counts, from the noise before contact.
 
-    The level is the 90th percentile over the recordings of the largest count in their first
-    `QUIET_S`: a few recordings that begin in contact do not raise it.
+    The noise is the 90th percentile over the recordings of the largest count in their first
+    `QUIET_S`, so that a few recordings that begin in contact do not raise it.
     """
     largest = [
         int(recording.frames[recording.t <= recording.t[0] + QUIET_S].max(initial=0))
@@ -46,35 +45,30 @@ def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:
     return min(threshold, 65534), min(round(ONSET * threshold), 65534)
 
 
-def found(recordings: Sequence[Recording], threshold: int, onset: int) -> tuple[int, int]:
-    """How many recordings have a contact, and how many contacts there are."""
+def count_contacts(recordings: Sequence[Recording], threshold: int, onset: int) -> tuple[int, int]:
+    """The number of recordings with a contact, and the number of contacts."""
     layout = with_thresholds(recordings[0].layout, threshold, onset)
-    counts = [
-        len(
-            contacts(recording, ContactTracker(for_device(layout, recording.layout), horizon_s=0.1))
-        )
-        for recording in recordings
-    ]
-    return sum(count > 0 for count in counts), sum(counts)
+    counts = []
+    for recording in recordings:
+        tracker = ContactTracker(for_device(layout, recording.layout), horizon_s=0.1)
+        counts.append(len(contacts(recording, tracker)))
+    return len(np.flatnonzero(counts)), sum(counts)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Propose, and count."""
+    """Print the proposal, and the contacts that it and other thresholds give."""
     recordings = read(arguments.data, progress=True).recordings
-    if any(len(recording.t) == 0 for recording in recordings):
-        raise InputError("a recording has no frame; leave it out")
     threshold, onset = proposed(recordings)
     own = recordings[0].layout
     rows = [("recorded", own.threshold_counts, own.onset)]
-    rows += [
-        (name, min(round(factor * threshold), 65534), min(round(factor * onset), 65534))
-        for name, factor in (("half", 0.5), ("proposed", 1.0), ("twice", 2.0), ("four times", 4.0))
-    ]
+    for name, factor in (("half", 0.5), ("proposed", 1), ("twice", 2), ("four times", 4)):
+        low, high = (min(round(factor * level), 65534) for level in (threshold, onset))
+        rows.append((name, low, high))
     print(f"{'':<11}threshold  onset  recordings with a contact  contacts")
     for name, low, high in tqdm(rows, desc="following", leave=False):
-        some, every = found(recordings, low, high)
+        touched, total = count_contacts(recordings, low, high)
         tqdm.write(
-            f"{name:<11}{low:>9}  {high:>5}  {some:>12} of {len(recordings):<10}  {every:>8}"
+            f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  {total:>8}"
         )
     print(f"use: --threshold {threshold} --onset {onset}")
     return 0

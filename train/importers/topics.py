@@ -1,25 +1,25 @@
-"""From the topics of frames and joint angles in a robot's log to one recording.
+"""Topics of frames and joint angles in a robot's log, turned into one recording.
 
 Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`), `std_msgs/UInt16MultiArray`
-(with two dimensions in its layout, or the skin's rows and columns beside the file), or JSON
+(with two dimensions in its layout, or with the skin's rows and columns in the JSON file), or JSON
 `{"counts": [[...], ...]}`. Joint angles are `sensor_msgs/JointState`, or JSON `{"q": [...]}`,
-optionally with `"names": [...]`. Each message may carry its own time (`header.stamp`, `"t"`);
+optionally with `"names": [...]`. A message may carry its own time (`header.stamp`, `"t"`);
 otherwise the time at which it was logged is used.
 
-Angles are told apart by the names of their joints, whatever their order in a message, and several
-messages may share the joints between them. An arm's joints are selected by name, in the arm's
-order; other joints are left out, and a warning names them. Without an arm, all joints are kept.
+Joints are identified by name, in any order, and several messages may share them. With an arm, its
+joints are selected in the arm's order, and a warning names the others. Without one, all are kept.
 
-What a log does not say may stand in a JSON file beside it, `NAME.json`, with the optional keys
-`labels` {task: label}, `skin` (see `edge.touch.layout.SkinLayout`), `arm`, and, if there are
-several topics of a kind, the ones to use: `frames_topic` and `joints_topic`.
+A JSON file beside the log, `NAME.json`, may add what the log lacks: `labels` {task: label}, `skin`
+(see `edge.touch.layout.SkinLayout`), `arm`, and, if there are several topics of a kind, the ones to
+use: `frames_topic` and `joints_topic`.
 """
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,8 +27,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import parse_json, read_json
+from edge.config import parse_json, read_json, shown
 from edge.errors import InputError
+from edge.files import parsing
 from edge.recording import Recording
 from edge.runtime.joint_stream import OLDEST_S
 from edge.touch.arm import Chain, joint_columns
@@ -39,13 +40,22 @@ FRAMES = ("sensor_msgs/msg/Image", "std_msgs/msg/UInt16MultiArray")
 JOINTS = ("sensor_msgs/msg/JointState",)
 
 
+@contextmanager
+def needs(package: str) -> Iterator[None]:
+    """Name the package to install if an import in the block fails."""
+    try:
+        yield
+    except ImportError:
+        raise InputError(f"this needs {package}; install it with `pip install {package}`") from None
+
+
 @dataclass
 class Log:
-    """Messages of one log, sorted out by topic as they are read.
+    """The messages of one log, collected by topic.
 
     Attributes:
-        path: the log, for sentences.
-        beside: what the JSON file beside it says.
+        path: of the log.
+        beside: the contents of the JSON file beside it.
         arm: whose joint angles are wanted, or None for all.
     """
 
@@ -54,30 +64,28 @@ class Log:
     arm: Chain | None = None
     _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(default_factory=dict)
     _joints: dict[str, dict[str, list[tuple[float, float]]]] = field(default_factory=dict)
-    """Times and angles, by topic and joint."""
+    """{topic: {joint: [(time, angle)]}}"""
 
     @classmethod
     def of(cls, path: Path, arm: Chain | None = None) -> Log:
-        """A log with what stands beside it; `arm` is used rather than the one beside it.
+        """A log with its JSON file; `arm` has precedence over the file's.
 
         Raises:
-            InputError: the file beside it is not a JSON object.
+            InputError: the file is not a JSON object.
         """
-        beside = path.with_name(path.stem + ".json")
-        if not beside.is_file():
-            return cls(path, {}, arm)
-        said = read_json(beside)
-        if not isinstance(said, dict):
-            raise InputError(f"{beside}: must be a JSON object with labels, skin, arm")
-        if arm is None and "arm" in said:
-            arm = Chain.from_dict(said["arm"], where=f"{beside}: arm")
-        return cls(path, said, arm)
+        file = path.with_name(path.stem + ".json")
+        beside = read_json(file) if file.is_file() else {}
+        if not isinstance(beside, dict):
+            raise InputError(f"{file}: must be a JSON object with labels, skin, arm")
+        if arm is None and "arm" in beside:
+            arm = Chain.from_dict(beside["arm"], where=f"{file}: arm")
+        return cls(path, beside, arm)
 
     def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
-        """Take in a ROS message; kinds that are neither frames nor joint angles are left out."""
+        """Take in a ROS message; kinds other than frames and joint angles are ignored."""
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         t = logged_s if stamp is None else stamp.sec + stamp.nanosec * 1e-9
-        if t == 0.0:  # a driver that does not fill in its stamp
+        if t == 0.0:  # the driver leaves its stamp empty
             t = logged_s
         if kind in JOINTS:
             self._pose(topic, t, list(message.name), np.asarray(message.position))
@@ -88,7 +96,7 @@ class Log:
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
-        try:
+        with parsing(f"{self.path}: a message of {topic}", "usable"):
             message = parse_json(data, f"{self.path}: a message of {topic}")
             t = float(message.get("t", logged_s))
             if "q" in message:
@@ -97,16 +105,12 @@ class Log:
             elif "counts" in message:
                 counts = self._counts(topic, np.asarray(message["counts"]))
                 self._frames.setdefault(topic, []).append((t, counts))
-        except InputError:
-            raise
-        except (AttributeError, OverflowError, TypeError, ValueError) as error:
-            raise InputError(f"{self.path}: a message of {topic} cannot be used: {error}") from None
 
     def _pose(self, topic: str, t: float, names: list[str], q: NDArray[np.float64]) -> None:
-        """Take in a message's angles; joints without names are called by their positions."""
+        """Take in a message's angles; joints without names get their positions as names."""
         if q.ndim != 1 or (names and len(names) != len(q)):
             raise InputError(
-                f"{self.path}: a message of {topic} has {len(names)} names for {q.size} angles"
+                f"{self.path}: in a message of {topic}, names are {len(names)} and angles {q.size}"
             )
         if len(set(names)) < len(names):
             raise InputError(f"{self.path}: a message of {topic} names a joint twice")
@@ -121,11 +125,12 @@ class Log:
         size = kinds.get(message.encoding)
         if size is None:
             raise InputError(
-                f"{self.path}: {topic} is of {message.encoding} images; give {', '.join(kinds)}"
+                f"{self.path}: the images of {topic} are {message.encoding}; they must be "
+                f"{', '.join(kinds)}"
             )
         raw = np.asarray(message.data, dtype=np.uint8)
         if raw.size != message.height * message.step or message.step < message.width * size:
-            raise InputError(f"{self.path}: an image of {topic} has not the size that it claims")
+            raise InputError(f"{self.path}: an image of {topic} does not have its stated size")
         lines = raw.reshape(message.height, message.step)[:, : message.width * size]
         order = ">" if message.is_bigendian else "<"
         pixels = np.ascontiguousarray(lines).view(f"{order}u{size}")
@@ -138,8 +143,8 @@ class Log:
             skin = self.beside.get("skin", {})
             if "rows" not in skin or "cols" not in skin:
                 raise InputError(
-                    f"{self.path}: {topic} does not say its rows and columns; give them as "
-                    f'{{"skin": {{"rows": ..., "cols": ...}}}} in {self.path.stem}.json beside it'
+                    f"{self.path}: {topic} does not state its rows and columns; put them as "
+                    f'{{"skin": {{"rows": ..., "cols": ...}}}} into {self.path.stem}.json beside it'
                 )
             shape = [skin["rows"], skin["cols"]]
         if values.size != math.prod(shape):
@@ -155,14 +160,14 @@ class Log:
                 f"not {counts.dtype} {counts.shape}"
             )
         if counts.size and not 0 <= counts.min() <= counts.max() <= 65535:
-            raise InputError(f"{self.path}: {topic} has counts that are not 0 to 65535")
+            raise InputError(f"{self.path}: {topic} has counts outside 0 to 65535")
         return counts.astype(np.uint16)
 
     def recording(self) -> Recording:
-        """All that was taken in, in the order of time from 0; joint angles at the frames' times.
+        """The frames in the order of time, from 0, with joint angles at the frames' times.
 
         Raises:
-            InputError: there is no topic of frames, or several, or their shapes differ.
+            InputError: the log has no topic of frames or several, or the frames' shapes differ.
         """
         name, frames = self._only("frames", self._frames)
         if not frames:
@@ -196,65 +201,61 @@ class Log:
     def _angles(
         self, t: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64] | None, tuple[str, ...] | None]:
-        """Angles (n, dof) at the frames' times, and the joints' names where the log has them."""
+        """Angles (n, dof) at the frames' times, and the joints' names if the log has them."""
         topic, series = self._only("joints", self._joints)
         if not series:
             return None, None
-        found = tuple(series)
-        named = found != tuple(map(str, range(len(found))))
-        wanted = found
+        logged = tuple(series)
+        named = logged != tuple(map(str, range(len(logged))))
+        wanted = logged
         if self.arm is not None and named:
             wanted = self.arm.names
             try:
-                joint_columns(found, wanted)
+                joint_columns(logged, wanted)
             except InputError as error:
                 raise InputError(f"{self.path}: {topic} has {error}") from None
-            others = [name for name in found if name not in wanted]
+            others = [name for name in logged if name not in wanted]
             if others:
-                LOG.warning("%s: %s: not of the arm: %s", self.path, topic, ", ".join(others))
-        elif self.arm is not None and len(found) != self.arm.dof:
+                LOG.warning(f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}")
+        elif self.arm is not None and len(logged) != self.arm.dof:
             raise InputError(
-                f"{self.path}: {topic} has {len(found)} angles without names, but the arm has "
+                f"{self.path}: {topic} has {len(logged)} angles without names, but the arm has "
                 f"{self.arm.dof} joints"
             )
         first = max(min(series[name])[0] for name in wanted)
         last = min(max(series[name])[0] for name in wanted)
-        apart = max(first - t[0], t[-1] - last)
-        if apart > OLDEST_S:
+        gap_s = max(first - t[0], t[-1] - last)
+        if gap_s > OLDEST_S:
             LOG.warning(
-                "%s: %s leaves up to %.2f s of the frames without joint angles; the nearest are "
-                "held there",
-                self.path,
-                topic,
-                apart,
+                f"{self.path}: {topic} lacks joint angles for up to {gap_s:.2f} s of the frames; "
+                "the nearest ones are used"
             )
-        return np.stack([_at(t, series[name]) for name in wanted], axis=1), (
-            wanted if named else None
-        )
+        angles = np.stack([_at(t, series[name]) for name in wanted], axis=1)
+        return angles, wanted if named else None
 
     def _only(self, what: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
-        wanted = self.beside.get(f"{what}_topic")
-        if wanted is not None:
-            if not isinstance(wanted, str):
-                raise InputError(
-                    f"{self.path}: {what}_topic in {self.path.stem}.json must be a topic's name"
-                )
-            if wanted not in topics:
-                raise InputError(
-                    f"{self.path}: has no {what} on {wanted}; it has {sorted(topics) or 'none'}"
-                )
-            return wanted, topics[wanted]
-        if len(topics) > 1:
+        """The one topic of a kind with its messages, or the one that the JSON file names."""
+        name = self.beside.get(f"{what}_topic")
+        if name is None and len(topics) > 1:
             raise InputError(
-                f"{self.path}: {what} are on {', '.join(sorted(topics))}; name one as "
+                f"{self.path}: {what} are on {', '.join(sorted(topics))}; name one of them as "
                 f'"{what}_topic" in {self.path.stem}.json beside it'
             )
-        return next(iter(topics.items()), ("", ()))
+        if name is None:
+            return next(iter(topics.items()), ("", ()))
+        if not isinstance(name, str) or name not in topics:
+            raise InputError(
+                f"{self.path}: {what}_topic in {self.path.stem}.json must be one of "
+                f"{sorted(topics)}, not {shown(name)}"
+            )
+        return name, topics[name]
 
 
 def _at(t: NDArray[np.float64], series: list[tuple[float, float]]) -> NDArray[np.float64]:
-    """A joint's angle at times `t`, linear between messages; held before the first and after the
-    last. An angle that wraps at +-pi between two messages went the shorter way."""
+    """A joint's angles at times `t`: linear between messages, constant before and after them.
+
+    An angle that wraps at +-pi between two messages is taken to have gone the shorter way.
+    """
     at, angle = np.array(sorted(series)).T
     angles: NDArray[np.float64] = np.interp(t, at, np.unwrap(angle))
     return angles

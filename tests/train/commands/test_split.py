@@ -22,7 +22,7 @@ def test_each_contact_becomes_a_recording_with_its_own_labels(make_touch, tmp_pa
     each = [{"object": "one"}, {"object": "other"}]
     save(tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": each}))
     assert main(["split", str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 0
-    assert "2 recordings in" in capsys.readouterr().out
+    assert "recordings written to" in capsys.readouterr().out
     whole = contacts(two, ContactTracker(two.layout))
     for i, label in enumerate(("one", "other")):
         part = load(tmp_path / "out" / f"two-{i:02d}.npz")

@@ -6,7 +6,7 @@ import numpy as np
 
 from edge.recording import save
 from train.__main__ import main
-from train.commands.thresholds import found, proposed
+from train.commands.thresholds import count_contacts, proposed
 
 
 def noisy(recording, seed):
@@ -20,8 +20,8 @@ def test_the_proposal_lies_above_the_noise_and_finds_every_contact(make_touch):
     threshold, onset = proposed(trials)
     assert 70 <= threshold <= 80
     assert onset == round(1.5 * threshold)
-    assert found(trials, threshold, onset) == (6, 6)
-    assert found(trials, 60000, 60000) == (0, 0)
+    assert count_contacts(trials, threshold, onset) == (6, 6)
+    assert count_contacts(trials, 60000, 60000) == (0, 0)
 
 
 def test_a_few_recordings_that_begin_in_contact_do_not_raise_it(make_touch):
