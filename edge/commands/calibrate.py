@@ -137,7 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
             "unread": unread,
             "moving": moving,
         },
-        f"{arguments.skin}: calibrated from {seen} frames; the noise is {median:.1f} counts "
-        f"(median) to {largest:.1f} (largest). The old file is kept as {backup}.",
+        f"{arguments.skin}: calibrated from {seen} frames; noise in counts: median {median:.1f}, "
+        f"largest {largest:.1f}. The old file is kept as {backup}.",
     )
     return 0

@@ -65,13 +65,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--lead",
         type=within(float, 0.0, 60.0),
         default=LEAD_S,
-        help="seconds to keep from before onset (default: %(default)s)",
+        metavar="SECONDS",
+        help="time to keep from before onset (default: %(default)s)",
     )
     parser.add_argument(
         "--length",
         type=within(float, 0.1, 600.0),
         default=LENGTH_S,
-        help="seconds to keep after onset, at most (default: %(default)s)",
+        metavar="SECONDS",
+        help="longest time to keep after onset (default: %(default)s)",
     )
     parser.add_argument(
         "--dof", type=int, help="the number of angles in each line of --joints, without --arm"

@@ -42,7 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
         if check.row is not None:
             line |= {"worst_row": check.row, "seen": check.seen, "expected": check.expected}
         if not check.passed:
-            text += f"; the worst is row {check.row}: {check.seen} instead of {check.expected}"
+            seen, expected = (" ".join(str(x).split()) for x in (check.seen, check.expected))
+            text += f"; the worst is row {check.row}: {seen} instead of {expected}"
         output.event(line, text)
     failed = [check.name for check in checks if not check.passed]
     if FLOAT64 in failed:

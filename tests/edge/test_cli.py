@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from edge import __version__, cli
+from edge.__main__ import main as start
 from edge.errors import InputError
 from edge.skin import file as skinfile
 
@@ -25,7 +26,7 @@ def top(run):
 
 
 def raising(error):
-    def run(arguments):
+    def run(*arguments):
         raise error
 
     return run
@@ -121,8 +122,11 @@ def test_bad_input_is_one_sentence_and_exit_2(capsys):
     assert capsys.readouterr().err == "edge-classify: a.npz: no such file\n"
 
 
-def test_ctrl_c_is_exit_130_and_quiet(capsys):
+def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(capsys, monkeypatch):
     assert cli.dispatch(top(raising(KeyboardInterrupt())), []) == 130
+    monkeypatch.setattr(cli, "import_module", raising(KeyboardInterrupt()))
+    monkeypatch.setattr("sys.argv", ["edge-classify", "check", "skin.toml"])
+    assert start() == 130
     assert capsys.readouterr().err == ""
 
 
