@@ -23,9 +23,12 @@ if TYPE_CHECKING:
     from edge.skin.skin import Skin
 
 AS_TRAINED = "as_trained"
-"""Flag of a decision at distance 0 from a training trial: the coordinates of the two, which are all
-that the model compares, are the same to the last bit. Nearly always it is that trial, replayed;
-what was constant in training, or has no weight in the projection, may differ."""
+"""Flag of a decision at distance 0 from a training trial: the two have the same coordinates, which
+are all that the model compares. Nearly always the touch is that trial, replayed. Features that were
+constant in training, or have no weight in the projection, may differ."""
+OUT_OF_RANGE = "out_of_range"
+"""Flag of a decision on features that lie far outside those of the training trials. The model cuts
+them off before it compares them; features that it cannot scale at all get no label."""
 
 
 @dataclass
@@ -63,12 +66,11 @@ class Classifier:
     unlike everything in training; the label of the task with the most labels, such as the object,
     is then "unknown") and `unsure` (the window ended before the confidence was reached).
 
-    Flags of a decision: `tie` (another label had as many votes), `close` (two of the nearest
-    training trials are equally far but for rounding), `short` (the stream ended inside the window;
-    the last values were held), `missing_taxels` (taxels could not be read), `missing_pose` (joint
-    angles were absent in part of the window), `skin_motion` (motion was measured on the skin,
-    though the model's is in the world), `as_trained` (see `AS_TRAINED`) and `out_of_range` (there
-    is no label, as the features are too large to be measured against the training rows).
+    Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended inside
+    the window; the last values were held), `missing_taxels` (taxels could not be read),
+    `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
+    measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
+    `out_of_range` (see `OUT_OF_RANGE`).
 
     A task that was trained with recordings of no contact is decided by `finish` where there was
     none, flagged `no_contact` and at the time of the last frame; `missing_taxels` says that a
@@ -259,7 +261,7 @@ class Classifier:
             vector = feature_vector(contact.series(), window_s, info.samples, info.features)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
-            answers = [replace(one, flags=(*flags, "out_of_range")) for one in answers]
+            answers = [replace(one, flags=(*flags, OUT_OF_RANGE)) for one in answers]
         else:
             novel = self._novel(decision_point, decisions)
             found = [self._answer(waiting, one, decisions[one.task], novel) for one in answers]
@@ -289,7 +291,7 @@ class Classifier:
             novel: from `_novel`.
         """
         flags = (*none.flags, AS_TRAINED) if decision.distances[0] == 0.0 else none.flags
-        flags = (*flags, "close") if decision.close else flags
+        flags = (*flags, OUT_OF_RANGE) if decision.out_of_range else flags
         label, confidence = decision.label, decision.confidence
         if self.error is None:
             flags = (*flags, "tie") if decision.tie else flags

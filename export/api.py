@@ -27,8 +27,8 @@ from train.choosing import TRIAL, Chosen
 from train.dataset import NO_CONTACT, DataSet
 from train.evaluate import Result
 from train.fitting import Fitted
-from train.pipeline import Choice, ContactClassifier
-from train.projection import CLOSE_EIGENVALUES
+from train.pipeline import Choice, ContactClassifier, squared_distances
+from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
 from train.stopping import SequentialClassifier
 
 MISSING_SHARE = 0.02
@@ -242,14 +242,22 @@ def warnings(fitted: Fitted) -> list[str]:
                 f"{dropped} fewer than asked for"
             )
         rows = classifier.rows_[classifier.spaces_[task]][:, : classifier.components_[task]]
-        alike = told_by_order(rows, classifier.labels_[task])
-        if alike:
+        equal = told_by_order(rows, classifier.labels_[task])
+        if equal:
             lines.append(
-                f"warning: {task}: {alike} trials equal one of another label in all that the model "
+                f"warning: {task}: {equal} trials equal one of another label in all that the model "
                 "looks at; of equal trials the one that was read first counts as nearer, so their "
                 "order decides the label"
             )
-        gap = classifier.projections_[classifier.spaces_[task]].gap_
+        projection = classifier.projections_[classifier.spaces_[task]]
+        steps, farthest = coarseness(rows, projection.grid_.unit)
+        if steps < FEWEST_UNITS:
+            lines.append(
+                f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps "
+                f"of another one, since {dataset.trials[farthest].path} lies far outside all "
+                "others; leave it out if its recording is wrong"
+            )
+        gap = projection.gap_
         if gap < CLOSE_EIGENVALUES:
             lines.append(
                 f"warning: {task}: two components explain the same variance to within {gap:.1e}; "
@@ -264,6 +272,24 @@ def told_by_order(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
     labels_of = np.zeros((len(rows), int(labels.max()) + 1), dtype=bool)
     labels_of[group.ravel(), labels] = True
     return int((labels_of.sum(axis=1) > 1)[group.ravel()].sum())
+
+
+def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
+    """How coarse a model's grid is for its trials, by at most a thousand of them.
+
+    Args:
+        rows: (n, c) projected trials.
+        unit: of their coordinates.
+
+    Returns:
+        The median distance, in units, from a trial to the nearest one that differs from it;
+        infinite where all are equal. And the number of the trial that lies farthest out.
+    """
+    some = rows[:: -(-len(rows) // 1000)]
+    squares = squared_distances(some, rows)
+    squares[squares == 0.0] = np.inf
+    nearest = float(np.sqrt(np.median(squares.min(axis=1)))) if rows.size else np.inf
+    return nearest / unit, int(squared_distances(rows, np.zeros_like(rows[:1])).argmax())
 
 
 def told_by_posture(dataset: DataSet, task: str) -> float:

@@ -1,22 +1,21 @@
-"""Nodes and constants of an ONNX graph, and the projection that all its parts share."""
+"""Nodes and constants of an ONNX graph, and the projection of `train.projection` as its nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import onnx
 from numpy.typing import NDArray
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, numpy_helper
 
-from train.projection import FINE, RoundingGrid
+from train.projection import MOST_STEPS, Projection
 
 OPSET = 18
 
 
 class Builder:
-    """Nodes and constants of a graph under construction, either the main one or a branch.
+    """Nodes and constants of a graph under construction.
 
     Attributes:
         decision_point: name of the scalar that says which decision point is asked for; unused
@@ -28,7 +27,6 @@ class Builder:
         self.decision_point = decision_point
         self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
         self._made: dict[tuple[Any, ...], str] = {}
-        self._branch: list[onnx.NodeProto] | None = None
 
     def constant(self, value: Any, dtype: Any = np.float64) -> str:
         """Name of a constant; equal ones are stored once."""
@@ -46,14 +44,17 @@ class Builder:
         return self.constant(values, np.int64)
 
     def by_decision_point(self, values: Sequence[Any], dtype: Any = np.float64) -> str:
-        """Name of the stacked constants' value at the decision point that is asked for."""
-        if len(values) == 1:
+        """Name of the constant's value at the decision point that is asked for."""
+        if all(np.array_equal(value, values[0]) for value in values):
             return self.constant(values[0], dtype)
         stack = self.constant(np.stack(values), dtype)
         return self.node("Gather", [stack, self.decision_point], axis=0)
 
     def by_decision_point_small(self, values: Sequence[Any]) -> str:
-        """As `by_decision_point`; in half the memory where float32 holds the numbers exactly."""
+        """As `by_decision_point`, stored in float32 where that holds all values exactly.
+
+        A single value stays float64: to convert it in each decision would take longer.
+        """
         with np.errstate(over="ignore"):
             small = [np.asarray(value).astype(np.float32) for value in values]
         if len(values) == 1 or not np.array_equal(small, values):
@@ -67,12 +68,11 @@ class Builder:
         return self.node("Gather", [x, self.constant(columns, np.int64)], axis=1)
 
     def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
-        """Add an operator of one output and return its name; of equal ones, one is enough."""
+        """Add an operator of one output and return its name; an equal one is not added again."""
         key = (operator, *inputs, *sorted(attributes.items()))
-        made = self._made if self._branch is None else {}
-        if output or key not in made:
-            made[key] = self.nodes(operator, inputs, [output], **attributes)[0]
-        return made[key]
+        if output or key not in self._made:
+            self._made[key] = self.nodes(operator, inputs, [output], **attributes)[0]
+        return self._made[key]
 
     def nodes(
         self, operator: str, inputs: list[str], outputs: list[str], **attributes: Any
@@ -80,87 +80,52 @@ class Builder:
         """Add an operator; an output named "" gets a name of its own."""
         names = [o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs]
         label = self._scope.get_unique_operator_name(operator)
-        if self._branch is not None:
-            self._branch.append(helper.make_node(operator, inputs, names, name=label, **attributes))
-        else:
-            self._container.add_node(
-                operator, inputs, names, op_version=OPSET, name=label, **attributes
-            )
+        self._container.add_node(
+            operator, inputs, names, op_version=OPSET, name=label, **attributes
+        )
         return names
 
-    def branch(self, name: str, outputs: dict[str, tuple[Any, int]], make: Any) -> onnx.GraphProto:
-        """The graph of what `make()` adds; it returns the outputs' names in order.
+    def clipped(self, x: str, limits: Sequence[float]) -> tuple[str, str]:
+        """Whole numbers (n, m) cut off at plus and minus a limit for each decision point.
 
-        Args:
-            name: of the graph.
-            outputs: {name: (tensor type, number of axes)}.
-            make: adds nodes to this builder.
+        Returns:
+            Names of the numbers, and of the sum (n, 1) of what was cut off, which is 0 within the
+            limits and not finite where a number is not.
         """
-        self._branch = []
-        made = make()
-        inside = {output for node in self._branch for output in node.output}
-        infos = []
-        for seen, (wanted, (kind, axes)) in zip(made, outputs.items(), strict=True):
-            if seen not in inside:
-                seen = self.node("Identity", [seen], self._scope.get_unique_variable_name(wanted))
-            infos.append(helper.make_tensor_value_info(seen, kind, [None] * axes))
-        nodes, self._branch = self._branch, None
-        return helper.make_graph(nodes, name, [], infos)
+        low, high = (self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0))
+        inside = self.node("Clip", [x, low, high])
+        rest = self.node("Sub", [x, inside])
+        return inside, self.node("ReduceL1", [rest, self.ints(1)], keepdims=1)
 
 
-class Affine(Protocol):
-    """What `project` reads of a `train.projection.Projection`, or of several stacked."""
-
-    mean_: NDArray[np.float64]
-    gain_: NDArray[np.float64]
-    grid_: RoundingGrid
-    weights_: NDArray[np.float64]
-
-
-def project(
-    build: Builder, x: str, decision_points: Sequence[Affine], reach: str = ""
-) -> tuple[str, str]:
-    """Features (n, p) to coordinates (n, c); see `train.projection.Projection`.
-
-    Gains and weights carry the grid's unit, a power of two: no bit of a coordinate changes.
+def project(build: Builder, x: str, decision_points: Sequence[Projection]) -> tuple[str, str]:
+    """Nodes that take features (n, p) to whole coordinates; see `train.projection.Projection`.
 
     Args:
         build: takes the nodes.
         x: name of the features.
         decision_points: a projection for each.
-        reach: name to give to the second result.
 
     Returns:
-        The coordinates, and (n,) the length of the scaled differences in units of the grid.
+        Names of the coordinates (n, c) in the grid's units, and of how much was cut off to get
+        them (n, 1): 0 within the training set's reach, not finite where a feature is not.
     """
+    grids = [p.grid_ for p in decision_points]
     d = build.node("Sub", [x, build.by_decision_point([p.mean_ for p in decision_points])])
-    for factors in _gains(decision_points):
-        d = build.node("Mul", [d, build.by_decision_point(factors)])
-    length = build.node("ReduceL2", [d, build.ints(1)], reach, keepdims=0)
-    high = build.node("Round", [d])
-    fine = build.constant(FINE)
-    low = build.node("Sub", [build.node("Add", [build.node("Sub", [d, high]), fine]), fine])
-    weights = build.by_decision_point_small(
-        widened([p.weights_ * p.grid_.unit for p in decision_points])
-    )
-    halves = [build.node("MatMul", [half, weights]) for half in (high, low)]
-    return build.node("Add", halves), length
-
-
-def _gains(decision_points: Sequence[Affine]) -> list[list[Any]]:
-    """Gains over the grids' units; one after the other where float64 holds no quotient."""
-    units = [p.grid_.unit for p in decision_points]
-    with np.errstate(over="ignore"):
-        gains = [p.gain_ / unit for p, unit in zip(decision_points, units, strict=True)]
-    if np.isfinite(gains).all():
-        return [gains]
-    return [[p.gain_ for p in decision_points], [1.0 / unit for unit in units]]
+    gains = [p.gain_ / p.grid_.step for p in decision_points]
+    steps = build.node("Round", [build.node("Mul", [d, build.by_decision_point(gains)])])
+    steps, far = build.clipped(steps, [MOST_STEPS] * len(grids))
+    # A step over a unit is a power of two, so that the products' sums are still exact.
+    weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
+    product = build.node("MatMul", [steps, build.by_decision_point_small(widened(weights))])
+    z, farther = build.clipped(build.node("Round", [product]), [grid.limit for grid in grids])
+    return z, build.node("Add", [far, farther])
 
 
 def widened(arrays: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Arrays with columns of zeros added up to the widest: coordinates that are always 0."""
-    most = max(array.shape[-1] for array in arrays)
+    """Arrays with columns of zeros added up to the widest, for coordinates that are always 0."""
+    widest = max(array.shape[-1] for array in arrays)
     return [
-        np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, most - array.shape[-1])])
+        np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, widest - array.shape[-1])])
         for array in arrays
     ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.model import Model
-from edge.model.verify import SINGLE_BITS, first_series, outputs, parts
+from edge.model.verify import first_series, outputs, outputs_at_points, parts
 from edge.recording import Recording, save_arrays
 from edge.touch.features import feature_vector
 from train.dataset import DataSet
@@ -18,24 +18,17 @@ TRIALS = 24
 """Trials whose frames a golden file holds."""
 VECTORS = 256
 """Feature vectors beyond the trials' own."""
-TWINS = 8
-"""Pairs of vectors that float32 takes for one."""
-APART = 2.0**-34
-"""By what part of itself the second one of a pair is larger."""
-
 BOUNDS = {
     "scores": 1e-15,
-    "distances": 1e-12,
-    "next": 1e-12,
     "label_distances": 1e-12,
     "features": 1e-12,
     "time_s": 1e-9,
 }
-"""Scores are quotients of small integers, correctly rounded everywhere. A distance sums at most 20
-squares of coordinates that are the same bits everywhere: its relative error is below
-22 * 2^-53 = 2.4e-15. Features are interpolated in a few operations, and motion passes through
-sines and cosines that differ by an ulp between C libraries: below 100 ulp of metres. The bounds
-leave a factor of 40 and more."""
+"""Scores are quotients of small integers, correctly rounded everywhere. A label's distance is the
+mean of whole numbers whose sum may exceed 2^53 where a vector lies outside the training set: its
+relative error is then below 2^-46. Features are interpolated in a few operations, and motion passes
+through sines and cosines that differ by an ulp between C libraries: below 100 ulp of metres. The
+bounds leave a factor of 40 and more."""
 
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:
@@ -65,30 +58,20 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     )
 
 
-def paired(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2 n, width) vectors rounded to float32's bits, each followed by one a little larger.
-
-    An engine that computes in float32 cannot tell the two apart; see `edge.model.verify.twins`.
-    """
-    mantissas, exponents = np.frexp(vectors)
-    rounded = np.ldexp(np.rint(np.ldexp(mantissas, SINGLE_BITS)), exponents - SINGLE_BITS)
-    return np.stack([rounded, rounded * (1.0 + APART)], axis=1).reshape(-1, vectors.shape[1])
-
-
 def wanted(model: Model) -> list[tuple[str, str]]:
-    """(task, part) of all that the model says."""
+    """(task, part) of each output of the model."""
     return [(task, part) for task in model.info.tasks for part in parts(model)]
 
 
 def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
-    """Run the exported model on trials and vectors, and store what it gave.
+    """Run the exported model on trials and vectors, and store its outputs.
 
     Vectors are the trials' own, training vectors (distance exactly 0), others between and
-    beyond them, pairs that float32 takes for one, and two that are not finite (label -1).
+    beyond them, and two that are not finite (label -1).
     """
     info = model.info
     pieces: list[Recording] = []
-    found: list[tuple[float, Any]] = []
+    contacts: list[tuple[float, Any]] = []
     for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
         part = trimmed(trial.recording, trial.onset_s, model)
@@ -96,10 +79,10 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         if series is None:
             continue
         pieces.append(part)
-        found.append(series)
+        contacts.append(series)
     rng = np.random.default_rng(20120101)
     own = np.stack(
-        [feature_vector(s, info.window_s, info.samples, info.features) for _, s in found]
+        [feature_vector(s, info.window_s, info.samples, info.features) for _, s in contacts]
     )
     rows = X[rng.permutation(len(X))[: VECTORS // 2]]
     pairs = rng.integers(0, len(X), (VECTORS // 2, 2))
@@ -107,26 +90,28 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     mixed = X[pairs[:, 0]] + weight * (X[pairs[:, 1]] - X[pairs[:, 0]])
     wrong = np.repeat(own[:1], 2, axis=0)
     wrong[0, 5], wrong[1, -1] = np.nan, np.inf
-    vectors = np.concatenate([own, rows, mixed, paired(mixed[:TWINS]), wrong])
+    vectors = np.concatenate([own, rows, mixed, wrong])
     arrays: dict[str, NDArray[Any]] = {
         "start": np.cumsum([0, *(len(p.t) for p in pieces)]),
         "t": np.concatenate([p.t for p in pieces]),
         "frames": np.concatenate([p.frames for p in pieces]),
         "valid": np.concatenate([p.valid for p in pieces if p.valid is not None]),
-        "onset_s": np.array([onset for onset, _ in found]),
-        "series_start": np.cumsum([0, *(len(s.t) for _, s in found)]),
-        "series_t": np.concatenate([s.t for _, s in found]),
-        "series_counts": np.concatenate([s.integers for _, s in found]),
+        "onset_s": np.array([onset for onset, _ in contacts]),
+        "series_start": np.cumsum([0, *(len(s.t) for _, s in contacts)]),
+        "series_t": np.concatenate([s.t for _, s in contacts]),
+        "series_counts": np.concatenate([s.integers for _, s in contacts]),
         "vectors": vectors,
     }
     if info.dof is not None:
         arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
     answers = outputs(model, vectors)
-    arrays |= {f"{task}_{what}": answers[f"{task}_{what}"] for task, what in wanted(model)}
+    arrays |= {f"{task}_{part}": answers[f"{task}_{part}"] for task, part in wanted(model)}
     if info.decision_points_s:
         arrays["decision_point_vectors"] = at_decision_points = np.stack(
             [
-                np.stack([feature_vector(s, window, info.samples, info.features) for _, s in found])
+                np.stack(
+                    [feature_vector(s, window, info.samples, info.features) for _, s in contacts]
+                )
                 for window in info.decision_points_s
             ]
         )
@@ -135,14 +120,10 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         arrays["decision_point_vectors"] = at_decision_points = np.concatenate(
             [at_decision_points, between], axis=1
         )
-        seen = [
-            outputs(model, rows, decision_point)
-            for decision_point, rows in enumerate(at_decision_points)
-        ]
-        for task, what in wanted(model):
-            arrays[f"{task}_decision_point_{what}"] = np.stack(
-                [one[f"{task}_{what}"] for one in seen]
-            )
+        seen = outputs_at_points(model, at_decision_points)
+        arrays |= {
+            f"{task}_decision_point_{part}": seen[f"{task}_{part}"] for task, part in wanted(model)
+        }
     bounds = {
         key: bound
         for key, bound in BOUNDS.items()

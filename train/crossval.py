@@ -17,8 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.distance import running_squares
-from train.projection import RoundingGrid, Spectrum, on_grid
+from train.projection import Grid, Spectrum, on_grid
 from train.scaling import centred_and_scaled
 
 MAX_COMPONENTS = 20
@@ -56,13 +55,15 @@ def split_neighbours(
     """
     mean, gain, known = centred_and_scaled(X[train], scaling, features)
     axes = Spectrum(known).leading(max_components)
-    exact, weights = RoundingGrid(np.abs(known).max(initial=0.0)), on_grid(axes.T)
-    references = exact.project(known, weights)
-    queries = exact.project((X[test] - mean) * gain, weights)
+    weights, grid = on_grid(axes.T), Grid.of(known, len(axes))
+    references = grid.project(known, weights)
+    queries = grid.project((X[test] - mean) * gain, weights)
     rows = np.empty((len(test), max_components, max_k), dtype=np.int64)
     used = len(axes)
     for near, query in zip(rows, queries, strict=True):
-        order = _nearest(running_squares(references, query), max_k)
+        # Sums of squares by the first 1, 2, ... components: exact, as all coordinates are whole.
+        squares = np.cumsum((references - query).T ** 2, axis=0)
+        order = _nearest(squares, max_k)
         near[:used] = train[order]
         near[used:] = train[order[-1]] if used else train[:max_k]
     return rows

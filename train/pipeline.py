@@ -1,7 +1,7 @@
 """Nearest neighbours, and all tasks of a model together.
 
-A fitted `ContactClassifier` finds the neighbours that its ONNX graph finds: both measure by
-`train.distance`. `export/graph.py` writes the graph down.
+A fitted `ContactClassifier` finds the neighbours that its ONNX graph finds: coordinates are whole
+numbers, and their squared distances are exact. `export/graph.py` writes the graph down.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.distance import squared_distances
 from train.projection import Projection
 from train.scaling import widths_of
 
@@ -39,12 +39,18 @@ def vote(labels: NDArray[np.int64], classes: int) -> tuple[NDArray[np.int64], ND
     return labels[np.arange(n), nearest], votes / k
 
 
+def squared_distances(X: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, n) squared distances of points X (m, c) to rows (n, c); exact for those of a `Grid`."""
+    return (
+        np.asarray(cdist(X, rows, "sqeuclidean")) if X.shape[1] else np.zeros((len(X), len(rows)))
+    )
+
+
 class NearestNeighbours(ClassifierMixin, BaseEstimator):
     """k nearest neighbours under the project's rules.
 
-    Euclidean distance taken directly (never by the expanded form, which cancels); majority
-    vote; a tie goes to the nearest neighbour among the tied; equal distances go to the earlier
-    training row.
+    Euclidean distance; majority vote; a tie goes to the nearest neighbour among the tied; equal
+    distances go to the earlier training row.
 
     Args:
         k: neighbours that vote, at most the training rows.
@@ -64,13 +70,9 @@ class NearestNeighbours(ClassifierMixin, BaseEstimator):
     def kneighbors(self, X: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Distances and rows (m, k) of the neighbours of X (m, c), nearest first."""
         check_is_fitted(self)
-        distances = np.empty((len(X), self.k))
-        rows = np.empty((len(X), self.k), dtype=np.int64)
-        for i, x in enumerate(np.asarray(X, dtype=np.float64)):
-            squares = squared_distances(self.rows_, x)
-            rows[i] = np.argsort(squares, kind="stable")[: self.k]
-            distances[i] = np.sqrt(squares[rows[i]])
-        return distances, rows
+        squares = squared_distances(np.asarray(X, dtype=np.float64), self.rows_)
+        rows = np.argsort(squares, axis=1, kind="stable")[:, : self.k]
+        return np.sqrt(np.take_along_axis(squares, rows, axis=1)), rows
 
     def predict(self, X: NDArray[np.float64]) -> NDArray[np.str_]:
         """(m,) labels."""
@@ -209,10 +211,9 @@ class ContactClassifier:
         return nearest.kneighbors(self.project(space, X)[:, :c])
 
     def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, n) squared distances of vectors (m, p) to all training trials, taken directly."""
+        """(m, n) squared distances of vectors (m, p) to all training trials."""
         space, c = self.spaces_[task], self.components_[task]
-        rows = self.rows_[space][:, :c]
-        return np.stack([squared_distances(rows, z) for z in self.project(space, X)[:, :c]])
+        return squared_distances(self.project(space, X)[:, :c], self.rows_[space][:, :c])
 
     def predict(self, X: NDArray[np.float64]) -> dict[str, NDArray[np.str_]]:
         """{task: (m,) labels} for vectors (m, p)."""

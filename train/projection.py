@@ -1,12 +1,14 @@
-"""Projection of scaled feature vectors, as a scikit-learn transformer.
+"""Projection of scaled feature vectors to a few whole-number coordinates.
 
-A fitted `Projection` gives the coordinates of the ONNX graph, to the bit where sums are exact (see
-there); `export/build.py` writes it down.
+All arithmetic after the scaling is in whole numbers that float64 holds exactly, so every machine
+and every engine gives the same bits in any order of summation. `export/build.py` writes a fitted
+`Projection` down as ONNX operators.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,15 +20,21 @@ from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.scaling import centred_and_scaled, column_means
 
-WEIGHT_BITS = 20
-"""Components of up to 128 columns are multiples of 2 ** -WEIGHT_BITS; see `Projection`."""
-HALF_BITS = 26
-FINE = 1.5 * 2.0 ** (52 - HALF_BITS)
-"""Added and taken away again, it rounds to 2^-`HALF_BITS`."""
-MOST_COLUMNS = 1 << 12
-"""Beyond them too few bits are left for the components."""
-RANGE = 4.0
-"""How far beyond the training set's range a query may lie and still be projected exactly."""
+FEATURE_BITS = 22
+"""Of the largest scaled difference from the mean in training."""
+RANGE = 4
+"""A query's differences are cut off at this many times 2^`FEATURE_BITS` steps, which is 4 to 8
+times the training set's largest difference."""
+MOST_STEPS = RANGE * 2.0**FEATURE_BITS
+WEIGHT_BITS = 24
+"""Of the largest weight at most: float32 holds them exactly."""
+COORDINATE_BITS = 22
+"""Of the longest training row at most."""
+EXACT_BITS = 53
+"""Whole numbers up to 2^`EXACT_BITS` are exact in float64."""
+FEWEST_UNITS = 256
+"""Median distance from a training row to its nearest other, in units of the coordinates' grid,
+below which one row far outside leaves too few steps to tell the others apart."""
 CLOSE_EIGENVALUES = 1e-6
 WELL_CONDITIONED = 1e-8
 """Variance, as a part of the largest, down to which eigenvectors of a covariance are trusted."""
@@ -177,65 +185,99 @@ class Spectrum:
         return np.asarray(directions / np.sqrt(variance))
 
 
-def check_columns(columns: int) -> None:
-    """Raise InputError where feature vectors are too long for a `Projection`."""
-    if columns > MOST_COLUMNS:
-        raise InputError(
-            f"{columns} values a trial are more than the {MOST_COLUMNS} that a projection "
-            "adds up exactly; take fewer features or samples"
-        )
-
-
 def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights (p, c) rounded so that `Projection` adds up their products exactly.
+    """Weights (p, c) rounded to whole multiples of one power of two.
 
-    Each column is a multiple of its own power of two, 2^-`WEIGHT_BITS` of its largest entry with
-    up to 128 rows; each doubling of the rows costs one bit.
+    The multiples of a column add up to less than 2^29 in absolute value, since by Cauchy and
+    Schwarz they are at most sqrt(p) times its length. Their products with features of up to
+    `MOST_STEPS` = 2^24 therefore add up to less than 2^53: exactly. Principal
+    components have length 1, so their grid does not depend on how many of them there are.
     """
-    lost = max(0, (len(weights) - 1).bit_length() - 7)
-    largest = np.abs(weights).max(axis=0, initial=0.0)
-    above = np.ceil(np.log2(largest, out=np.zeros_like(largest), where=largest > 0.0))
-    powers = WEIGHT_BITS - lost - above.astype(np.int32)
-    return np.ascontiguousarray(np.ldexp(np.rint(np.ldexp(weights, powers)), -powers))
+    p = max(len(weights), 1)
+    most = 2.0**EXACT_BITS / MOST_STEPS
+    bits = min(WEIGHT_BITS, int(np.floor(np.log2((most - p) / np.sqrt(p)))))
+    length = np.sqrt((weights**2).sum(axis=0)).max(initial=0.0)
+    # A length of 1 may be rounded up a little.
+    power = bits - int(np.ceil(np.log2(length) - 1e-9)) if length > 0.0 else bits
+    rounded = np.rint(np.ldexp(weights, power))
+    if np.abs(rounded).sum(axis=0).max(initial=0.0) >= most:
+        raise ValueError("the weights' products with features would not add up exactly")
+    return np.ascontiguousarray(np.ldexp(rounded, -power))
 
 
-class RoundingGrid:
-    """Differences from a mean, split so that their products with weights add up exactly.
+def coordinate_bits(components: int) -> int:
+    """Bits of coordinates whose squared distances stay below 2^`EXACT_BITS`.
 
-    The high half is a whole number of units, the low half what is left in units of `FINE`.
+    A training row b is at most 2^bits long; each of a query's c coordinates q is clipped at twice
+    that. Then (|b| + |q|)^2 <= (1 + 2 sqrt(c))^2 2^(2 bits). A hundredth is left for b's rounding.
+    """
+    spread = 1.01 * (1.0 + 2.0 * np.sqrt(components)) ** 2
+    return min(COORDINATE_BITS, int((EXACT_BITS - np.log2(spread)) / 2.0))
 
-    Args:
-        largest: of the training set's differences, in absolute value.
+
+def _power_of_two(value: float) -> float:
+    """The smallest power of two that is not below a value; 1 for 0."""
+    return float(2.0 ** np.ceil(np.log2(value))) if value > 0.0 else 1.0
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Steps of features and of coordinates, all powers of two.
 
     Attributes:
-        unit: a power of two. Differences up to 2^`HALF_BITS` of it are added up exactly.
+        step: scaled differences from the mean are rounded to its multiples.
+        unit: coordinates are rounded to its multiples.
+        bits: no training row is longer than 2^bits units.
     """
 
-    def __init__(self, largest: float) -> None:
-        exponent = int(np.ceil(np.log2(RANGE * largest))) if largest > 0.0 else 0
-        self.unit = 2.0 ** (exponent - HALF_BITS)
+    step: float
+    unit: float
+    bits: int
+
+    @classmethod
+    def of(
+        cls, d: NDArray[np.float64], components: int, projected: NDArray[np.float64] | None = None
+    ) -> Grid:
+        """The grid for training rows.
+
+        Args:
+            d: (n, p) their scaled differences from the mean.
+            components: number of coordinates.
+            projected: (n, c) their coordinates; None for principal components, along which
+                rows are at most as long as d, whatever the number of components.
+        """
+        largest, bits = float(np.abs(d).max(initial=0.0)), coordinate_bits(components)
+        rows = d if projected is None else projected
+        longest = float(np.sqrt((rows**2).sum(axis=1)).max(initial=0.0))
+        return cls(
+            _power_of_two(largest) * 2.0**-FEATURE_BITS, _power_of_two(longest) * 2.0**-bits, bits
+        )
+
+    @property
+    def limit(self) -> float:
+        """Units at which a query's coordinates are clipped."""
+        return float(2.0 ** (self.bits + 1))
 
     def project(self, d: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates (n, c) of differences (n, p) by weights (p, c) of `on_grid`."""
-        d = d / self.unit
-        high = np.rint(d)
-        low = ((d - high) + FINE) - FINE
-        return np.asarray((high @ weights + low @ weights) * self.unit)
+        """Coordinates (n, c), multiples of `unit`, of differences (n, p) by weights of `on_grid`.
+
+        Differences and coordinates outside the training set's reach are clipped.
+        """
+        steps = np.clip(np.rint(d / self.step), -MOST_STEPS, MOST_STEPS)
+        units = np.rint(steps @ (weights * (self.step / self.unit)))
+        return np.asarray(np.clip(units, -self.limit, self.limit) * self.unit)
 
 
 class Projection(TransformerMixin, BaseEstimator):
-    """Features to a few coordinates, the same bits on every machine up to `RANGE`.
+    """A few whole-number coordinates of feature vectors, the same bits on every machine.
 
-    Each column's mean is subtracted and its feature type's gain multiplied. The directions are
-    principal components, or the discriminants of the labels (`Spectrum.discriminants`).
+    Each column's mean is subtracted and its feature type's gain multiplied. The result is rounded
+    to 22 bits, multiplied with weights of at most 24 bits, and the sums, which are exact, are
+    rounded to 22 bits (`Grid`, `on_grid`). The directions are principal components, or the
+    discriminants of the labels (`Spectrum.discriminants`).
 
-    A feature's difference d from its training mean, scaled, is split into a high and a low half
-    of `HALF_BITS` bits each on a fixed grid, and weights are on a grid too (`on_grid`). Each
-    product then has at most 53 - 7 bits and sums of up to 128 of them are exact, in any order,
-    with or without fused multiply-add: a query that equals a training row lies at distance
-    exactly 0, in any batch, on any processor. Each doubling of the columns beyond 128 costs the
-    weights one bit. What is cut off lies 2^-52 below the range of the training set. Queries more
-    than `RANGE` times outside it are projected with ordinary rounding.
+    Two vectors that differ by less than a step, about 1e-6 of a deviation, may get the same
+    coordinates. A vector far outside the training set's reach is clipped.
 
     Args:
         scaling: one of `train.scaling.SCALINGS`.
@@ -249,8 +291,8 @@ class Projection(TransformerMixin, BaseEstimator):
     Attributes:
         mean_: (p,) subtracted first.
         gain_: (p,) multiplied next.
-        grid_: what the differences are split by.
-        weights_: (p, c).
+        grid_: steps of features and coordinates.
+        weights_: (p, c), of `on_grid`.
         rank_: how many coordinates there could be.
         gap_: smallest relative gap of squared singular values at any cut up to c; 1 of `lda`.
     """
@@ -277,17 +319,17 @@ class Projection(TransformerMixin, BaseEstimator):
         The discriminants of several tasks stand side by side.
 
         Raises:
-            InputError: the columns are too many, or their scale is beyond what distances hold;
-                the kind is unknown, or needs labels.
+            InputError: the scale of the features is beyond what distances hold; the kind is
+                unknown, or needs labels.
         """
         X = np.asarray(X, dtype=np.float64)
-        check_columns(X.shape[1])
         self.n_features_in_ = X.shape[1]
         self.mean_, self.gain_, d = centred_and_scaled(X, self.scaling, self.features, self.widths)
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
-        self.grid_ = RoundingGrid(float(np.abs(d).max(initial=0.0)))
+        projected = d @ self.weights_ if self.kind == "lda" else None
+        self.grid_ = Grid.of(d, self.weights_.shape[1], projected)
         return self
 
     def _axes(
@@ -310,7 +352,7 @@ class Projection(TransformerMixin, BaseEstimator):
         return np.hstack(parts), 1.0
 
     def transform(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates (n, c) of vectors (n, p)."""
+        """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
         check_is_fitted(self)
         d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_
         return self.grid_.project(d, self.weights_)

@@ -16,7 +16,7 @@ from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
 
 METADATA_KEY = "edge-classify"
-FORMAT = 3
+FORMAT = 4
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,6 @@ class Task:
         features: those that it takes, in the order of the model's; all where empty.
         left_out: what the accuracy left out as a whole: "trial", or a label such as "object".
         no_contact: the answer where a recording ends without a contact, or None.
-        resolution: two distances that differ by no more than the first number, plus the second
-            times the distance, may be in either order: they are known no better.
     """
 
     labels: tuple[str, ...]
@@ -46,7 +44,6 @@ class Task:
     features: tuple[str, ...] = ()
     left_out: str = "trial"
     no_contact: str | None = None
-    resolution: tuple[float, ...] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -118,7 +115,7 @@ class ModelInfo:
         if self.decision_points_s and self.novelty is not None:
             calibration = {
                 "decision_points_s": self.decision_points_s,
-                "stopping": {task: one.to_dict() for task, one in self.stopping.items()},
+                "stopping": {task: rules.to_dict() for task, rules in self.stopping.items()},
                 "novelty": self.novelty.to_dict(),
             }
         return json.dumps(
@@ -233,7 +230,6 @@ def _task(table: ConfigTable) -> Task:
         features=table.texts("features"),
         left_out=table.text("left_out"),
         no_contact=table.text("no_contact") if table.has("no_contact") else None,
-        resolution=table.numbers("resolution", 2, low=0.0),
     )
     table.done()
     return task

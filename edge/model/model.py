@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,12 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from edge.errors import EdgeError, InputError
 from edge.files import open_regular, parsing
-from edge.model import onnx_file as onnxfile
+from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 
 LARGEST_BYTES = 1 << 30
-EXACT_REACH = 2.0**26
-"""Up to this `reach` the graph adds up coordinates without rounding."""
 
 
 class Decision(NamedTuple):
@@ -38,8 +35,8 @@ class Decision(NamedTuple):
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) mean squared distance to the nearest (up to three) training
             trials of each label, of a model with decision points; see `edge.model.stopping`.
-        close: two of the neighbours, or the last of them and the next trial, are so nearly
-            equally far that exact arithmetic may have them in another order.
+        out_of_range: the features lie so far outside those of the training trials that the model
+            cut them off; see `train.projection.Grid`.
     """
 
     label: str
@@ -49,7 +46,7 @@ class Decision(NamedTuple):
     neighbours: NDArray[np.int64]
     tie: bool
     label_distances: NDArray[np.float64] | None = None
-    close: bool = False
+    out_of_range: bool = False
 
 
 class Model:
@@ -70,14 +67,16 @@ class Model:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         """Load the file."""
         name = os.fspath(path)
-        contents, checked = _contents(name)
+        contents, stat = _contents(name)
         text = contents.metadata.get(METADATA_KEY)
         if text is None:
             raise InputError(
                 f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
             )
         self.path = name
+        # An older format is named before its operators, which are others.
         self.info = ModelInfo.from_json(text, name)
+        onnx_file.check(contents, name)
         runtime = _onnxruntime()
         options = runtime.SessionOptions()
         # One thread is fastest for models of this size.
@@ -95,7 +94,7 @@ class Model:
             raise InputError(
                 f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
             ) from None
-        if not _is(name, checked):
+        if not _is(name, stat):
             raise InputError(f"{name}: was changed while it was read; start again")
         self._check(name)
         self._names = [output.name for output in self._session.get_outputs()]
@@ -111,11 +110,6 @@ class Model:
             )
             for output in self._session.get_outputs()
         }
-        # A task's distances and the next one lie side by side, and are read at once.
-        near = {task: np.zeros((1, entry.k + 1)) for task, entry in self.info.tasks.items()}
-        for task, entry in self.info.tasks.items():
-            outputs[f"{task}_distances"] = near[task][:, : entry.k]
-            outputs[f"{task}_next"] = near[task][:, entry.k :]
         self._binding = self._session.io_binding()
         value = runtime.OrtValue.ortvalue_from_numpy
         self._binding.bind_ortvalue_input("features", value(self._input))
@@ -127,16 +121,15 @@ class Model:
             _Answer(
                 task,
                 entry.labels,
-                entry.resolution,
                 outputs[f"{task}_label"],
                 outputs[f"{task}_scores"][0],
-                near[task][0],
+                outputs[f"{task}_distances"][0],
                 outputs[f"{task}_neighbours"][0],
                 outputs[f"{task}_label_distances"][0] if self.info.decision_points_s else None,
             )
             for task, entry in self.info.tasks.items()
         ]
-        self._reach = outputs["reach"]
+        self._out_of_range = outputs["out_of_range"]
 
     def _check(self, name: str) -> None:
         inputs = self._session.get_inputs()
@@ -157,11 +150,10 @@ class Model:
                 "export it again"
             )
         outputs = {output.name: output.shape for output in self._session.get_outputs()}
-        widths: dict[str, list[int]] = {"reach": []}
+        widths: dict[str, list[int]] = {"out_of_range": []}
         for task, entry in self.info.tasks.items():
             widths |= {f"{task}_label": [], f"{task}_scores": [len(entry.labels)]}
             widths |= {f"{task}_distances": [entry.k], f"{task}_neighbours": [entry.k]}
-            widths[f"{task}_next"] = [1]
             if self.info.decision_points_s:
                 widths[f"{task}_label_distances"] = [len(entry.labels)]
         for output, width in widths.items():
@@ -206,9 +198,8 @@ class Model:
             decision_point: place in `decision_points_s`; the last, the full window, where None.
 
         Raises:
-            InputError: the vector has another length, or a value that is not finite (or is so
-                large that no distance to the training rows is); the model has no such decision
-                point, or its file is damaged.
+            InputError: the vector has another length, or a value that is not finite, or that is
+                not once it is scaled; the model has no such decision point, or its file is damaged.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != self._shape:
@@ -219,43 +210,38 @@ class Model:
             self._session.run_with_iobinding(self._binding)
         except Exception as error:  # an index past its tensor, a shape that came out otherwise
             raise self._broken(str(error)) from None
-        # Beyond that the sums round as well: see `train.distance.resolution`.
-        reach = self._reach.item()
-        coarser = 1.0 if reach <= EXACT_REACH else (len(x) + 4) * reach / EXACT_REACH
+        out_of_range = self._out_of_range.item() > 0.0
         decisions: dict[str, Decision] = {}
         for answer in self._answers:
-            name, labels, known, label, scores, near, neighbours, apart = answer
-            index = int(label[0])
+            index = int(answer.label[0])
             if index < 0:
                 raise self._refusal(x)
-            shares = scores.tolist()
-            if index >= len(labels) or not 0.0 <= shares[index] <= 1.0:
-                raise self._broken(f"{name} is answered by label {index} of {len(labels)}")
-            far = near.tolist()
-            resolved = coarser * known[0] + known[1] * far[-2]
-            decisions[name] = Decision(
-                labels[index],
+            shares = answer.scores.tolist()
+            if index >= len(answer.labels) or not 0.0 <= shares[index] <= 1.0:
+                raise self._broken(
+                    f"{answer.task} is answered by label {index} of {len(answer.labels)}"
+                )
+            decisions[answer.task] = Decision(
+                answer.labels[index],
                 shares[index],
-                scores.copy(),
-                near[:-1].copy(),
-                neighbours.copy(),
+                answer.scores.copy(),
+                answer.distances.copy(),
+                answer.neighbours.copy(),
                 shares.count(shares[index]) > 1,
-                None if apart is None else apart.copy(),
-                min(map(sub, far[1:], far)) <= resolved,
+                None if answer.label_distances is None else answer.label_distances.copy(),
+                out_of_range,
             )
         return decisions
 
     def _broken(self, reason: str) -> InputError:
-        """The file loads, and yet it is no model: nothing that was exported answers so."""
+        """The error for a file that loads, but does not answer as an exported model does."""
         reason = " ".join(reason.split())[:200]
         return InputError(f"{self.path}: cannot be run ({reason}); copy or export it again")
 
     def _refusal(self, x: NDArray[np.float64]) -> InputError:
-        """Why the graph answered -1: it does so for every vector it cannot measure."""
+        """The error for a vector that the graph answers with label -1."""
         if np.isfinite(x).all():
-            return InputError(
-                "the features are too large for the model to measure a distance to them"
-            )
+            return InputError("the features are too large to be scaled")
         bad = int(np.argmin(np.isfinite(x)))
         ends = np.cumsum(self.info.widths)
         which = int(ends.searchsorted(bad, side="right"))
@@ -284,31 +270,29 @@ def require_joints(model: Model, dof: int | None, where: str) -> None:
 
 
 class _Answer(NamedTuple):
-    """A task, and the arrays that ONNX Runtime writes its answer to."""
+    """A task and the arrays into which ONNX Runtime writes its answer."""
 
     task: str
     labels: tuple[str, ...]
-    resolution: tuple[float, ...]
     label: NDArray[np.int64]
     scores: NDArray[np.float64]
-    near: NDArray[np.float64]
-    """Distances of the neighbours, and of the next training trial."""
+    distances: NDArray[np.float64]
     neighbours: NDArray[np.int64]
     label_distances: NDArray[np.float64] | None
 
 
-def _contents(name: str) -> tuple[onnxfile.Contents, os.stat_result]:
-    """What the file holds, checked, and which file that was."""
+def _contents(name: str) -> tuple[onnx_file.Contents, os.stat_result]:
+    """The file's contents, and its identity, to see whether it changes."""
     if not os.path.lexists(name) and "\0" not in name:
         raise InputError(f"{name}: no such model; make one with `make export`")
     with open_regular(name, LARGEST_BYTES) as file:
         stat = os.fstat(file.fileno())
         with parsing(name, "a model", "; copy or export it again"):
-            return onnxfile.check(file.read(LARGEST_BYTES), name), stat
+            return onnx_file.read(file.read(LARGEST_BYTES), name), stat
 
 
 def _is(name: str, stat: os.stat_result) -> bool:
-    """The file is still the one that was checked, unchanged."""
+    """Whether the file is still the same, unchanged."""
     try:
         now = os.stat(name)
     except OSError:

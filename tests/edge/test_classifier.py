@@ -129,17 +129,12 @@ def test_a_new_touch_is_not_flagged(model, make_touch):
     assert [e.flags for e in events if isinstance(e, Decided)] == [(), ()]
 
 
-def test_neighbours_that_rounding_could_order_otherwise_flag_the_decision(
-    model, make_touch, monkeypatch
-):
-    decide = model.decide
-
-    def close(*arguments):
-        return {task: one._replace(close=True) for task, one in decide(*arguments).items()}
-
-    monkeypatch.setattr(model, "decide", close)
-    events = [e for _, e in watch(model, make_touch(kind="soft", seed=99))]
-    assert [e.flags for e in events if isinstance(e, Decided)] == [("close",), ("close",)]
+def test_features_that_the_model_cut_off_flag_the_decision(model, make_touch):
+    recording = make_touch(kind="soft", seed=99)
+    skin = {**recording.meta["skin"], "counts_per_newton": 0.01}
+    strong = replace(recording, meta={**recording.meta, "skin": skin})
+    decided = [e for e in Classifier(model).classify(strong) if isinstance(e, Decided)]
+    assert [(e.label is None, e.flags) for e in decided] == [(False, ("out_of_range",))] * 2
 
 
 def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(model, make_touch):
@@ -179,7 +174,7 @@ def test_a_pose_that_is_missing_flags_the_decision(model, make_touch):
     assert "missing_pose" in events[-1].flags
 
 
-def test_features_too_large_to_measure_give_no_label(model, make_touch):
+def test_features_too_large_to_scale_give_no_label(model, make_touch):
     recording = make_touch()
     skin = {**recording.meta["skin"], "counts_per_newton": 1e-300}
     tiny = replace(recording, meta={**recording.meta, "skin": skin})

@@ -11,7 +11,8 @@ from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load, save
-from export.api import LEAK, measure, report, told_by_order, told_by_posture, warnings
+from export.api import LEAK, coarseness, measure, report, told_by_order, told_by_posture, warnings
+from train.pipeline import ContactClassifier
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +120,38 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
     said = [line for line in warnings(fitted) if "equal one of another label" in line]
     assert [line.split(" equal")[0] for line in said] == ["warning: object: 3 trials"]
+
+
+def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings, tmp_path):
+    """A skin that was stored with a scale of its own: one trial of newtons a million times too
+    many leaves a few steps for all others."""
+    for path in sorted(recordings.glob("*.npz")):
+        save(tmp_path / path.name, load(path))
+    fixed = {"features": ["paper"], "projection": "pca", "scaling": "none", "jobs": 1, "k": 1}
+    fitted = train.fit(str(tmp_path), components=5, **fixed)
+    assert not any("steps" in line for line in warnings(fitted))
+    outlier = fitted.X.copy()
+    outlier[7] *= 3e6
+    classifier = ContactClassifier(fitted.classifier.choices, fitted.dataset.names)
+    classifier.fit(outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen})
+    said = [line for line in warnings(replace(fitted, classifier=classifier)) if "steps" in line]
+    assert len(said) == len(fitted.chosen)
+    assert f"since {fitted.dataset.trials[7].path} lies far outside all others" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "steps", "farthest"),
+    [
+        ([[0.0], [0.0], [3.0], [10.0]], 3.0, 3),  # equal rows are skipped: 3, 3, 3, 7
+        ([[2.0], [2.0]], np.inf, 0),
+        ([[0.0, 0.0], [6.0, 8.0]], 10.0, 1),
+    ],
+)
+def test_the_coarseness_of_a_grid_is_the_median_gap_of_neighbours_in_units(rows, steps):
+    assert coarseness(0.5 * np.array(rows), 0.5) == (
+        steps,
+        len(rows) - 1 if np.isfinite(steps) else 0,
+    )
 
 
 def test_rows_that_are_equal_but_for_rounding_are_not_equal():

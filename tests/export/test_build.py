@@ -59,13 +59,42 @@ def test_equal_constants_are_stored_once(graph):
 
 
 @pytest.mark.parametrize("scaling", ["none", "III"])
-def test_the_graph_projects_to_the_bits_of_the_estimator(graph, scaling):
+def test_the_graph_projects_to_the_whole_numbers_of_the_estimator(graph, scaling):
     build, _, run = graph
     X = np.random.default_rng(0).gamma(2.0, size=(30, 120)) * 10.0 ** np.arange(-3, 3).repeat(20)
-    projection = Projection(scaling, 7).fit(X)
-    np.testing.assert_array_equal(
-        run(project(build, "x", [projection])[0], X), projection.transform(X)
-    )
+    p = Projection(scaling, 7).fit(X)
+    z = run(project(build, "x", [p])[0], X)
+    assert (z == np.rint(z)).all()
+    assert (z * p.grid_.unit == p.transform(X)).all()
+
+
+@pytest.mark.parametrize(
+    ("x", "inside", "off"),
+    [
+        ([3.0, -4.0], [3.0, -4.0], 0.0),
+        ([6.0, -9.0], [4.0, -4.0], 7.0),
+        ([np.inf, 0.0], [4.0, 0.0], np.inf),
+    ],
+)
+def test_the_sum_of_all_that_was_cut_off_is_given(graph, x, inside, off):
+    build, _, run = graph
+    clipped, rest = build.clipped("x", [4.0])
+    assert run(clipped, np.array([x])).tolist() == [inside]
+    assert run(rest, np.array([x])).tolist() == [[off]]
+
+
+def test_what_was_cut_off_a_nan_is_no_number(graph):
+    build, _, run = graph
+    assert np.isnan(run(build.clipped("x", [4.0])[1], np.array([[np.nan, 1.0]]))).all()
+
+
+def test_constants_of_several_decision_points_are_stored_in_float32_where_it_holds_them(graph):
+    build, names, _ = graph
+    build.decision_point = build.constant(1, np.int64)
+    kinds = {TensorProto.FLOAT: 2.0**24, TensorProto.DOUBLE: 2.0**24 + 1.0}
+    for kind, value in kinds.items():
+        build.by_decision_point_small([np.array([1.0]), np.array([value])])
+        assert names.initial[-1].data_type == kind
 
 
 def test_widened_columns_are_zero():

@@ -46,7 +46,7 @@ def test_golden_holds_raw_frames_and_hard_vectors(exported):
     assert (golden["object_label"][-2:] == -1).all()
     assert (golden["object_distances"][:16, 0] == 0.0).all()  # the trials are training rows
     bounds = json.loads(str(golden["meta"]))["bounds"]
-    assert set(bounds) == {"scores", "distances", "features", "next", "time_s"}
+    assert set(bounds) == {"scores", "features", "time_s"}
 
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):

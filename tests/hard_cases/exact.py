@@ -1,40 +1,64 @@
-"""Oracles that do not round: a float64 is a whole number times a power of two."""
+"""Oracles that do not round: Python's whole numbers and fractions."""
 
 from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from train.projection import MOST_STEPS, Projection
+
 Whole = NDArray[np.object_]
 
 
-def whole(*arrays: NDArray[np.float64]) -> tuple[list[Whole], int]:
-    """The arrays as Python integers times one power of two, and its exponent."""
-    parts = [np.frexp(np.asarray(a, dtype=np.float64)) for a in arrays]
-    low = min((int(e[m != 0.0].min()) for m, e in parts if (m != 0.0).any()), default=0)
-    out: list[Whole] = []
-    for mantissa, exponent in parts:
-        scaled = np.ldexp(mantissa, 53).astype(np.int64)
-        shifts = np.where(mantissa != 0.0, exponent - low, 0)
-        flat = [int(m) << int(s) for m, s in zip(scaled.ravel(), shifts.ravel(), strict=True)]
-        out.append(np.array(flat, dtype=object).reshape(mantissa.shape))
-    return out, low - 53
+def multiples(values: NDArray[np.float64], unit: float) -> Whole:
+    """Values over a power of two, as Python integers.
+
+    Raises:
+        ValueError: a value is no multiple of it.
+    """
+    exact = [Fraction(value) / Fraction(unit) for value in np.ravel(values).tolist()]
+    if any(value.denominator != 1 for value in exact):
+        raise ValueError(f"not all multiples of {unit}")
+    return np.array([int(value) for value in exact], dtype=object).reshape(np.shape(values))
 
 
-def coordinates(
-    vectors: NDArray[np.float64],
-    mean: NDArray[np.float64],
-    gain: NDArray[np.float64],
-    weights: NDArray[np.float64],
-) -> tuple[Whole, int]:
-    """(x - mean) * gain @ weights without rounding: (n, c) whole numbers and their exponent."""
-    (x, m), first = whole(vectors, mean)
-    (g,), second = whole(gain)
-    (w,), third = whole(weights)
-    return ((x - m) * g) @ w, first + second + third
+def smallest_bit(values: NDArray[np.float64]) -> float:
+    """The largest power of two of which all values are multiples; 1 for zeros."""
+    ratios = [Fraction(value) for value in np.ravel(values).tolist() if value]
+    bits = [(r.numerator & -r.numerator).bit_length() - r.denominator.bit_length() for r in ratios]
+    return math.ldexp(1.0, min(bits, default=0))
+
+
+def coordinates(vectors: NDArray[np.float64], p: Projection, components: int) -> Whole:
+    """(n, c) whole coordinates of vectors by the rule of `train.projection`.
+
+    The difference from the mean and its product with the gain are rounded once each, as IEEE 754
+    says; all that follows is in Python's whole numbers.
+    """
+    d = (vectors - p.mean_) * p.gain_ / p.grid_.step
+    bound = int(MOST_STEPS)
+    rounded = [max(-bound, min(bound, round(Fraction(value)))) for value in np.ravel(d).tolist()]
+    steps = np.array(rounded, dtype=object).reshape(d.shape)
+    weights = p.weights_[:, :components]
+    bit = smallest_bit(weights)
+    scale = Fraction(bit) * Fraction(p.grid_.step) / Fraction(p.grid_.unit)
+    sums = steps @ multiples(weights, bit) if components else np.zeros((len(d), 0), dtype=object)
+    limit = int(p.grid_.limit)
+    units = [max(-limit, min(limit, round(value * scale))) for value in np.ravel(sums).tolist()]
+    return np.array(units, dtype=object).reshape(sums.shape)
+
+
+def unrounded(
+    vectors: NDArray[np.float64], mean: NDArray[np.float64], weights: NDArray[np.float64]
+) -> Whole:
+    """(n, c) whole numbers proportional to (x - mean) @ weights, without any rounding."""
+    bit = smallest_bit(np.concatenate([vectors.ravel(), mean]))
+    d = multiples(vectors, bit) - multiples(mean, bit)
+    return np.asarray(d @ multiples(weights, smallest_bit(weights)))
 
 
 def nearest(rows: Whole, query: Whole, k: int) -> tuple[list[int], list[int]]:
@@ -43,20 +67,16 @@ def nearest(rows: Whole, query: Whole, k: int) -> tuple[list[int], list[int]]:
     return sorted(range(len(rows)), key=lambda i: (squares[i], i))[:k], squares
 
 
-def winner(labels: list[int]) -> int:
+def winner(labels: list[Any]) -> Any:
     """The majority of the neighbours' labels, nearest first; ties to the nearest of the tied."""
     votes = {label: labels.count(label) for label in labels}
     most = max(votes.values())
     return next(label for label in labels if votes[label] == most)
 
 
-def root_error(seen: float, square: int, exponent: int) -> float:
-    """|seen - sqrt(square * 2^exponent)| over the root; a root of 0 allows nothing."""
-    exact = Fraction(square) * Fraction(2) ** exponent
-    if exact == 0:
-        return 0.0 if seen == 0.0 else math.inf
-    # (a^2 - b^2) / b^2 is twice the relative error of a.
-    return abs(float((Fraction(seen) ** 2 - exact) / exact)) / 2.0
+def distance(square: int, unit: float) -> float:
+    """The root of a whole number, correctly rounded, in units of a power of two."""
+    return math.sqrt(square) * unit  # below 2^53 the number is a float64, whose root IEEE rounds
 
 
 def rank(rows: NDArray[np.int64]) -> int:

@@ -27,7 +27,7 @@ from tests.conftest import FOREARM, touch
 from tests.hard_cases.adversarial import corpus
 from tests.hard_cases.families import Hard, made
 from tests.hard_cases.models import features, labels_for
-from tests.hard_cases.neighbours import SHORT, lattice, near_duplicates, offset_data
+from tests.hard_cases.neighbours import MANY, lattice, near_duplicates, offset_data
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
 
@@ -91,11 +91,11 @@ def vectors(dataset: DataSet) -> dict[str, Hard]:
     found = {
         "frames": (own, Choice("IV", 5, 2)),
         "near-duplicates": (near_duplicates(160, 1e-7, 0)[0], Choice("none", 6, 5)),
-        "near-duplicates-shortlist": (near_duplicates(SHORT, 1e-7, 0)[0], Choice("none", 6, 5)),
-        "shortlist": (features(SHORT), Choice("IV", 20, 4)),
+        "near-duplicates-many": (near_duplicates(MANY, 1e-7, 0)[0], Choice("none", 6, 5)),
+        "many": (features(MANY), Choice("IV", 20, 4)),
         "offset": (offset_data(1e6, 0.01, 0)[0], Choice("none", 6, 5)),
         "tiny": (features(160) * 1e-24, Choice("none", 6, 5)),
-        "huge": (features(SHORT) * 1e20, Choice("none", 6, 5)),
+        "huge": (features(MANY) * 1e20, Choice("none", 6, 5)),
         "equal-distances": (lattice(0)[0], Choice("none", 3, 8)),
         "duplicates": (np.repeat(features(40), 4, axis=0), Choice("IV", 20, 4)),
     }

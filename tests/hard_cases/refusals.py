@@ -66,7 +66,7 @@ def line(bad: float) -> None:
 
 @cache
 def small_model() -> Ours:
-    return Ours(features(30), components=5, k=3)
+    return Ours(features(30), choice=Choice("none", 5, 3))
 
 
 def vector(bad: float) -> None:
@@ -189,7 +189,7 @@ def let_in(entry: str, bad: float) -> float:
 
 
 def beyond_error(size: float) -> float:
-    """1 where a finite vector too large for any distance gets a label."""
+    """1 where a finite vector that is infinite once scaled gets a label."""
     try:
         small_model().model.decide(np.full(120, size))
     except InputError:
@@ -214,7 +214,7 @@ def usual() -> str:
 def beyond_usual() -> str:
     X = features(30)
     pipe = usual_pipeline(X, 5, 1, np.arange(30))
-    queries = np.stack([np.full(120, size) for size in (1e200, -1e300, 1.7e308)])
+    queries = np.stack([np.full(120, size) for size in (1e303, -1e305, 1.7e308)])
     single = np.ravel(converted(pipe, X).run(None, {"X": queries.astype(np.float32)})[0]).tolist()
     try:
         said = f"answers {pipe.predict(queries).tolist()}"
@@ -236,12 +236,12 @@ CASES = [
     ),
     Case(
         "refusals",
-        "finite, but beyond any distance",
+        "finite, but infinite once scaled",
         "one sentence, no result",
         "let in",
         0,
         beyond_error,
-        [{"size": s} for s in (1e200, -1e300, 1.7e308)],
+        [{"size": s} for s in (1e303, -1e305, 1.7e308)],
         usual=beyond_usual,
     ),
 ]

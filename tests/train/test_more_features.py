@@ -60,11 +60,6 @@ def test_a_projection_of_many_columns_adds_up_exactly(samples):
     assert (shuffled.transform(X[:, order]) == rows).all()
 
 
-def test_more_columns_than_add_up_exactly_are_refused():
-    with pytest.raises(InputError, match="4098 values a trial are more than the 4096"):
-        Projection("none", 2, SIX).fit(vectors(6, 683, n=4))
-
-
 def test_a_classifier_of_six_features_and_few_samples(recordings):
     dataset = load_trials([recordings], features=SIX)
     X = dataset.features(1.0, 20)

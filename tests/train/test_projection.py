@@ -1,7 +1,5 @@
 """Projections against exact fractions, long double and fifty digits."""
 
-from fractions import Fraction
-
 import mpmath
 import numpy as np
 import pytest
@@ -9,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from train.projection import Projection, Spectrum, principal_axes
+from tests.hard_cases import exact
+from train.projection import Projection, Spectrum, coordinate_bits, on_grid, principal_axes
 from train.scaling import SCALINGS
 
 
@@ -71,38 +70,67 @@ def test_a_column_without_variance_gets_no_weight():
     offset=st.sampled_from([0.0, 1e3, 1e6]),
     spread=st.sampled_from([1e-6, 1.0, 1e6]),
 )
-def test_a_projection_is_exact_in_any_order(seed, scaling, offset, spread):
-    """Its two sums are those of exact fractions, so the order of summation cannot matter."""
+def test_coordinates_are_those_of_whole_numbers_in_any_order(seed, scaling, offset, spread):
     X = data(seed=seed) * spread + offset
-    projection = Projection(scaling, 4).fit(X)
-    z = projection.transform(X)
-    d = (X - projection.mean_) * projection.gain_
-    units = d / projection.grid_.unit
-    high = np.rint(units) * projection.grid_.unit
-    low = np.rint((units - np.rint(units)) * 2.0**26) * 2.0**-26 * projection.grid_.unit
-    for i in range(0, len(X), 7):
-        for j in range(4):
-            w = [Fraction(v) for v in projection.weights_[:, j].tolist()]
-            parts = [
-                sum((Fraction(v) * u for v, u in zip(half[i].tolist(), w, strict=True)), Fraction())
-                for half in (high, low)
-            ]
-            # Each half's sum is a float64, and only their sum is rounded.
-            assert all(Fraction(float(part)) == part for part in parts)
-            assert z[i, j] == float(parts[0]) + float(parts[1])
-    order = np.random.default_rng(seed).permutation(120)
-    shuffled = (
-        high[:, order] @ projection.weights_[order] + low[:, order] @ projection.weights_[order]
-    )
-    assert (shuffled == z).all()
+    p = Projection(scaling, 4).fit(X)
+    z = p.transform(X)
+    assert (z / p.grid_.unit).tolist() == exact.coordinates(X, p, 4).tolist()
+    d, order = (X - p.mean_) * p.gain_, np.random.default_rng(seed).permutation(120)
+    assert (p.grid_.project(d[:, order], p.weights_[order]) == z).all()
 
 
-def test_what_a_projection_cuts_off_is_below_float64_of_its_range():
+@pytest.mark.parametrize("kind", ["pca", "lda"])
+@pytest.mark.parametrize("columns", [1, 2, 3, 24, 120, 1024, 4096])
+def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
+    """For features at their limit with the signs of the weights, the worst that can come."""
+    X = np.random.default_rng(columns).normal(size=(30, columns))
+    X *= 10.0 ** np.linspace(0, 6, columns)
+    p = Projection("none", 20, ["max_force"], kind).fit(X, np.arange(30) % 5)
+    weights = exact.multiples(p.weights_, exact.smallest_bit(p.weights_))
+    assert max(map(abs, weights.ravel())) <= 2**24
+    assert max(sum(abs(weights)) * 2**24) < 2**53
+
+
+def test_weights_that_are_all_equal_add_up_exactly_too():
+    """1,024 of 1/32 have the largest sum that a column of length 1 can have."""
+    weights = on_grid(np.full((1024, 1), 1.0 / 32.0))
+    assert np.ravel(weights).tolist() == [1.0 / 32.0] * 1024
+
+
+@pytest.mark.parametrize(
+    ("components", "bits"), [(0, 22), (20, 22), (115, 22), (116, 21), (500, 20)]
+)
+def test_squared_distances_stay_below_2_to_the_53(components, bits):
+    assert coordinate_bits(components) == bits
+    longest, limit = 2**bits, 2 ** (bits + 1)
+    assert (longest + components**0.5 * limit) ** 2 < 2**53
+
+
+@pytest.mark.parametrize("components", [1, 5, 19, 20])
+def test_the_grid_of_principal_components_does_not_depend_on_their_number(components):
+    """So that leave-one-out serves every number with one decomposition."""
+    X = data(40)
+    many, few = Projection("IV", 20).fit(X), Projection("IV", components).fit(X)
+    assert few.grid_ == many.grid_
+    assert (few.transform(X) == many.transform(X)[:, :components]).all()
+
+
+def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
     X = data()
-    projection = Projection("none", 20).fit(X)
-    exact = (X - projection.mean_).astype(np.longdouble) @ projection.weights_.astype(np.longdouble)
-    reach = np.abs(X - projection.mean_).max()
-    assert float(np.abs(projection.transform(X) - exact).max()) < 120 * 2.0**-51 * reach
+    p = Projection("none", 20).fit(X)
+    _, axes, _ = principal_axes(X)
+    true = (X - p.mean_).astype(np.longdouble) @ axes[:20].T.astype(np.longdouble)
+    longest = np.linalg.norm(X - p.mean_, axis=1).max()
+    assert float(np.abs(p.transform(X) - true).max()) < 2.0**-20 * longest
+
+
+def test_features_are_cut_off_far_outside_the_training_set():
+    X = data()
+    p = Projection("none", 5).fit(X)
+    largest = np.abs(X - p.mean_).max()
+    once, twice = (p.transform(p.mean_[None] + f * largest * np.eye(120)[:1]) for f in (9.0, 18.0))
+    assert (once == twice).all()
+    assert (p.transform(p.mean_[None] + 4.0 * largest * np.eye(120)[:1]) != once).any()
 
 
 def exact_distances(rows, labels, shrinkage):
