@@ -157,7 +157,6 @@ class ModelInfo:
                     f"{FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
-            tracking.get("connectivity", 4)  # earlier versions wrote it
             points = meta.numbers("decision_points_s", default=())
             rules = meta.table("stopping") if points else ConfigTable({}, where)
             novelty = meta.table("novelty") if points else None

@@ -147,11 +147,8 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recording
         ([[0.0, 0.0], [6.0, 8.0]], 10.0, 1),
     ],
 )
-def test_the_coarseness_of_a_grid_is_the_median_gap_of_neighbours_in_units(rows, steps):
-    assert coarseness(0.5 * np.array(rows), 0.5) == (
-        steps,
-        len(rows) - 1 if np.isfinite(steps) else 0,
-    )
+def test_coarseness_is_the_median_gap_of_neighbours_in_units(rows, steps, farthest):
+    assert coarseness(0.5 * np.array(rows), 0.5) == (steps, farthest)
 
 
 def test_rows_that_are_equal_but_for_rounding_are_not_equal():

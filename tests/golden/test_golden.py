@@ -18,7 +18,7 @@ def checks():
 
 def test_every_quantity_of_the_path_and_of_the_graph_is_met(checks):
     assert [c.name for c in checks.values() if not c.passed] == []
-    assert len(checks) == 4 + 3 * 5
+    assert len(checks) == 4 + 3 * 4
 
 
 @pytest.mark.parametrize("task", ["category", "mobility", "object"])

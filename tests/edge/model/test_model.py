@@ -299,7 +299,7 @@ def test_a_model_that_is_no_file_is_refused_at_once(what, tmp_path):
     else:
         with path.open("wb") as file:
             file.truncate(1 << 40)
-    with pytest.raises(InputError, match=r"cannot be read|at most \d+ are read"):
+    with pytest.raises(InputError, match=r"cannot be read|has at most \d+"):
         Model(path)
 
 
