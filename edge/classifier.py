@@ -1,4 +1,4 @@
-"""Frames in, events out: the one path that live reading, replay, the demo and the tests share."""
+"""The classifier: frames in, events out; shared by live reading, replay, the demo and the tests."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ them off before it compares them; features that it cannot scale at all get no la
 
 @dataclass
 class _Waiting:
-    """A contact that has yet to be decided for some tasks."""
+    """A contact for which some tasks are not decided yet."""
 
     contact: Contact
     number: int
     decision_point: int
-    """The next of the model's decision points."""
+    """Index of the next of the model's decision points."""
     tasks: list[str]
 
 
 class Classifier:
-    """Follows the contacts in a stream of frames and decides what each one touches.
+    """Follows the contacts in a stream of frames and decides what the robot touches in each.
 
     >>> import edge
     >>> from edge import demo
@@ -55,9 +55,8 @@ class Classifier:
     mobility movable
     object pillow
 
-    `push` and `finish` return events in the order in which they came about: an `Onset` when a
-    contact begins, a `Decided` for each task once its window is over, and a `Release` when the
-    contact ends.
+    `push` and `finish` return events in the order of time: an `Onset` when a contact begins, a
+    `Decided` for each task at the end of its window, and a `Release` when the contact ends.
 
     With an error rate, each task follows the fastest stopping rule that the model holds certified
     for that rate: it is decided at the first decision point that is sure enough, and at the rule's
@@ -90,37 +89,35 @@ class Classifier:
         """Decide with a model.
 
         Args:
-            model: what decides.
-            layout: the skin that gives the frames; the model's own where None.
-            error: how often a decision may be wrong, in (0, 1), to decide as soon as that allows;
-                None decides at the full window.
-            novelty_rate: how often a contact with a trained thing may be called unknown. The
-                certified errors hold for the default.
-            max_contacts: how many regions to follow at once. With 1 it is the largest; with more,
-                each event names its contact, and a decision its position.
-            motion_on_skin: decide a contact whose first frame has no joint angles by motion on
-                the skin, flagged `skin_motion`; else by what else is known, flagged
+            model: the model that decides.
+            layout: the skin that gives the frames; None for the model's own.
+            error: the accepted share of wrong decisions, in (0, 1), for decisions as early as
+                that allows; None decides at the full window.
+            novelty_rate: the accepted share of contacts with trained objects that are called
+                unknown. The certified errors hold for the default.
+            max_contacts: how many regions to follow at once. 1 follows the largest; with more,
+                each event names its contact, and each decision its position.
+            motion_on_skin: if the first frame of a contact has no joint angles, measure its motion
+                on the skin, flagged `skin_motion`; otherwise its motion is left out, flagged
                 `missing_pose`.
 
         Raises:
             InputError: the skin is not the one that the model was made for, a rate is outside
                 (0, 1), or the model certifies the error rate for no task.
         """
-        info = model.info
         self._rules: dict[str, StoppingRule | None] = {}
         if error is not None:
             check_rate(novelty_rate, "the novelty rate")
             self._rules = stopping_rules(model, error)
-        self.model = model
+        self.model, self.error, self.novelty_rate = model, error, novelty_rate
         self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
-        self.tracker = info.tracker(
-            layout or info.layout, max_contacts=max_contacts, motion_on_skin=motion_on_skin
+        self.tracker = model.info.tracker(
+            layout or model.info.layout, max_contacts=max_contacts, motion_on_skin=motion_on_skin
         )
         self.layout = self.tracker.layout
-        self.error, self.novelty_rate = error, novelty_rate
         self._waiting: list[_Waiting] = []
         self._numbers: dict[Contact, int] = {}
-        """The contacts under way."""
+        """The numbers of the contacts under way."""
         self._begun = 0
         self._end_s: float | None = None
         self._missing_taxels = False
@@ -158,15 +155,15 @@ class Classifier:
         return events
 
     def finish(self) -> list[Event]:
-        """The stream has ended: decide what waits, flagged `short`, or that nothing was touched."""
+        """End the stream: decide the tasks that wait, flagged `short`, or the absence of contact."""
         began = time.perf_counter()
-        waiting, self._waiting = self._waiting, []
+        unfinished, self._waiting = self._waiting, []
         if self._begun == 0 and self._end_s is not None:
             return list(self._untouched(self._end_s, began))
-        return [event for one in waiting for event in self._decide(one, began, short=True)]
+        return [event for w in unfinished for event in self._decide(w, began, short=True)]
 
     def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
-        """The decisions on a stream without contact, of the tasks that have a label for it."""
+        """Decisions on a stream without contact, for the tasks that have a label for it."""
         flags = ("no_contact", "missing_taxels") if self._missing_taxels else ("no_contact",)
         for name, task in self.model.info.tasks.items():
             if task.no_contact is not None:
@@ -174,12 +171,10 @@ class Classifier:
                 yield Decided(name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags)
 
     def classify(self, recording: Recording) -> Iterator[Event]:
-        """Decide on a recording from its first frame, as the board would have.
-
-        Contacts that this classifier is following are left alone.
+        """Decide on a recording as the board would have; this classifier's own state stays.
 
         Args:
-            recording: of a skin of the model's kind; its own scale is taken into account.
+            recording: of a skin like the model's; its own scale is taken into account.
 
         Raises:
             InputError: the recording does not suit the model.
@@ -195,12 +190,12 @@ class Classifier:
     def watch(
         self, skin: Skin, *, joints: JointSource | None = None, lasts_s: float = math.inf
     ) -> Iterator[Event]:
-        """Read a skin at its rate and decide, until the caller stops asking.
+        """Read a skin at its rate and decide, until the caller stops iterating.
 
         Args:
             skin: open, real or fake.
-            joints: where joint angles come from, for a model that measures motion in the world.
-            lasts_s: how many seconds to read for; what is waiting then is decided, flagged
+            joints: the source of joint angles, for a model that measures motion in the world.
+            lasts_s: how many seconds to read for; tasks that wait then are decided, flagged
                 `short`.
 
         Raises:
@@ -226,11 +221,11 @@ class Classifier:
         )
 
     def _named(self, number: int) -> int | None:
-        """A contact's number, where there may be several at once."""
+        """The contact's number if several are followed at once, else None."""
         return number if self._max_contacts > 1 else None
 
     def _decide(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Decided]:
-        """Ask the model about a contact; a task that it settles no longer waits."""
+        """Ask the model about a contact; returns the answers of the tasks that are now decided."""
         info = self.model.info
         last = len(self.model.decision_points_s) - 1
         decision_point = last if short else waiting.decision_point
@@ -326,11 +321,11 @@ class Classifier:
 
 
 def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:
-    """{task: the fastest rule that the model holds certified for an error rate, or None}.
+    """{task: the fastest stopping rule that is certified for an error rate, or None}.
 
     Raises:
-        InputError: the rate is outside (0, 1), or is certified for no task; the sentence says
-            which errors are.
+        InputError: the rate is outside (0, 1), or is certified for no task; the message names
+            the errors that are.
     """
     check_rate(error, "the error rate")
     if not model.info.decision_points_s:
@@ -340,7 +335,7 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
         )
     rules = {task: stopping.rule(error) for task, stopping in model.info.stopping.items()}
     if not any(rules.values()):
-        reasons = (f"{task}: {one.refusal(error)}" for task, one in model.info.stopping.items())
+        reasons = (f"{task}: {s.refusal(error)}" for task, s in model.info.stopping.items())
         raise InputError(
             f"{model.path}: an error of {error:g} cannot be certified; {'; '.join(reasons)}"
         )

@@ -1,4 +1,4 @@
-"""The clock that a skin and its loop go by; the fake has a virtual one (`edge.fake.clock`)."""
+"""The clock of a skin and its loop; a fake skin may have a virtual one (`edge.fake.clock`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Clock(Protocol):
         ...
 
     def sleep_until(self, t: float) -> None:
-        """Return at `t`, or at once where it has passed."""
+        """Wait until `t`; return at once if it has passed."""
         ...
 
 
@@ -28,7 +28,7 @@ class SystemClock:
     now = staticmethod(time.monotonic)
 
     def sleep_until(self, t: float) -> None:
-        """Return at `t`, or at once where it has passed."""
+        """Wait until `t`; return at once if it has passed."""
         left = t - time.monotonic()
         if left > 0.0:
             time.sleep(left)

@@ -1,11 +1,11 @@
-"""The base of all errors, the errors that a user can correct, and text that is safe to show."""
+"""The base of all errors, the errors that a user can correct, and text that is safe to print."""
 
 
 def printable(text: str) -> str:
-    """Text for a terminal or a line of a log: what does not print stands as Python writes it.
+    """Text that is safe on a terminal or in a log: unprintable characters become Python escapes.
 
-    That holds for line breaks, escape sequences, controls that turn the direction of writing,
-    and lone surrogates, which no encoding has.
+    These are line breaks, escape sequences, characters that reverse the direction of writing, and
+    lone surrogates, which no encoding has.
 
     >>> printable("box\\x1b[2J")
     'box\\\\x1b[2J'
@@ -16,7 +16,7 @@ def printable(text: str) -> str:
 class EdgeError(Exception):
     """The base of the errors that edge-classify raises; its text is one sentence for a person.
 
-    The text stays on one line whatever a file contributes to it (see `printable`).
+    The text stays on one line, whatever the file that it quotes contains (see `printable`).
 
     >>> import edge
     >>> try:

@@ -1,4 +1,4 @@
-"""The events of a stream of frames: a contact begins, is decided, and ends."""
+"""The events of a contact: its onset, its decisions and its release."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class Onset:
 
     Attributes:
         onset_s: when, on the frames' clock.
-        contact: which one, counted from 1, where several are followed at once; else None.
+        contact: its number, counted from 1, if several are followed at once; else None.
     """
 
     onset_s: float
     contact: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As a line of JSON says it."""
+        """The event as a JSON object."""
         return {"event": "onset", **_which(self.contact), "onset_s": round(self.onset_s, 6)}
 
 
@@ -43,22 +43,22 @@ class Decided:
 
     Attributes:
         task: the question.
-        label: its answer; "unknown" where no trained label fits, None where the features are too
-            large to be measured against the training rows.
+        label: its answer; "unknown" if no trained label fits, None if the features are too large
+            to be compared with the training rows.
         confidence: the label's share of the votes, 0 to 1; with an error rate, the calibrated
             probability that the label is right.
-        window_s: seconds from onset that it was decided on.
+        window_s: seconds from onset on which the decision is based.
         onset_s: when the contact began; without a contact, when the stream ended.
         latency_ms: from the frame that completed the window to the answer.
-        flags: its reservations, see `Classifier`.
-        error: how often a decision may be wrong, where that was asked for and is certified.
-        stopped_by: then `confidence`, or `window` where the stopping rule's last decision point
-            came first.
+        flags: reasons for doubt, see `Classifier`.
+        error: the certified error rate, if one was asked for.
+        stopped_by: with an error rate, `confidence`, or `window` if the stopping rule's last
+            decision point came first.
         contact: as in `Onset`.
-        position: (x, y, z) where the contact was last seen, where several are followed (see
-            `edge.touch.contact.Contact.position`); None where it is not known.
+        position: (x, y, z) of the contact's last position, if several are followed and it is known
+            (see `edge.touch.contact.Contact.position`).
         decision: the model's own answer, with the votes and the nearest training trials; None
-            where there is no label.
+            without a label.
     """
 
     task: str
@@ -75,7 +75,7 @@ class Decided:
     decision: Decision | None = field(default=None, compare=False, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """As a line of JSON says it."""
+        """The event as a JSON object."""
         line: dict[str, Any] = {
             "event": "decision",
             **_which(self.contact),
@@ -105,7 +105,7 @@ class Release:
 
     Attributes:
         onset_s: when it began.
-        release_s: when it was known to have ended.
+        release_s: when its end was certain.
         contact: as in `Onset`.
     """
 
@@ -114,7 +114,7 @@ class Release:
     contact: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As a line of JSON says it."""
+        """The event as a JSON object."""
         return {
             "event": "release",
             **_which(self.contact),
@@ -131,10 +131,10 @@ def _which(contact: int | None) -> dict[str, int]:
 
 
 def json_line(event: Mapping[str, Any]) -> str:
-    """An event as one line of JSON, without its end.
+    """An event as one line of JSON, without the line break.
 
-    In ASCII, which every encoding of stdout has, so that no label can break a line or reach a
-    terminal as an escape sequence; a number that is not finite, which JSON lacks, is null.
+    It is ASCII, which every encoding of stdout has, so that no label can break the line or reach a
+    terminal as an escape sequence. JSON has no NaN or infinity, so they become null.
 
     >>> json_line({"label": "Bär", "confidence": float("nan")})
     '{"label": "B\\\\u00e4r", "confidence": null}'
@@ -149,5 +149,5 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {key: _finite(one) for key, one in value.items()}
-    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
