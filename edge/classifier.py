@@ -155,7 +155,7 @@ class Classifier:
         return events
 
     def finish(self) -> list[Event]:
-        """End the stream: decide the tasks that wait, flagged `short`, or the absence of contact."""
+        """End the stream: decide the tasks that wait, flagged `short`, or that no contact came."""
         began = time.perf_counter()
         unfinished, self._waiting = self._waiting, []
         if self._begun == 0 and self._end_s is not None:
