@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
+TIME_ROUNDING_S = 5e-7
+"""A time meant to be that of a sample may lie below it by rounding, by less than this."""
+
 
 class Clock(Protocol):
     """Seconds that never go back."""

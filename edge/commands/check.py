@@ -33,7 +33,7 @@ def faults(file: SkinFile) -> Iterator[str]:
             f"no contact can begin: onset_counts is {file.layout.onset}, but a taxel gives at "
             f"most {top}"
         )
-    if any(chip.kind == "mpr121" and chip.sign == 1 for chip in file.chips):
+    if any(chip.kind.name == "mpr121" and chip.sign == 1 for chip in file.chips):
         yield "sign = 1, but a touch lowers an MPR121's values: leave sign out, or set it to -1"
     silent = file.signal.dead_band_sigma == 0.0 and file.signal.dead_band_counts == 0
     if file.layout.onset == 0 and silent:

@@ -14,9 +14,9 @@ import numpy as np
 from edge.commands.options import add_skin
 from edge.commands.output import Output
 from edge.commands.source import chip_event, open_skin
+from edge.i2c.chip import UNUSED
 from edge.skin.file import SkinFile
 from edge.skin.skin import ChipStatus
-from edge.skin.wiring import UNUSED
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""A bus that exists only here: chips on a wire, with what real adapters refuse."""
+"""A fake bus: models of chips on a wire, refusing the transactions that real adapters refuse."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from edge.fake.chips import FakeChip, FakeTCA9548A
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault, Route, Script
 from edge.i2c.bus import LARGEST_BYTES, LARGEST_MESSAGES, Message, Transfer, bus_error, wire_bits
+from edge.i2c.chip import FakeChip
+from edge.i2c.tca9548a import FakeTCA9548A
 
 Way = tuple[str, int, int | None, int | None]
 
@@ -39,39 +40,42 @@ class FakeBus:
         clock_hz: int = 400_000,
         timed: bool = False,
         timeout_s: float = 0.02,
+        overhead_s: float = 0.0,
         faults: Sequence[Fault] = NO_FAULTS,
         seed: int = 0,
         count: Callable[[Sequence[Message]], int] = wire_bits,
     ) -> None:
-        """Lay the bus.
+        """Connect chips to a bus.
 
         Args:
-            name: what errors call it.
+            name: its name in errors.
             chips: chips by address; a `FakeTCA9548A` carries more.
             clock: shared by the buses of a skin.
             clock_hz: of the wire.
-            timed: the virtual clock advances by the bits on the wire.
-            timeout_s: what a hung transfer costs where timed.
+            timed: the virtual clock advances with the bits on the wire.
+            timeout_s: time of a hung transfer, where timed.
+            overhead_s: time of the software for each transaction, where timed.
             faults: see `edge.fake.faults`.
             seed: of the faults' random stream.
-            count: bits on the wire of a call's messages.
+            count: gives the bits on the wire of a call's messages.
         """
         self.name = name
         self.chips = dict(chips or {})
         self.clock_hz, self.timed, self.timeout_s = clock_hz, timed, timeout_s
+        self.overhead_s = overhead_s
         self.hand = (clock or VirtualClock()).hand()
         self.script = Script(faults, name, seed)
         self.bits = 0
         """Bits on the wire so far."""
         self.transactions = 0
         self.threads: set[int] = set()
-        """Threads that have used it: a bus belongs to one at a time."""
+        """Threads that have used it; a bus belongs to one at a time."""
         self._held: dict[tuple[Route, int], bytes] = {}
         self._count = count
         self._open = True
 
     def inject(self, faults: Sequence[Fault], seed: int = 0) -> None:
-        """Start another script; transactions count from 0 again."""
+        """Start another script, which counts transactions from 0."""
         self.script = Script(faults, self.name, seed)
 
     def now(self) -> float:
@@ -83,7 +87,7 @@ class FakeBus:
         self.hand.advance(seconds)
 
     def close(self) -> None:
-        """Refuse what comes until it is opened again."""
+        """Refuse all transactions until it is opened again."""
         self._open = False
 
     def reopen(self) -> None:
@@ -97,14 +101,14 @@ class FakeBus:
         self._open = True
 
     def prepare(self, *messages: Message) -> Transfer:
-        """Keep the messages; their shape is judged when they are sent, as a kernel does."""
+        """Keep the messages; their shape is checked when they are sent, as in a kernel."""
         return Transfer(messages)
 
     def transfer(self, prepared: Transfer) -> None:
-        """Carry the messages to the chips that are connected.
+        """Carry the messages to the connected chips.
 
         Raises:
-            BusError: a shape is refused, nothing acknowledges, or a fault is due.
+            BusError: the shape is refused, no chip acknowledges, or a fault is due.
         """
         messages = prepared.messages
         address = messages[0].address
@@ -149,7 +153,7 @@ class FakeBus:
     def _route(self, address: int) -> tuple[Way, list[FakeChip]]:
         """Every chip that hears the address, and the way to it."""
         own = self.chips.get(address)
-        found = [] if own is None else [own]
+        chips = [] if own is None else [own]
         mux_address, channel = None, None
         for at, mux in self.chips.items():
             if isinstance(mux, FakeTCA9548A) and at != address:
@@ -157,8 +161,8 @@ class FakeBus:
                     if own is None:
                         mux_address, channel = at, n
                     if address in mux.channels[n]:
-                        found.append(mux.channels[n][address])
-        return (self.name, address, mux_address, channel), found
+                        chips.append(mux.channels[n][address])
+        return (self.name, address, mux_address, channel), chips
 
     def _carry(
         self,
@@ -202,4 +206,4 @@ class FakeBus:
     def _spend(self, bits: int) -> None:
         self.bits += bits
         if self.timed:
-            self.hand.advance(bits / self.clock_hz)
+            self.hand.advance(bits / self.clock_hz + self.overhead_s)

@@ -1,19 +1,16 @@
-"""Virtual time: it passes when someone sleeps, or by the bits on a wire that is timed."""
+"""Virtual time: it passes when someone sleeps, or with the bits on a timed wire."""
 
 from __future__ import annotations
 
 import math
 import time
 
-TIME_ROUNDING_S = 5e-7
-"""A time that is meant to be a sample's own may lie below it by rounding; no two samples are as
-close as this half microsecond."""
 LATE_S = 0.005
-"""A paced clock that is later than this behind real time is put forward."""
+"""A paced clock that lags real time by more than this is put forward."""
 
 
 class Hand:
-    """One bus's place in time; buses run side by side, so each has its own."""
+    """The time of one bus; buses run side by side, so each has its own."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
@@ -41,11 +38,11 @@ class VirtualClock:
 
     def __init__(self, start: float = 0.0) -> None:
         self.start = start
-        """When all hands last met: a bus that has done nothing since is here."""
+        """When all hands last met; a bus that has done nothing since is still there."""
         self._hands: list[Hand] = []
 
     def hand(self) -> Hand:
-        """A further bus's place in time."""
+        """A hand for a further bus."""
         self._hands.append(Hand(self))
         return self._hands[-1]
 
@@ -54,16 +51,16 @@ class VirtualClock:
         return max((hand.now() for hand in self._hands), default=self.start)
 
     def sleep_until(self, t: float) -> None:
-        """Let all hands meet at `t`, or now where it has passed."""
+        """Let all hands meet at `t`, or now if it has passed."""
         self.start = max(self.now(), t)
 
 
 class PacedClock(VirtualClock):
-    """Virtual time that goes with real time from the first wait on, for a person to watch.
+    """Virtual time that keeps to real time from the first wait on, for a person to watch.
 
-    While the machine keeps up, times are to the bit those of a clock that never waits. A loop that
-    comes late finds that time went on without it, as over real chips: hurrying after it would give
-    other programs, which send joint angles at real times, a clock that changes its speed.
+    While the machine keeps up, times have the same bits as on a clock that never waits. For a late
+    loop time has gone on, as with real chips: other programs send joint angles at real times, so
+    the clock must not change its speed to catch up.
     """
 
     def __init__(self) -> None:
@@ -71,11 +68,11 @@ class PacedClock(VirtualClock):
         self._ahead = math.nan
 
     def real(self) -> float:
-        """Seconds that have really passed, on this clock: when another program's line came."""
+        """Real time on this clock's scale, for the arrival of another program's line."""
         return self.now() if math.isnan(self._ahead) else time.monotonic() - self._ahead
 
     def sleep_until(self, t: float) -> None:
-        """Let all hands meet at `t`, and wait until as much real time has passed."""
+        """Let all hands meet at `t`, and wait until that much real time has passed."""
         if math.isnan(self._ahead) and t > self.now():
             self._ahead = time.monotonic() - self.now()
         super().sleep_until(t)

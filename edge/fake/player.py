@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeAD7147, FakeBlock, FakeChip, FakeMPR121, FakeTCA9548A, Sense
-from edge.fake.clock import TIME_ROUNDING_S, VirtualClock
+from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
-from edge.i2c import ad7147, block
+from edge.i2c import block
 from edge.i2c.bus import wire_bits
+from edge.i2c.chip import UNUSED, ChipSpec, FakeChip, Sense
 from edge.i2c.serial_bus import serial_bits
+from edge.i2c.tca9548a import FakeTCA9548A
 from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, TaxelCalibration
 from edge.skin.skin import Skin
-from edge.skin.wiring import UNUSED, BusSpec, ChipSpec
+from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
-
-REST = {"ad7147": 20946, "mpr121": 600, "block": 20946}
-"""Raw rest value where the skin's file has no calibration; Cody's real skin rests at 20946."""
 
 
 class Playback:
@@ -95,13 +95,9 @@ def calibrated(file: SkinFile) -> SkinFile:
     for chip in file.chips:
         for taxel in chip.taxels:
             if taxel != UNUSED:
-                baseline[taxel] = _rest(chip)
+                baseline[taxel] = chip.kind.rest(chip)
     shape = file.layout.shape
     return replace(file, calibration=TaxelCalibration(baseline.reshape(shape), np.zeros(shape)))
-
-
-def _rest(chip: ChipSpec) -> int:
-    return min(REST[chip.kind], 128 if chip.bits == 8 else 2048 if chip.bits == 12 else 65535)
 
 
 def fake_buses(
@@ -111,6 +107,7 @@ def fake_buses(
     *,
     timed: bool = False,
     noise_counts: float = 0.0,
+    overhead_s: float = 0.0,
     faults: Sequence[Fault] = NO_FAULTS,
     seed: int = 0,
 ) -> list[FakeBus]:
@@ -135,6 +132,7 @@ def fake_buses(
             clock_hz=spec.clock_hz,
             timed=timed,
             timeout_s=file.reading.timeout_s,
+            overhead_s=overhead_s,
             faults=faults,
             seed=seed,
             count=serial_bits if spec.serial else wire_bits,
@@ -142,7 +140,9 @@ def fake_buses(
         felt = _Felt(spec, scene, rest.baseline.ravel())
         for c, chip in enumerate(spec.chips):
             stream = np.random.default_rng([seed, b, c]) if noise_counts > 0.0 else None
-            _attach(bus, chip, _model(chip, felt.sense(chip, noise_counts, stream), timed))
+            power_up = random.Random(f"power-up/{seed}/{b}/{c}")
+            sense = felt.sense(chip, noise_counts, stream)
+            _attach(bus, chip, chip.kind.fake(chip, sense, timed, power_up))
         buses.append(bus)
     return buses
 
@@ -159,7 +159,7 @@ class _Felt:
         for chip in spec.chips:
             taxels = list(chip.taxels)
             self._gain[taxels], self._top[taxels] = chip.sign, chip.highest
-        self._gain[UNUSED], self._rest[UNUSED] = 0, _rest(spec.chips[0])
+        self._gain[UNUSED], self._rest[UNUSED] = 0, spec.chips[0].kind.rest(spec.chips[0])
         self._at, self._raw = math.nan, self._rest
 
     def raw(self, t: float) -> NDArray[np.int64]:
@@ -188,14 +188,6 @@ class _Felt:
         return quiet if stream is None else noisy
 
 
-def _model(chip: ChipSpec, sense: Sense, timed: bool) -> FakeChip:
-    if chip.kind == "ad7147":
-        return FakeAD7147(sense, refresh_s=ad7147.REFRESH_S[chip.decimation] if timed else 0.0)
-    if chip.kind == "mpr121":
-        return FakeMPR121(sense)
-    return FakeBlock(sense, taxels=len(chip.taxels), bits=chip.bits)
-
-
 def _attach(bus: FakeBus, chip: ChipSpec, model: FakeChip) -> None:
     if chip.mux is None or chip.channel is None:
         bus.chips[chip.address] = model
@@ -212,6 +204,7 @@ def fake_skin(
     clock: VirtualClock | None = None,
     timed: bool = False,
     noise_counts: float = 0.0,
+    overhead_s: float = 0.0,
     faults: Sequence[Fault] = NO_FAULTS,
     seed: int = 0,
     touch_counts: int | None = None,
@@ -219,7 +212,15 @@ def fake_skin(
     """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
     clock = clock or VirtualClock()
     file = calibrated(file)
-    buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed)
+    buses = fake_buses(
+        file,
+        scene,
+        clock,
+        timed=timed,
+        noise_counts=noise_counts,
+        overhead_s=overhead_s,
+        seed=seed,
+    )
     skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
     skin.start()
     clock.sleep_until(clock.now())
@@ -283,7 +284,7 @@ def skin_file(layout: SkinLayout) -> SkinFile:
         return replace(cody, name="fake", layout=layout)
     taxels, most = layout.rows * layout.cols, block.MOST_TAXELS
     chips = tuple(
-        ChipSpec("block", 0x08 + i, tuple(range(first, min(first + most, taxels))))
+        ChipSpec(block.KIND, 0x08 + i, tuple(range(first, min(first + most, taxels))))
         for i, first in enumerate(range(0, taxels, most))
     )
     if len(chips) > 100:

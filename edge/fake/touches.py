@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from edge import demo
 from edge.fake.player import calibrated
+from edge.i2c.chip import UNUSED
 from edge.recording import Recording, load
 from edge.skin.file import SkinFile
-from edge.skin.wiring import UNUSED
 from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.01

@@ -1,92 +1,107 @@
 """AD7147-1: 12 capacitive taxels of 16 bits.
 
-Registers are 16 bits behind a 16-bit pointer, both big-endian, with auto-increment
-(AD7147 data sheet; start sequence as in robotology/icub-firmware).
+Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-increment (AD7147 data
+sheet). The start sequence is that of robotology/icub-firmware and of Linux's driver ad714x.
 """
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.i2c.bus import Bus, fetch, read, send, write
-from edge.i2c.chip import Parsed, wrong_chip
+from edge.i2c.chip import Chip, ChipKind, Defaults, FakeChip, Option, Parsed, Sense
 
-STAGES = 12
-PWR_CONTROL, STAGE_CAL_EN, RESULTS, DEVICE_ID, STAGE_BANK = 0x00, 0x01, 0x0B, 0x17, 0x80
-ADDRESSES = range(0x2C, 0x30)
+STAGES, STAGE_REGISTERS = 12, 8
+SYSTEM, STATUS, RESULTS, DEVICE_ID, STAGE_BANK = 0x00, 0x08, 0x0B, 0x17, 0x80
 DECIMATION = {64: 0x02B0, 128: 0x01B0, 256: 0x00B0}
 """PWR_CONTROL for 12 stages at full power, by decimation."""
 REFRESH_S = {64: 0.009216, 128: 0.018432, 256: 0.036864}
 """Time of one conversion of 12 stages; only 64 keeps up with 100 Hz."""
+CALIBRATE_ALL = 0x0FFF
+STAGES_PER_WRITE = 3
+"""Some adapters carry at most 61 bytes a transfer (CP2112)."""
+DETECTION = (0x2626, 1600, 1600, 1600, 1600)
+"""Sensitivity and offsets of the chip's own touch detection, as in Linux's board files. No result
+depends on them, but power-up leaves them undefined."""
+
+Row = tuple[int, tuple[int, ...]]
+"""First register and the values from there on."""
 
 
 def stage_bank(stage: int) -> tuple[int, ...]:
-    """The registers of a stage that decide what it converts: its input goes to the converter's
-    positive side, without offset.
+    """The eight registers of a stage: its own input on the positive side, no offset.
 
-    The bank's other five set the limits of the chip's own touch detection, which nothing here
-    reads. Without them, twelve chips that browned out are back in 80 ms instead of 150.
+    >>> [hex(value) for value in stage_bank(7)[:3]]
+    ['0xffff', '0x1ffe', '0x0']
     """
     if stage < 7:
         connection = (0xFFFF ^ (1 << 2 * stage), 0x1FFF)
     else:
         connection = (0xFFFF, 0x1FFF ^ (1 << 2 * (stage - 7)))
-    return (*connection, 0)
+    return (*connection, 0, *DETECTION)
 
 
-def settings_table(decimation: int = 64) -> tuple[tuple[int, tuple[int, ...]], ...]:
-    """(first register, values) in the order in which they are written; calibration comes last."""
-    banks = tuple((STAGE_BANK + 8 * s, stage_bank(s)) for s in range(STAGES))
-    return (
-        *banks,
-        (PWR_CONTROL, (DECIMATION[decimation],)),
-        (0x02, (0, 0, 0, 0, 0, 0x0400)),
-        (STAGE_CAL_EN, (0x0FFF,)),
-    )
+def system_registers(decimation: int) -> Row:
+    """PWR_CONTROL, calibration of all stages, and ambient compensation and interrupts, all off."""
+    return (SYSTEM, (DECIMATION[decimation], CALIBRATE_ALL, 0, 0, 0, 0, 0, 0x0400))
+
+
+def start_rows(decimation: int = 64) -> list[Row]:
+    """The rows to write, in order: the stages, then the system registers."""
+    rows: list[Row] = []
+    for first in range(0, STAGES, STAGES_PER_WRITE):
+        banks = (stage_bank(s) for s in range(first, first + STAGES_PER_WRITE))
+        rows.append((STAGE_BANK + STAGE_REGISTERS * first, sum(banks, ())))
+    return [*rows, system_registers(decimation)]
+
+
+def check_rows(decimation: int = 64) -> list[Row]:
+    """The rows to read back: what each stage converts, and last the system registers.
+
+    A reset changes each of them, so that any one row tells a chip that has lost its settings.
+    """
+    stages = [(STAGE_BANK + STAGE_REGISTERS * s, stage_bank(s)[:3]) for s in range(STAGES)]
+    return [*stages, system_registers(decimation)]
 
 
 def words(values: tuple[int, ...]) -> bytes:
-    """Registers as they travel."""
+    """Registers as bytes on the wire."""
     return b"".join(v.to_bytes(2, "big") for v in values)
 
 
 def parse(data: NDArray[np.uint8]) -> Parsed:
     """12 big-endian words a chip.
 
-    A word of 0 is marked as not whole: it is what a chip without its settings serves, and no
-    stage that converts reads it. So is 0xFFFF at the end of a frame, with the word before it
-    where that ends in 0xFF: it is what a bus reads that nobody drives any more.
+    No converting stage reads 0: a chip without settings serves it, or converts stage 0 alone.
+    Words of 0xFFFF up to the end of a frame come from a bus that nothing drives any more; the
+    word before them is damaged too where it ends in 0xFF.
 
     Args:
         data: (n, 24) bytes.
 
     Returns:
-        (n, 12) values and which of them are whole.
+        (n, 12) values and which of them are intact.
     """
     values = data.view(">u2").astype(np.uint16)
-    whole = values != 0
-    broken = np.flatnonzero(values[:, -1] == 0xFFFF)
-    for row in broken.tolist():
+    intact = values != 0
+    intact[:, 0] &= intact[:, 1:].any(axis=1)
+    for row in np.flatnonzero(values[:, -1] == 0xFFFF).tolist():
         driven = np.flatnonzero(data[row] != 0xFF)
-        whole[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
-    return values, whole
+        intact[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
+    return values, intact
 
 
-class AD7147:
+class AD7147(Chip):
     """One AD7147-1.
 
     >>> chip = AD7147(bus, 0x2C)                                 # doctest: +SKIP
-    >>> list(chip.settings()); bus.transfer(chip.frame)          # doctest: +SKIP
-    >>> chip.parse(chip.frame.buffer[None])                      # doctest: +SKIP
+    >>> list(chip.settings()); chip.read()                       # doctest: +SKIP
+    >>> parse(chip.frame.buffer[None])                           # doctest: +SKIP
     """
-
-    kind: ClassVar[str] = "ad7147"
-    taxels = STAGES
-    bytes = 2 * STAGES
 
     def __init__(
         self,
@@ -96,56 +111,157 @@ class AD7147:
         decimation: int = 64,
         into: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Check that the chip is one.
+        """Identify the chip.
 
         Args:
             bus: a bus or a mux's channel.
             address: 0x2C to 0x2F.
             decimation: 64, 128 or 256; see `REFRESH_S`.
-            into: (24,) bytes that `frame` reads into; its own where None.
+            into: (24,) bytes that `read` fills; new ones where None.
 
         Raises:
-            WrongChip: the identity register holds something else.
-            BusError: it does not answer.
+            WrongChip: the identity register does not read 0x147x.
+            BusError: the chip does not answer.
         """
-        self.bus, self.address = bus, address
-        self._table = settings_table(decimation)
-        buffer = np.zeros(self.bytes, dtype=np.uint8) if into is None else into
-        self.frame = bus.prepare(write(address, words((RESULTS,))), read(address, buffer))
-        self._power = bus.prepare(write(address, words((PWR_CONTROL,))), read(address, 2))
-        self._expected = words((DECIMATION[decimation],))
+        buffer = np.zeros(2 * STAGES, dtype=np.uint8) if into is None else into
+        super().__init__(bus, address, words((RESULTS,)), buffer)
+        self._start = start_rows(decimation)
+        self._checks = [
+            (register, words(values), bus.prepare(write(address, words((register,))),
+                                                  read(address, 2 * len(values))))
+            for register, values in check_rows(decimation)
+        ]  # fmt: skip
+        self._turn = 0
         identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")
         if identity & 0xFFF0 != 0x1470:
-            raise wrong_chip(
-                bus, address, f"not an AD7147: its identity reads {identity:#06x}, not 0x147x"
-            )
-
-    parse = staticmethod(parse)
+            raise self.wrong(f"not an AD7147: its identity reads {identity:#06x}, not 0x147x")
 
     def settings(self) -> Iterator[None]:
-        """Write each row of the table, then read each back; a step a transaction.
-
-        What a reset clears for certain is read back last: a chip that loses its settings at any
-        moment before does not pass.
+        """Write all rows, read the status registers, which clears them, and read the rows back.
 
         Raises:
             WrongChip: a register does not hold what was written.
             BusError: a transaction failed.
         """
-        for register, values in self._table:
+        for register, values in self._start:
             send(self.bus, self.address, words((register, *values)))
             yield
-        for register, values in sorted(self._table, key=lambda row: row[0] == PWR_CONTROL):
-            got = fetch(self.bus, self.address, words((register,)), 2 * len(values))
-            if got != words(values):
-                raise wrong_chip(
-                    self.bus,
-                    self.address,
-                    f"register {register:#04x} of the AD7147 does not keep what is written",
+        fetch(self.bus, self.address, words((STATUS,)), 6)
+        yield
+        for register, expected, prepared in self._checks:
+            self.bus.transfer(prepared)
+            if prepared.buffer.tobytes() != expected:
+                raise self.wrong(
+                    f"register {register:#04x} of the AD7147 does not keep what is written"
                 )
             yield
 
     def healthy(self) -> bool:
-        """Whether PWR_CONTROL is as it was set; a reset clears it."""
-        self.bus.transfer(self._power)
-        return self._power.buffer.tobytes() == self._expected
+        """Whether the next row of `check_rows`, each in turn, holds what was written."""
+        self._turn = (self._turn + 1) % len(self._checks)
+        _, expected, prepared = self._checks[self._turn]
+        self.bus.transfer(prepared)
+        return prepared.buffer.tobytes() == expected
+
+    def read(self) -> None:
+        """Read all taxels, and once more where the last byte is 0xFF.
+
+        Such a byte may be a value, or a transfer that broke off before it; the words carry no
+        check that could tell.
+        """
+        self.bus.transfer(self.frame)
+        if self.frame.buffer[-1] == 0xFF:
+            self.bus.transfer(self.frame)
+
+
+class FakeAD7147(FakeChip):
+    """A model of the AD7147-1: the registers that the driver uses, and the results.
+
+    A running stage serves its taxel where its own input is connected, else something else. A
+    stage that does not run serves 0.
+    """
+
+    def __init__(
+        self, sense: Sense, *, refresh_s: float = 0.0, power_up: random.Random | None = None
+    ) -> None:
+        """Model a chip.
+
+        Args:
+            sense: raw values of the 12 taxels at a time.
+            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the last
+                one; 0 for results that are always fresh.
+            power_up: draws the stage registers, which power-up leaves undefined.
+        """
+        self._sense, self._refresh = sense, refresh_s
+        self._power_up = power_up or random.Random("power-up")
+        self.reset()
+
+    def reset(self) -> None:
+        """Registers as after power-on."""
+        self.registers = [0] * 0x400
+        for register in range(STAGE_BANK, STAGE_BANK + STAGE_REGISTERS * STAGES):
+            self.registers[register] = self._power_up.randrange(1 << 16)
+        self.registers[DEVICE_ID] = 0x1472
+        self._pointer = 0
+        self._connected: NDArray[np.bool_] | None = None
+
+    def write(self, data: bytes, t: float) -> None:
+        """Pointer, then words; writes to the read-only registers are lost."""
+        if len(data) < 2:
+            return
+        self._pointer = int.from_bytes(data[:2], "big") & 0x3FF
+        for i in range(2, len(data) - 1, 2):
+            if not STATUS <= self._pointer <= DEVICE_ID:
+                self.registers[self._pointer] = int.from_bytes(data[i : i + 2], "big")
+                self._connected = None
+            self._pointer = (self._pointer + 1) & 0x3FF
+
+    def read(self, n: int, t: float) -> bytes:
+        """Words from the pointer on."""
+        first, count = self._pointer, (n + 1) // 2
+        self._pointer = (first + count) & 0x3FF
+        if (first, count) == (RESULTS, STAGES):
+            return self._results(t).astype(">u2").tobytes()
+        registers = list(self.registers)
+        registers[RESULTS : RESULTS + STAGES] = self._results(t).tolist()
+        return words(tuple(registers[first : first + count])).ljust(n, b"\0")[:n]
+
+    def _results(self, t: float) -> NDArray[np.uint16]:
+        if self._connected is None:
+            banks = np.array(self.registers[STAGE_BANK : STAGE_BANK + STAGE_REGISTERS * STAGES])
+            banks = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
+            expected = np.array([stage_bank(s)[:3] for s in range(STAGES)])
+            power = self.registers[SYSTEM]
+            runs = power & 0x0003 == 0 and np.arange(STAGES) <= (power >> 4 & 15)
+            self._connected = (banks == expected).all(axis=1) & runs
+            self._elsewhere = np.where(runs, banks[:, 0] | 1, 0)
+            self._all = bool(self._connected.all())
+        if self._refresh > 0.0:
+            t = t // self._refresh * self._refresh
+        values = self._sense(t)
+        if self._all:
+            return values
+        return np.where(self._connected, values, self._elsewhere).astype(np.uint16)
+
+
+KIND = ChipKind(
+    name="ad7147",
+    description="a capacitance-to-digital converter",
+    driver=lambda bus, spec, into: AD7147(
+        bus, spec.address, decimation=spec.option("decimation"), into=into
+    ),
+    parse=lambda data, spec: parse(data),
+    fake=lambda spec, sense, timed, power_up: FakeAD7147(
+        sense,
+        refresh_s=REFRESH_S[spec.option("decimation")] if timed else 0.0,
+        power_up=power_up,
+    ),
+    frame_bytes=lambda spec: 2 * STAGES,
+    highest=lambda spec: 0xFFFE,  # 0xFFFF is the end of its range
+    rest=lambda spec: 20946,  # Cody's real skin rests there
+    addresses=range(0x2C, 0x30),
+    stages=STAGES,
+    pointer_bytes=2,
+    options={"decimation": Option(64, tuple(DECIMATION))},
+    defaults=lambda options: Defaults(threshold_counts=40, onset_counts=60),
+)

@@ -12,20 +12,32 @@ examples/firmware/ has one.
 from __future__ import annotations
 
 from binascii import crc_hqx
-from collections.abc import Iterator
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.clock import TIME_ROUNDING_S
 from edge.i2c.bus import Bus, fetch, read, write
-from edge.i2c.chip import Parsed, wrong_chip
+from edge.i2c.chip import (
+    Chip,
+    ChipKind,
+    ChipSpec,
+    Defaults,
+    FakeChip,
+    Option,
+    Parsed,
+    Sense,
+)
 
 IDENTITY, FRAME = b"\x00", b"\x10"
 MAGIC = b"TAXL\x01"
 BITS = (8, 12, 16)
 MOST_TAXELS = 4000
 """A frame then stays under the 8192 bytes of one message."""
+UNCHANGED_FRAMES = 25
+"""Readings with one sequence number after which the microcontroller hangs."""
+FAKE_RATE_HZ = 100.0
+"""Samples a second of the model; its sequence number counts them."""
 
 
 def crc16(data: bytes) -> int:
@@ -38,12 +50,12 @@ def crc16(data: bytes) -> int:
 
 
 def data_bytes(taxels: int, bits: int) -> int:
-    """Bytes that the taxels of one frame take."""
+    """Bytes of the taxels of one frame."""
     return (taxels * bits + 7) // 8
 
 
 def pack(values: NDArray[np.uint16], bits: int) -> bytes:
-    """Taxels as they travel; the inverse of `unpack`.
+    """Taxels as bytes on the wire; the inverse of `unpack`.
 
     Args:
         values: (taxels,), each below 2 ** bits.
@@ -80,13 +92,33 @@ def sealed(data: bytes) -> bytes:
     return data + crc16(data).to_bytes(2, "big")
 
 
-class Block:
+def parse(data: NDArray[np.uint8], taxels: int, bits: int) -> Parsed:
+    """Taxels of n microcontrollers, and whether the CRC of their frame holds.
+
+    Args:
+        data: (n, 4 + data_bytes) bytes.
+        taxels: of each.
+        bits: of one taxel.
+
+    Returns:
+        (n, taxels) values and which of them are intact: all of a frame or none.
+    """
+    # The CRC over bytes with their own CRC is 0.
+    intact = np.array([[crc16(row.tobytes()) == 0] for row in data])
+    values = unpack(data[:, 2:-2], taxels, bits)
+    return values, np.broadcast_to(intact, values.shape)
+
+
+def identity(taxels: int, bits: int) -> bytes:
+    """The identity register of a microcontroller."""
+    return sealed(MAGIC + bytes([bits]) + taxels.to_bytes(2, "big"))
+
+
+class Block(Chip):
     """One microcontroller.
 
     >>> chip = Block(bus, 0x28, taxels=384, bits=8)              # doctest: +SKIP
     """
-
-    kind: ClassVar[str] = "block"
 
     def __init__(
         self,
@@ -97,51 +129,96 @@ class Block:
         bits: int = 16,
         into: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Check that it serves what the skin file says.
+        """Check that the microcontroller serves what the skin file says.
 
         Args:
-            bus: a bus or a mux's channel.
-            address: its 7-bit address.
-            taxels: how many it serves.
+            bus: a bus, a mux's channel or a serial port.
+            address: 7 bits.
+            taxels: number of taxels that it serves.
             bits: of one taxel, 8, 12 or 16.
-            into: (4 + data_bytes,) bytes that `frame` reads into; its own where None.
+            into: (4 + data_bytes,) bytes that `read` fills; new ones where None.
 
         Raises:
             WrongChip: it serves something else.
             BusError: it does not answer.
         """
-        self.bus, self.address = bus, address
-        self.taxels, self.bits = taxels, bits
-        self.bytes = 4 + data_bytes(taxels, bits)
-        buffer = np.zeros(self.bytes, dtype=np.uint8) if into is None else into
-        self.frame = bus.prepare(write(address, FRAME), read(address, buffer))
-        self._expected = sealed(MAGIC + bytes([bits]) + taxels.to_bytes(2, "big"))
+        buffer = np.zeros(4 + data_bytes(taxels, bits), np.uint8) if into is None else into
+        super().__init__(bus, address, FRAME, buffer)
+        self._expected = identity(taxels, bits)
         self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
-        found = fetch(bus, address, IDENTITY, 10)
-        if found != self._expected:
-            if found[:5] == MAGIC and found == sealed(found[:8]):
-                served = f"serves {int.from_bytes(found[6:8], 'big')} taxels of {found[5]} bits"
-                raise wrong_chip(bus, address, f"{served}, not {taxels} of {bits}")
-            raise wrong_chip(bus, address, "not a microcontroller that serves frames")
-
-    def parse(self, data: NDArray[np.uint8]) -> Parsed:
-        """Taxels whose CRC holds.
-
-        Args:
-            data: (n, 4 + data_bytes) bytes.
-
-        Returns:
-            (n, taxels) values and which of them are whole: all of a frame or none.
-        """
-        whole = np.array([[crc16(row.tobytes()) == 0] for row in data])  # a CRC over itself is 0
-        values = unpack(data[:, 2:-2], self.taxels, self.bits)
-        return values, np.broadcast_to(whole, values.shape)
-
-    def settings(self) -> Iterator[None]:
-        """Nothing: the microcontroller knows its own."""
-        return iter(())
+        served = fetch(bus, address, IDENTITY, 10)
+        if served == self._expected:
+            return
+        if served[:5] == MAGIC and served == sealed(served[:8]):
+            number = int.from_bytes(served[6:8], "big")
+            raise self.wrong(f"serves {number} taxels of {served[5]} bits, not {taxels} of {bits}")
+        raise self.wrong("not a microcontroller that serves frames")
 
     def healthy(self) -> bool:
-        """Whether it still serves what it did."""
+        """Whether its identity is still the same."""
         self.bus.transfer(self._identity)
         return self._identity.buffer.tobytes() == self._expected
+
+
+class FakeBlock(FakeChip):
+    """A model of a microcontroller that serves frames."""
+
+    def __init__(self, sense: Sense, *, taxels: int, bits: int = 16) -> None:
+        """Model one.
+
+        Args:
+            sense: raw values at a time.
+            taxels: number of taxels that it serves.
+            bits: of one taxel.
+        """
+        self._sense, self._taxels, self._bits = sense, taxels, bits
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again, which takes no time."""
+        self._pointer = 0
+
+    def write(self, data: bytes, t: float) -> None:
+        """The pointer; nothing can be written."""
+        if data:
+            self._pointer = data[0]
+
+    def read(self, n: int, t: float) -> bytes:
+        """The identity or the frame, then zeros."""
+        out = b""
+        if self._pointer == IDENTITY[0]:
+            out = identity(self._taxels, self._bits)
+        elif self._pointer == FRAME[0]:
+            sample = int((t + TIME_ROUNDING_S) * FAKE_RATE_HZ)
+            values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
+            out = sealed((sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits))
+        return out[:n].ljust(n, b"\0")
+
+
+def _highest(spec: ChipSpec) -> int:
+    return (1 << spec.option("bits")) - 1
+
+
+KIND = ChipKind(
+    name="block",
+    description="a microcontroller that serves frames",
+    driver=lambda bus, spec, into: Block(
+        bus, spec.address, taxels=len(spec.taxels), bits=spec.option("bits"), into=into
+    ),
+    parse=lambda data, spec: parse(data, len(spec.taxels), spec.option("bits")),
+    fake=lambda spec, sense, timed, power_up: FakeBlock(
+        sense, taxels=len(spec.taxels), bits=spec.option("bits")
+    ),
+    frame_bytes=lambda spec: 4 + data_bytes(len(spec.taxels), spec.option("bits")),
+    highest=_highest,
+    rest=lambda spec: min(20946, (_highest(spec) + 1) // 2),
+    options={"bits": Option(16, BITS)},
+    # The drift of 16 bits, scaled to their range.
+    defaults=lambda options: {
+        12: Defaults(drift_counts_per_s=1.25, drift_limit_counts=125),
+        8: Defaults(drift_counts_per_s=0.08, drift_limit_counts=8),
+    }.get(options["bits"], Defaults()),
+    most_taxels=MOST_TAXELS,
+    unchanged_frames=UNCHANGED_FRAMES,
+    serial=True,
+)

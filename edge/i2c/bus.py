@@ -1,8 +1,8 @@
-"""An I2C bus: what travels over it, what goes wrong on it, and Linux's adapter.
+"""An I2C bus: its messages, its errors, and Linux's adapter.
 
-Only the transaction that every adapter carries is built on top of this module: one chip,
-`[write]`, `[read]` or `[write pointer][read n]`, in one call. Raspberry Pis up to 4 refuse a
-read anywhere but last, the Pi 5 a second address in one call.
+The drivers use only the transactions that every adapter carries: `[write]`, `[read]` or
+`[write pointer][read n]` to one chip in one call. Raspberry Pis up to 4 refuse a read anywhere but
+last, the Pi 5 a second address in one call.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from edge.errors import EdgeError
 
 I2C_TIMEOUT = 0x0702
-"""ioctl of linux/i2c-dev.h; its unit is 10 ms, and it holds for the whole adapter."""
+"""ioctl of linux/i2c-dev.h; its unit is 10 ms, and it applies to the whole adapter."""
 I2C_RDWR = 0x0707
 LARGEST_MESSAGES = 42
 LARGEST_BYTES = 8192
@@ -34,9 +34,9 @@ class BusError(EdgeError):
     """A transaction that failed.
 
     Attributes:
-        errno: what the kernel said.
+        errno: the kernel's error number.
         bus: the bus's name.
-        address: the chip's 7-bit address, or None where the bus itself is at fault.
+        address: the chip's 7-bit address, or None where the bus itself failed.
     """
 
     errno: int | None = None
@@ -82,53 +82,53 @@ class BusGone(BusError, ConnectionAbortedError):
 
 @dataclass(frozen=True)
 class Response:
-    """What to do about an error.
+    """How to react to an error.
 
     Attributes:
         error: the exception that stands for it.
         retries: how often the transaction is sent again within the same frame.
-        reopen: the bus is opened anew before it is used again.
-        mend: the end of the sentence for that person.
+        remedy: the words that end the message.
     """
 
     error: type[BusError]
     retries: int = 0
-    reopen: bool = False
-    mend: str = ""
+    remedy: str = ""
 
 
-_NACK = Response(BusNack, 3, mend="does not answer; check its power, wiring and address")
-_GONE = Response(BusGone, reopen=True, mend="the adapter has gone; plug it in again")
-_REFUSED = Response(BusRefused, 1, mend="the adapter refuses a transaction of this shape")
-_DENIED = Response(BusDenied, mend="may not be opened; add yourself to the group i2c, or use sudo")
+_NACK = Response(BusNack, 3, remedy="does not answer; check its power, wiring and address")
+_GONE = Response(BusGone, remedy="the adapter has gone; plug it in again")
+_REFUSED = Response(BusRefused, 1, remedy="the adapter refuses a transaction of this shape")
+_DENIED = Response(
+    BusDenied, remedy="may not be opened; add yourself to the group i2c, or use sudo"
+)
 RESPONSES: dict[int, Response] = {
     errno.EREMOTEIO: _NACK,
     errno.ENXIO: _NACK,
     errno.EIO: Response(
-        BusFault, 2, mend="the transfer broke off; check cable length and pull-ups"
+        BusFault, 2, remedy="the transfer broke off; check cable length and pull-ups"
     ),
-    errno.ETIMEDOUT: Response(BusTimeout, reopen=True, mend="the transfer hung until its timeout"),
-    errno.EAGAIN: Response(BusArbitration, 3, mend="another master holds the bus"),
-    errno.EBUSY: Response(BusBusy, mend="a driver of the kernel owns the address; unbind it"),
+    errno.ETIMEDOUT: Response(BusTimeout, remedy="the transfer hung until its timeout"),
+    errno.EAGAIN: Response(BusArbitration, 3, remedy="another master holds the bus"),
+    errno.EBUSY: Response(BusBusy, remedy="a driver of the kernel owns the address; unbind it"),
     errno.EOPNOTSUPP: _REFUSED,
     errno.EINVAL: _REFUSED,
     errno.ENOENT: Response(
-        BusMissing, mend="no such bus; is I2C switched on, and the number right?"
+        BusMissing, remedy="no such bus; is I2C switched on, and the number right?"
     ),
     errno.EACCES: _DENIED,
     errno.EPERM: _DENIED,
     errno.ENODEV: _GONE,
 }
-"""errno to response, as adapters of the kernel give it. One that is not here counts as EIO."""
+"""Response by errno, as the kernel's adapters give it. Any other errno counts as EIO."""
 
 
 def response(code: int | None) -> Response:
-    """What to do about an errno."""
+    """How to react to an errno."""
     return RESPONSES.get(code or errno.EIO, RESPONSES[errno.EIO])
 
 
 def bus_error(code: int | None, bus: str, address: int | None = None) -> BusError:
-    """The named error of an errno, with a sentence that names the bus and the chip.
+    """Build the named error of an errno; its message names the bus and the chip.
 
     >>> bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
     BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)')
@@ -137,14 +137,14 @@ def bus_error(code: int | None, bus: str, address: int | None = None) -> BusErro
     where = bus if address is None else f"{bus}, address {address:#04x}"
     answer = response(code)
     name = errno.errorcode.get(code, str(code))
-    error = answer.error(f"{where}: {answer.mend} ({name})")
+    error = answer.error(f"{where}: {answer.remedy} ({name})")
     error.errno, error.bus, error.address = code, bus, address
     return error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Message:
-    """One message: bytes to a chip, or room for bytes from it."""
+    """One message: bytes to a chip, or a buffer for bytes from it."""
 
     address: int
     buffer: NDArray[np.uint8]
@@ -157,7 +157,7 @@ def write(address: int, data: bytes | Sequence[int]) -> Message:
 
 
 def read(address: int, into: NDArray[np.uint8] | int) -> Message:
-    """A message of bytes from a chip, into an array given or a new one."""
+    """A message of bytes from a chip, into the given array or a new one."""
     buffer = np.zeros(into, dtype=np.uint8) if isinstance(into, int) else into
     if buffer.dtype != np.uint8 or not buffer.flags.c_contiguous or not buffer.flags.writeable:
         raise ValueError("a read needs a writable, contiguous uint8 array")
@@ -166,14 +166,14 @@ def read(address: int, into: NDArray[np.uint8] | int) -> Message:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transfer:
-    """Messages of one call, prepared once and sent as often as wanted."""
+    """Messages of one call, prepared once and sent any number of times."""
 
     messages: tuple[Message, ...]
     handle: Any = None
 
     @property
     def buffer(self) -> NDArray[np.uint8]:
-        """The last message's bytes: what was read, where the last message is a read."""
+        """The last message's bytes: those read, where the last message is a read."""
         return self.messages[-1].buffer
 
 
@@ -187,11 +187,11 @@ def wire_bits(messages: Sequence[Message]) -> int:
 
 
 class Bus(Protocol):
-    """What carries transactions: an adapter, a mux's channel, or a fake."""
+    """A carrier of transactions: an adapter, a mux's channel, or a fake."""
 
     @property
     def name(self) -> str:
-        """What errors call it."""
+        """Its name in errors."""
         ...
 
     def prepare(self, *messages: Message) -> Transfer:
@@ -199,10 +199,10 @@ class Bus(Protocol):
         ...
 
     def transfer(self, prepared: Transfer) -> None:
-        """Send it; what was read is in its messages' buffers.
+        """Send it; bytes read are then in its messages' buffers.
 
         Raises:
-            BusError: it failed; `RESPONSES` says what to do about it.
+            BusError: it failed; see `RESPONSES`.
         """
         ...
 
@@ -211,11 +211,11 @@ class Bus(Protocol):
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Wait, as some chips need it."""
+        """Wait; some chips need it."""
         ...
 
     def reopen(self) -> None:
-        """Open it anew; what was prepared stays good.
+        """Open it anew; prepared transfers stay valid.
 
         Raises:
             BusError: it is not there.
@@ -223,7 +223,7 @@ class Bus(Protocol):
         ...
 
     def close(self) -> None:
-        """Let it go; twice is fine."""
+        """Close it; calling it twice is fine."""
         ...
 
 
@@ -233,7 +233,7 @@ def send(bus: Bus, address: int, data: bytes | Sequence[int]) -> None:
 
 
 def fetch(bus: Bus, address: int, pointer: bytes, n: int) -> bytes:
-    """Read `n` bytes from a chip, once, after writing `pointer` (nothing where it is empty)."""
+    """Read `n` bytes from a chip, once, after writing `pointer` unless it is empty."""
     messages = [write(address, pointer)] if pointer else []
     prepared = bus.prepare(*messages, read(address, n))
     bus.transfer(prepared)
@@ -259,7 +259,7 @@ class LinuxBus:
         Args:
             device: `/dev/i2c-1`, or 1.
             timeout_s: how long a hung transfer may last, rounded up to the adapter's 10 ms;
-                the kernel's own default is a second, a hundred frames.
+                the kernel's own default is a second.
 
         Raises:
             BusError: it is not there, may not be opened, or carries no plain I2C.
@@ -294,18 +294,18 @@ class LinuxBus:
         self._smbus, self._fd = smbus, smbus.fd
 
     def prepare(self, *messages: Message) -> Transfer:
-        """Build smbus2's structures over the messages' own buffers: nothing is copied later."""
+        """Build smbus2's structures over the messages' own buffers, without a copy."""
         from smbus2 import i2c_msg
         from smbus2.smbus2 import i2c_rdwr_ioctl_data
 
-        parts: list[Any] = []
+        prepared: list[Any] = []
         for message in messages:
             buffer = message.buffer
             pointer = ctypes.cast(buffer.ctypes.data, ctypes.POINTER(ctypes.c_char))
-            parts.append(
+            prepared.append(
                 i2c_msg(addr=message.address, flags=int(message.read), len=len(buffer), buf=pointer)
             )
-        return Transfer(messages, i2c_rdwr_ioctl_data.create(*parts))
+        return Transfer(messages, i2c_rdwr_ioctl_data.create(*prepared))
 
     def transfer(self, prepared: Transfer) -> None:
         """Send it; the interpreter lock is free while it is on the wire.
@@ -320,11 +320,11 @@ class LinuxBus:
             code = error.errno if isinstance(error, OSError) else errno.ENODEV
             raise bus_error(code, self.name, prepared.messages[0].address) from None
         if done != len(prepared.messages):
-            # The kernel stopped half way without an error: the buffer holds an older reading.
+            # The kernel stopped half way without an error, and the buffer holds an older reading.
             raise bus_error(errno.EIO, self.name, prepared.messages[0].address)
 
     def close(self) -> None:
-        """Let it go; twice is fine."""
+        """Close it; calling it twice is fine."""
         self._fd = -1
         if self._smbus is not None:
             self._smbus.close()

@@ -1,67 +1,217 @@
-"""What every chip with taxels offers to the skin."""
+"""A chip with taxels: its driver, its descriptor, its place in the wiring, and its model.
+
+Whoever adds a chip writes one module with a driver (a `Chip`), a model (a `FakeChip`) and a
+descriptor (a `ChipKind`), and adds the descriptor to the list in `edge.skin.kinds`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import ClassVar, Protocol
+import random
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.bus import Bus, BusError, Transfer
+from edge.i2c.bus import Bus, BusError, read, wire_bits, write
 
+ADDRESSES = range(0x08, 0x78)
+"""7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
+UNUSED = -1
+"""A stage without a taxel."""
 Parsed = tuple[NDArray[np.uint16], NDArray[np.bool_]]
-"""Values (n, taxels) of n chips, and which of them are whole, (n, taxels)."""
+"""Values (n, taxels) of n chips, and which of them are intact, (n, taxels)."""
+Sense = Callable[[float], NDArray[np.uint16]]
+"""Raw values (taxels,) that a fake chip senses at a time in seconds."""
 
 
 class WrongChip(BusError, LookupError):
     """Something answers at the address, but it is not the chip that the skin file names."""
 
 
-class Chip(Protocol):
-    """A chip that serves taxels.
+class Chip(ABC):
+    """A driver of one chip.
 
-    Its constructor sends nothing but the reads that identify it. `settings` configures it in
-    steps of one transaction each, so that a chip can be brought back between two frames.
+    The constructor sends only the reads that identify the chip. `settings` configures it in steps
+    of one transaction each, so that a chip can be set up between two frames.
+
+    Attributes:
+        bus: a bus or a mux's channel.
+        address: 7 bits.
+        frame: the prepared transfer `[write pointer][read all taxels]`.
     """
 
-    kind: ClassVar[str]
-    bus: Bus
-    address: int
-    frame: Transfer
-    """Reads all taxels; its buffer goes to `parse`."""
-
-    @property
-    def taxels(self) -> int:
-        """How many it serves."""
-        ...
+    def __init__(self, bus: Bus, address: int, pointer: bytes, into: NDArray[np.uint8]) -> None:
+        self.bus, self.address = bus, address
+        self.frame = bus.prepare(write(address, pointer), read(address, into))
 
     def settings(self) -> Iterator[None]:
         """Write the settings and read them back, one transaction a step.
 
-        The last step reads what a reset changes, so that a chip that loses its settings on the
-        way does not pass.
+        The last step reads a register that a reset changes, so that a chip that resets during
+        set-up does not pass. A chip without settings has no steps.
 
         Raises:
-            BusError: a transaction failed, or what was read back differs.
+            BusError: a transaction failed, or a register does not hold what was written.
         """
-        ...
+        return iter(())
 
+    @abstractmethod
     def healthy(self) -> bool:
-        """Whether it still has its settings: one short read. A chip that browned out does not.
+        """Whether the chip still has its settings: one short read.
 
         Raises:
             BusError: the transaction failed.
         """
-        ...
 
-    def parse(self, data: NDArray[np.uint8]) -> Parsed:
-        """Values of chips like this one from their bytes (n, bytes): a pure function."""
-        ...
+    def read(self) -> None:
+        """Read all taxels into the buffer of `frame`.
+
+        Raises:
+            BusError: the transaction failed.
+        """
+        self.bus.transfer(self.frame)
+
+    def wrong(self, what: str) -> WrongChip:
+        """Build the error for a chip that is not what the skin file says."""
+        error = WrongChip(f"{self.bus.name}, address {self.address:#04x}: {what}")
+        error.bus, error.address = self.bus.name, self.address
+        return error
 
 
-def wrong_chip(bus: Bus, address: int, what: str) -> WrongChip:
-    """The error of a chip that is not what the skin file says."""
-    error = WrongChip(f"{bus.name}, address {address:#04x}: {what}")
-    error.bus, error.address = bus.name, address
-    return error
+class FakeChip(ABC):
+    """A model of a chip on a fake bus."""
+
+    @abstractmethod
+    def write(self, data: bytes, t: float) -> None:
+        """Take the bytes of one write message at time `t`."""
+
+    @abstractmethod
+    def read(self, n: int, t: float) -> bytes:
+        """Serve the `n` bytes of one read message at time `t`."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Lose all settings, as in a brown-out."""
+
+    def stop(self) -> None:  # noqa: B027 - most chips do nothing at STOP
+        """End the transaction."""
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """Values for a kind of chip that a skin file need not give.
+
+    Attributes:
+        sign: 1 where a touch raises the raw value, -1 where it lowers it.
+        threshold_counts, onset_counts: see `edge.touch.layout.SkinLayout`; 0 for no default.
+        dead_band_counts, drift_counts_per_s, drift_limit_counts: see `edge.skin.file.Signal`.
+    """
+
+    sign: int = 1
+    threshold_counts: int = 0
+    onset_counts: int = 0
+    dead_band_counts: int = 0
+    drift_counts_per_s: float = 20.0
+    drift_limit_counts: int = 2000
+
+
+@dataclass(frozen=True)
+class Option:
+    """A key of a skin file that only one kind of chip has: its default and allowed values."""
+
+    default: int
+    allowed: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class ChipSpec:
+    """One chip of a skin file.
+
+    Attributes:
+        kind: the descriptor.
+        address: 7 bits; 0 on a serial port.
+        taxels: flat index (row * cols + col) of each stage, `UNUSED` for a stage without one.
+        mux, channel: the mux's address and channel, or None where the chip is on the bus itself.
+        sign: 1 where a touch raises the raw value, -1 where it lowers it.
+        options: values of the kind's options; the defaults apply to those left out.
+    """
+
+    kind: ChipKind
+    address: int
+    taxels: tuple[int, ...]
+    mux: int | None = None
+    channel: int | None = None
+    sign: int = 1
+    options: Mapping[str, int] = field(default_factory=dict)
+
+    def option(self, name: str) -> int:
+        """The value of one of the kind's options."""
+        return self.options.get(name, self.kind.options[name].default)
+
+    @property
+    def route(self) -> str:
+        """Mux, channel and address for a person to read."""
+        way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
+        return f"{way}address {self.address:#04x}"
+
+    @property
+    def highest(self) -> int:
+        """The largest raw value that is not saturated."""
+        return self.kind.highest(self)
+
+    @property
+    def frame_bytes(self) -> int:
+        """Bytes of one reading."""
+        return self.kind.frame_bytes(self)
+
+    @property
+    def frame_bits(self) -> int:
+        """Bits on the wire of one reading, `[write pointer][read frame]`."""
+        pointer = write(self.address, bytes(self.kind.pointer_bytes))
+        return wire_bits([pointer, read(self.address, self.frame_bytes)])
+
+
+@dataclass(frozen=True)
+class ChipKind:
+    """The descriptor of a kind of chip: all that the skin and the fake know about it.
+
+    Attributes:
+        name: the value of `kind` in a skin file.
+        description: a few words for a person.
+        driver: makes the driver of a chip, which reads frames into the given bytes.
+        parse: values and intact taxels of n chips from their bytes (n, frame_bytes); a pure
+            function.
+        fake: makes a model from the spec, the sensed values, whether conversions take their real
+            time, and a stream for what power-up leaves undefined.
+        frame_bytes: bytes of one reading.
+        highest: the largest raw value that is not saturated.
+        rest: raw value at rest of a fake chip without calibration.
+        addresses: addresses that the chip can have.
+        stages: number of its stages; None where the skin file decides, up to `most_taxels`.
+        pointer_bytes: bytes of the register pointer.
+        options: keys of a skin file that only this kind has.
+        defaults: values that the skin file need not give.
+        most_taxels: limit where `stages` is None.
+        unchanged_frames: readings with the same bytes after which the chip hangs for certain;
+            None where bytes at rest may stay the same.
+        serial: whether it can be on a serial port.
+    """
+
+    name: str
+    description: str
+    driver: Callable[[Bus, ChipSpec, NDArray[np.uint8]], Chip]
+    parse: Callable[[NDArray[np.uint8], ChipSpec], Parsed]
+    fake: Callable[[ChipSpec, Sense, bool, random.Random], FakeChip]
+    frame_bytes: Callable[[ChipSpec], int]
+    highest: Callable[[ChipSpec], int]
+    rest: Callable[[ChipSpec], int]
+    addresses: range = ADDRESSES
+    stages: int | None = None
+    pointer_bytes: int = 1
+    options: Mapping[str, Option] = field(default_factory=dict)
+    defaults: Callable[[Mapping[str, int]], Defaults] = lambda options: Defaults()
+    most_taxels: int = 4000
+    unchanged_frames: int | None = None
+    serial: bool = False

@@ -1,6 +1,6 @@
-"""TCA9548A: one bus to eight, one control byte. Each channel is itself a bus.
+"""TCA9548A: a mux with eight channels and one control byte. Each channel is itself a bus.
 
-A channel connects only after STOP, so that selecting it is a call of its own (TCA9548A data
+A channel connects only after STOP, so that selecting it takes a call of its own (TCA9548A data
 sheet, section 8.5).
 """
 
@@ -19,6 +19,7 @@ from edge.i2c.bus import (
     wire_bits,
     write,
 )
+from edge.i2c.chip import FakeChip
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = 8
@@ -43,14 +44,14 @@ class TCA9548A:
         verify: bool = True,
         beside: tuple[TCA9548A, ...] = (),
     ) -> None:
-        """Check that it is there, and disconnect all its channels.
+        """Check that the mux answers, and disconnect all its channels.
 
         Args:
-            bus: the bus it hangs on.
+            bus: the bus that it is on.
             address: 0x70 to 0x77.
             verify: read the control byte back whenever a channel is selected. It costs 20 bits
-                (1.9 % of a frame of 32 AD7147) and catches the wrong channel, whose data would
-                be plausible and wrong.
+                (1.9 % of a frame of 32 AD7147) and catches a wrong channel, whose data would
+                look plausible.
             beside: other muxes on the same bus, of which at most one may have a channel open.
 
         Raises:
@@ -58,7 +59,7 @@ class TCA9548A:
         """
         self.bus, self.address, self.verify = bus, address, verify
         self.selected: int | None = None
-        """The channel known to be connected; None where unknown."""
+        """The connected channel; None where unknown or none."""
         self._select = [bus.prepare(write(address, [1 << n])) for n in range(CHANNELS)]
         self._none = bus.prepare(write(address, [0]))
         self._control = bus.prepare(read(address, 1))
@@ -82,10 +83,10 @@ class TCA9548A:
         self._open = False
 
     def select(self, n: int) -> None:
-        """Connect channel `n` alone; nothing is sent where it is connected already.
+        """Connect channel `n` alone; send nothing if it is connected already.
 
         Raises:
-            BusError: it failed; which channel is connected is then unknown.
+            BusError: it failed; the connected channel is then unknown.
         """
         if self.selected == n:
             return
@@ -96,11 +97,11 @@ class TCA9548A:
         self._open, self.selected = True, n
 
     def forget(self) -> None:
-        """Take the connected channel for unknown, as it is after any error."""
+        """Take the connected channel as unknown, which it is after any error."""
         self.selected = self._open = None
 
     def _leave(self) -> None:
-        """Disconnect, for a mux beside; one that has gone for good does not cost the others."""
+        """Disconnect for the sake of a mux beside; a mux that never answers is passed over."""
         for _ in range(4):
             try:
                 return self.disconnect()
@@ -132,7 +133,7 @@ class Channel:
         return self.mux.bus.prepare(*messages)
 
     def transfer(self, prepared: Transfer) -> None:
-        """Select the channel where it is not, then send.
+        """Select the channel if necessary, then send.
 
         Raises:
             BusError: either failed; the channel is unknown from then on.
@@ -152,4 +153,34 @@ class Channel:
         self.mux.bus.reopen()
 
     def close(self) -> None:
-        """Nothing: whoever opened the bus closes it."""
+        """Do nothing: whoever opened the bus closes it."""
+
+
+_CHANNELS_OF = [[n for n in range(CHANNELS) if byte >> n & 1] for byte in range(256)]
+
+
+class FakeTCA9548A(FakeChip):
+    """A model of the TCA9548A: the channels written connect at STOP."""
+
+    def __init__(self) -> None:
+        self.channels: list[dict[int, FakeChip]] = [{} for _ in range(CHANNELS)]
+        """Chips by address on each channel."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Disconnect all channels."""
+        self._control = 0
+        self.stop()
+
+    def write(self, data: bytes, t: float) -> None:
+        """The last byte written is the control byte."""
+        if data:
+            self._control = data[-1]
+
+    def read(self, n: int, t: float) -> bytes:
+        """The control byte, repeated."""
+        return bytes([self._control]) * n
+
+    def stop(self) -> None:
+        """Connect the channels written."""
+        self.connected = _CHANNELS_OF[self._control]

@@ -1,94 +1,86 @@
-"""The chips of one bus, read frame by frame, whatever the bus does.
+"""The chips of one bus: read in every frame, and brought back after a failure.
 
-A chip that fails is sent the same transaction again as `edge.i2c.bus.RESPONSES` says, then left
-out and tried again after a pause that grows; when it answers it is identified and, where its
-settings are gone, set up again, a few transactions a frame. None of it costs another chip.
+A failed transaction is sent again as `edge.i2c.bus.RESPONSES` says. A chip that still fails is
+down; it is tried again at once and then every 0.1 s. While a chip is being set up, the others are
+read in every third frame, and the time saved goes to it, one transaction at a time.
 """
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.ad7147 import AD7147
-from edge.i2c.block import Block
-from edge.i2c.bus import (
-    Bus,
-    BusError,
-    BusGone,
-    BusRefused,
-    BusTimeout,
-    Transfer,
-    response,
-)
-from edge.i2c.chip import Chip
-from edge.i2c.mpr121 import MPR121
+from edge.i2c.bus import Bus, BusError, BusGone, BusRefused, BusTimeout, response
+from edge.i2c.chip import Chip, ChipSpec
 from edge.i2c.tca9548a import TCA9548A
-from edge.skin.slot import ChipState, Slot
-from edge.skin.wiring import BusSpec, ChipSpec
+from edge.skin.wiring import BusSpec
 
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.025, 0.1
-"""Pauses before a chip that does not answer is tried again; a try costs a few bits."""
-HUNG_PAUSE_S, LONGEST_HUNG_PAUSE_S = 0.05, 1.0
-"""Pauses before a chip that hung is; a try costs the adapter's timeout. Each pause is four times
-the one before."""
-GONE_PAUSE_S = 0.05
-"""Pause between two tries to open a bus whose adapter has gone."""
+PAUSE_S = 0.1
+"""Time between two attempts to bring the same chip back, and from a timeout to the next attempt
+on its bus."""
 RETRIES_PER_FRAME = 12
-STEPS_PER_FRAME = 128
-"""Most transactions a frame spends on bringing chips back; on a real wire its time ends them."""
-CHECKS_BEFORE_SET_UP = 4
-"""A chip whose settings are in place, but whose taxels have not become valid for 15 frames (one,
-two, four and eight between checks), is set up again: a conversion takes at most four at 100 Hz."""
-RESCUE_FRAMES, RESCUE_PAUSE = 10, 100
-"""How many frames may go to chips that have lost their settings alone, and how many pass before
-that is tried again."""
-RESCUE_SHARE = 1.07
-"""Nothing is read in such a frame, so that less of it need be kept for what cannot be foreseen."""
-LONGEST_DOUBT = 64
-"""Most frames between two checks of a chip whose taxels stay invalid."""
+SET_UP_AFTER, SET_UP_EVERY = 16, 64
+"""A chip that keeps its settings but serves damaged bytes is set up again after so many frames in a
+row, and then every so many; a conversion takes at most four frames at 100 Hz."""
+LONGEST_STEP_S = 0.0015
+"""A step of a set-up takes no longer at 400 kHz; none begins so shortly before a frame's end."""
+OLDEST_FRAMES = 3
+"""While a chip is being set up, each of the others is read in one frame of so many. A taxel stays
+valid for as long."""
+NEVER = -1.0e9
+"""Read time of a chip not read yet."""
 
 
-class Persistent:
-    """A bus that sends a transaction again as often as its error allows."""
+class ChipState(enum.Enum):
+    """The state of one chip."""
 
-    def __init__(self, bus: Bus, reader: BusReader) -> None:
-        self._bus, self._reader = bus, reader
-        self.name = bus.name
-        self.now, self.sleep, self.prepare = bus.now, bus.sleep, bus.prepare
-        self.reopen, self.close = bus.reopen, bus.close
-        self._send = bus.transfer
+    RUNNING = "running"
+    STARTING = "starting"
+    DOWN = "down"
 
-    def transfer(self, prepared: Transfer) -> None:
-        """Send it.
 
-        Raises:
-            BusError: it failed for good, or the frame's retries are used up.
-        """
-        try:
-            self._send(prepared)
-        except BusError as error:
-            self._again(prepared, error)
+class Slot:
+    """One chip on its bus: its state, and the bytes last read from it.
 
-    def _again(self, prepared: Transfer, error: BusError) -> None:
-        tries = 0
-        while True:
-            answer = response(error.errno)
-            if tries >= answer.retries or self._reader.retries == 0:
-                raise error
-            tries += 1
-            self._reader.retries -= 1
-            try:
-                return self._send(prepared)
-            except BusError as another:
-                error = another
+    Attributes:
+        spec: from the skin file.
+        row: (frame_bytes,) buffer for its bytes.
+        chip: its driver, once it has been identified.
+        state: see `ChipState`.
+        error: why it is down.
+        at: when it was last read, on the bus's clock.
+        good: whether `row` holds a complete reading of a chip with its settings.
+        damaged: number of readings in a row whose bytes made no sense; the skin counts it.
+        recoveries: how often the chip has come back.
+    """
+
+    def __init__(self, spec: ChipSpec, row: NDArray[np.uint8]) -> None:
+        self.spec, self.row = spec, row
+        self.chip: Chip | None = None
+        self.state = ChipState.DOWN
+        self.error: BusError | None = None
+        self.at = NEVER
+        self.good = False
+        self.damaged = 0
+        self.recoveries = 0
+        self.has_settings = False
+        """The settings were written and read back, and no loss was seen since."""
+        self.retry_at = -math.inf
+        self.steps: Iterator[None] | None = None
+        """The steps left until it runs."""
+
+    @property
+    def running(self) -> bool:
+        """Whether it is set up and answers."""
+        return self.state is ChipState.RUNNING
 
 
 class BusReader:
-    """The chips of one bus; one thread's own."""
+    """The chips of one bus, used by one thread at a time."""
 
     def __init__(
         self,
@@ -104,7 +96,7 @@ class BusReader:
         Args:
             bus: an open bus.
             spec: its chips.
-            rows: for each chip the bytes that its frame is read into.
+            rows: for each chip the buffer for its bytes.
             verify_mux: see `edge.i2c.tca9548a.TCA9548A`.
             recheck_frames: see `edge.skin.file.Reading`.
         """
@@ -112,276 +104,174 @@ class BusReader:
         self.slots = [Slot(chip, row) for chip, row in zip(spec.chips, rows, strict=True)]
         self._verify, self._recheck = verify_mux, recheck_frames
         self._muxes: dict[int, TCA9548A] = {}
-        self._frames = 0
+        self._frame = 0
         self._turn = 0
-        self._resting_until = -math.inf
-        self._gone = False
-        self._rests = 0
-        self.retries = RETRIES_PER_FRAME
-        self._timeouts = 0
-        self._all_running = False
-        self._starting = False
-        self._doubts = False
-        """A chip may be suspect."""
-        self._rescued_from = -RESCUE_PAUSE - 1
+        self._retries = self._timeouts = 0
+        self._rest_until = -math.inf
+        """No chip is brought back before this time."""
 
     def start(self) -> None:
-        """Identify and set up every chip; those that fail twice are left down.
+        """Identify and set up every chip; one that fails twice is left down.
 
         Raises:
             BusRefused: the adapter does not carry the transactions that drivers use.
         """
-        self._starting = True
-        for slot in self.slots * 2:
-            slot.revival = None
-            self.retries, self._timeouts = RETRIES_PER_FRAME, 0
-            while not slot.running and self._step(slot):
-                pass
-        self._starting = False
+        for _ in range(2):
+            for slot in self.slots:
+                self._timeouts = 0
+                while not slot.running and self._step(slot):
+                    pass
+            if not any(slot.running for slot in self.slots) and not self._reopened():
+                break
+        for slot in self.slots:
+            if isinstance(slot.error, BusRefused):
+                raise slot.error
 
     def read(self, slots: Sequence[Slot], deadline: float = math.inf) -> None:
-        """Read these chips once; `good` and `at` of each say how it went.
+        """Read these chips once; `good` and `at` of each tell the outcome.
 
         Args:
-            slots: of this bus, in the order in which to read them.
-            deadline: on the bus's clock; chips are not brought back after it.
-
+            slots: of this bus, in reading order.
+            deadline: on the bus's clock; after it, chips are brought back by one step only.
         """
-        self._frames += 1
-        self.retries, self._timeouts = RETRIES_PER_FRAME, 0
+        self._frame += 1
+        self._retries, self._timeouts = RETRIES_PER_FRAME, 0
+        if self._setting_up():
+            share = -(-len(slots) // OLDEST_FRAMES)
+            first = self._frame % OLDEST_FRAMES * share
+            slots = slots[first : first + share]
         for slot in slots:
-            slot.good = False
-        now = self.bus.now
-        if now() < self._resting_until or (self._gone and not self._return()):
-            return
-        if self._doubts:
-            self._check_suspects(deadline, damaged=True)
-        if self._rescue(deadline):
-            return
-        read_any = False
-        for slot in slots:
-            if slot.state is not ChipState.RUNNING:
-                continue
+            if slot.running:
+                self._read(slot)
+        if self._frame % self._recheck == 0:
+            running = [slot for slot in self.slots if slot.running]
+            if running:
+                self._turn += 1
+                self._check(running[self._turn % len(running)])
+        # After the reading, so that a broken chip costs the intact ones no time.
+        self._bring_back(deadline)
+
+    def _setting_up(self) -> bool:
+        return any(slot.state is ChipState.STARTING for slot in self.slots)
+
+    def _read(self, slot: Slot) -> None:
+        """Check a chip where its last bytes made no sense, and read it."""
+        assert slot.chip is not None
+        slot.good = False
+        if slot.damaged == 1 and not self._setting_up():
+            self._check(slot)
+        elif slot.damaged == 1:
+            # Whatever reset another chip has probably reset this one.
+            self._set_up_again(slot)
+        elif slot.damaged % SET_UP_EVERY == SET_UP_AFTER:
+            self._set_up_again(slot)
+        tries = 0
+        while slot.running:
             try:
-                slot.send(slot.frame)  # type: ignore[arg-type]
-                if slot.read_twice and slot.row[-1] == 0xFF:
-                    slot.send(slot.frame)  # type: ignore[arg-type]
+                slot.chip.read()
+                slot.good, slot.at = True, self.bus.now()
+                return
             except BusError as error:
-                self._fail(slot, error)
-                if self._gone or self._timeouts > 1:
-                    break
-                continue
-            slot.good = read_any = True
-            slot.at = now()
-        if self._gone or self._timeouts > 1:
-            self._give_up(read_any)
-            return
-        if self._doubts:
-            self._check_suspects(deadline, damaged=False)
-        elif self._frames % self._recheck == 0:
-            self._check_next()
-        # After the reading, so that what is broken takes no time from what is whole.
-        if not self._all_running:
-            self._revive(deadline)
+                if tries >= response(error.errno).retries or self._retries == 0:
+                    self._fail(slot, error)
+                tries += 1
+                self._retries -= 1
+
+    def _check(self, slot: Slot) -> None:
+        """Set a running chip up again if it has lost its settings."""
+        assert slot.chip is not None
+        try:
+            if not slot.chip.healthy():
+                self._set_up_again(slot)
+        except BusError as error:
+            self._fail(slot, error)
+
+    def _set_up_again(self, slot: Slot) -> None:
+        slot.recoveries += 1
+        slot.good = slot.has_settings = False
+        slot.state, slot.steps = ChipState.STARTING, self._set_up(slot)
 
     def _fail(self, slot: Slot, error: BusError) -> None:
-        """Take a chip down, and say when to try it again.
-
-        Raises:
-            BusRefused: the adapter refuses a transaction at the start, twice: it always will.
-        """
-        if isinstance(error, BusRefused) and self._starting and slot.failures:
-            raise error
-        if slot.state is ChipState.RUNNING:
-            self.doubt_all()
-        slot.good = False
-        slot.state, slot.error, slot.revival = ChipState.DOWN, error, None
-        self._all_running = False
-        slot.failures += 1
-        pause = 0.0
-        if slot.failures > 1:
-            pause = min(FIRST_PAUSE_S * 2.0 ** min(slot.failures - 2, 10), LONGEST_PAUSE_S)
-        if isinstance(error, BusTimeout):
-            pause = min(HUNG_PAUSE_S * 4.0 ** min(slot.failures - 1, 10), LONGEST_HUNG_PAUSE_S)
-            self._timeouts += 1
-            self._gone = not self._reopened()
-        elif isinstance(error, BusGone):
-            self._gone = True
-        slot.retry_at = self.bus.now() + pause
-
-    def _reopened(self) -> bool:
-        """Whether the bus could be opened anew."""
+        """Take a chip down, or all chips where the bus is gone or hangs."""
+        now = self.bus.now()
         for mux in self._muxes.values():
             mux.forget()
+        failed = [slot]
+        if isinstance(error, BusTimeout):
+            self._timeouts += 1
+            self._rest_until = now + PAUSE_S
+        if isinstance(error, BusGone):
+            self.bus.close()
+        if isinstance(error, BusGone) or self._timeouts > 1:
+            failed = self.slots
+        for slot in failed:
+            # A running chip is tried again at once.
+            slot.retry_at = now if slot.running else now + PAUSE_S
+            slot.good, slot.state, slot.error, slot.steps = False, ChipState.DOWN, error, None
+
+    def _bring_back(self, deadline: float) -> None:
+        """Bring chips back, the one that has waited longest first, until the deadline."""
+        now, steps = self.bus.now, 0
+        waiting = [slot for slot in self.slots if not slot.running and slot.retry_at <= now()]
+        if not waiting or now() < self._rest_until:
+            return
+        if all(slot.state is ChipState.DOWN for slot in self.slots) and not self._reopened():
+            return
+        for slot in sorted(waiting, key=lambda slot: slot.retry_at):
+            while not slot.running and slot.retry_at <= now():
+                if steps and (now() >= deadline or now() < self._rest_until):
+                    return
+                steps += 1
+                self._step(slot)
+
+    def _reopened(self) -> bool:
+        """Open a bus anew on which no chip runs; an unplugged adapter may be back."""
         try:
             self.bus.reopen()
         except BusError:
+            self._rest_until = self.bus.now() + PAUSE_S
             return False
         return True
-
-    def _return(self) -> bool:
-        """Try a bus that was gone."""
-        if not self._reopened():
-            self._resting_until = self.bus.now() + GONE_PAUSE_S
-            return False
-        self._gone = False
-        for slot in self.slots:
-            slot.state, slot.revival, slot.retry_at = ChipState.DOWN, None, -math.inf
-        self._all_running = False
-        return True
-
-    def doubt_all(self) -> None:
-        """What took one chip's power or its bus may have taken its neighbours' settings."""
-        for slot in self.slots:
-            self.doubt(slot)
-
-    def judge(self, slot: Slot, whole: bool) -> None:
-        """Hear what the bytes of a chip that was read were like: whole, or damaged."""
-        if whole:
-            slot.found_healthy = slot.check_from = 0
-        elif self._frames >= slot.check_from:
-            slot.damaged = True
-            self.doubt(slot)
-
-    def doubt(self, slot: Slot) -> None:
-        """Have a running chip's settings checked after this frame's or the next one's reading."""
-        if slot.state is ChipState.RUNNING:
-            slot.suspect = self._doubts = True
-
-    def _check_suspects(self, deadline: float, *, damaged: bool) -> None:
-        """Check the chips that are doubted, until the frame has no more time for it.
-
-        Those with damaged bytes come before the reading, which they would spoil again; the rest
-        after it, so that a doubt costs no reading.
-        """
-        for slot in self.slots:
-            if not slot.suspect or slot.damaged != damaged or slot.state is not ChipState.RUNNING:
-                continue
-            if self._timeouts or self._gone or self.bus.now() >= deadline:
-                return
-            slot.suspect = slot.damaged = False
-            self.check(slot)
-            if damaged and slot.state is ChipState.RUNNING:
-                slot.check_from = self._frames + min(1 << slot.found_healthy, LONGEST_DOUBT)
-                slot.found_healthy += 1
-                if slot.found_healthy >= CHECKS_BEFORE_SET_UP:
-                    self._set_up_again(slot)
-        self._doubts = any(slot.suspect for slot in self.slots)
-
-    def _give_up(self, read_any: bool) -> None:
-        """Leave the bus for this frame; where nothing on it answers, for a while."""
-        now = self.bus.now()
-        if self._gone:
-            self.bus.close()
-            for slot in self.slots:
-                slot.good = False
-            self._resting_until = now + GONE_PAUSE_S
-        elif not read_any:
-            self._rests += 1
-            pause = min(HUNG_PAUSE_S * 4.0 ** min(self._rests - 1, 10), LONGEST_HUNG_PAUSE_S)
-            self._resting_until = now + pause
-        else:
-            self._rests = 0
-
-    def _rescue(self, deadline: float) -> bool:
-        """Where half of the chips or more have lost their settings, the frame is for these alone.
-
-        A bus that is nearly full would need twice the time to set all its chips up if it went on
-        reading those that are back; in the end as many readings are lost either way.
-        """
-        lost = sum(slot.state is ChipState.STARTING for slot in self.slots)
-        if 2 * lost >= len(self.slots) > 1 and self._frames > self._rescued_from + RESCUE_PAUSE:
-            self._rescued_from = self._frames
-        if lost == 0 or self._frames >= self._rescued_from + RESCUE_FRAMES:
-            return False
-        now = self.bus.now()
-        self._revive(now + (deadline - now) * RESCUE_SHARE)
-        return any(slot.state is ChipState.STARTING for slot in self.slots)
-
-    def _revive(self, deadline: float) -> None:
-        """Bring chips back, as far as the frame has time, and by one step where it has none."""
-        now = self.bus.now
-        self._all_running = True
-        steps = STEPS_PER_FRAME
-        for slot in self.slots:
-            if slot.running:
-                continue
-            self._all_running = False
-            while not slot.running and slot.retry_at <= now():
-                if steps <= 0 or (steps < STEPS_PER_FRAME and now() >= deadline):
-                    return
-                steps -= 1
-                if not self._step(slot):
-                    if self._gone or self._timeouts:
-                        return
-                    break
 
     def _step(self, slot: Slot) -> bool:
-        """One step of a chip's return; False where it failed."""
-        if slot.revival is None:
-            slot.revival = self._revival(slot)
-            slot.state = ChipState.STARTING
+        """Take one step to bring a chip back; False where it failed."""
+        if slot.steps is None:
+            slot.steps, slot.state = self._revive(slot), ChipState.STARTING
         try:
-            next(slot.revival)
+            next(slot.steps)
         except StopIteration:
             slot.recoveries += slot.error is not None
-            slot.state, slot.revival, slot.error = ChipState.RUNNING, None, None
-            slot.failures, slot.suspect, slot.set_up = 0, False, True
+            slot.state, slot.error, slot.steps = ChipState.RUNNING, None, None
         except BusError as error:
             self._fail(slot, error)
             return False
         return True
 
-    def _revival(self, slot: Slot) -> Iterator[None]:
-        """Steps from down to running.
+    def _revive(self, slot: Slot) -> Iterator[None]:
+        """Steps from down to running; a chip that kept its settings needs no set-up."""
+        kept = slot.has_settings and slot.chip is not None and slot.chip.healthy()
+        if not kept:
+            slot.has_settings = False
+            slot.chip = self._driver(slot)
+            yield
+        yield from self._set_up(slot)
 
-        A chip that was set up and kept its settings is back at once. One whose set-up was broken
-        off is not believed: the register that `healthy` reads may be the only one it has.
-        """
-        if slot.set_up and slot.chip is not None and slot.chip.healthy():
-            return
-        slot.set_up = False
-        slot.chip = chip = self._make(slot.spec, slot.row)
-        slot.send, slot.frame = chip.bus.transfer, chip.frame
-        yield
-        yield from chip.settings()
+    def _set_up(self, slot: Slot) -> Iterator[None]:
+        """Steps from identified to running. The last one reads a frame: a chip that cannot serve
+        one does not run."""
+        assert slot.chip is not None
+        if not slot.has_settings:
+            yield from slot.chip.settings()
+            slot.has_settings = True
+        slot.chip.read()
+        slot.good, slot.at = True, self.bus.now()
 
-    def _make(self, spec: ChipSpec, row: NDArray[np.uint8]) -> Chip:
-        bus: Bus = self.bus
+    def _driver(self, slot: Slot) -> Chip:
+        spec, bus = slot.spec, self.bus
         if spec.mux is not None and spec.channel is not None:
             if spec.mux not in self._muxes:
                 self._muxes[spec.mux] = TCA9548A(
                     self.bus, spec.mux, verify=self._verify, beside=tuple(self._muxes.values())
                 )
             bus = self._muxes[spec.mux].channel(spec.channel)
-        bus = Persistent(bus, self)
-        if spec.kind == "ad7147":
-            return AD7147(bus, spec.address, decimation=spec.decimation, into=row)
-        if spec.kind == "mpr121":
-            return MPR121(bus, spec.address, into=row)
-        return Block(bus, spec.address, taxels=len(spec.taxels), bits=spec.bits, into=row)
-
-    def _check_next(self) -> None:
-        """Read the settings of one running chip again, each in its turn."""
-        running = [slot for slot in self.slots if slot.state is ChipState.RUNNING]
-        if running:
-            self._turn += 1
-            self.check(running[self._turn % len(running)])
-
-    def check(self, slot: Slot) -> None:
-        """Read a running chip's settings; where they are gone, what it serves is not good."""
-        if slot.chip is None or slot.state is not ChipState.RUNNING:
-            return
-        try:
-            if not slot.chip.healthy():
-                self._set_up_again(slot)
-                self.doubt_all()
-        except BusError as error:
-            # The check itself failed: the chip is checked again before it is read.
-            self._fail(slot, error)
-
-    def _set_up_again(self, slot: Slot) -> None:
-        assert slot.chip is not None
-        slot.recoveries += 1
-        slot.good = slot.set_up = self._all_running = False
-        slot.state, slot.revival = ChipState.STARTING, slot.chip.settings()
+        return spec.kind.driver(bus, spec, slot.row)

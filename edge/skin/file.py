@@ -1,4 +1,4 @@
-"""`skin.toml`: which chip stage is which taxel, and what its counts mean."""
+"""`skin.toml`: the taxel of each chip stage, and the meaning of its counts."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from edge.config import ConfigTable, parse_toml, shown
 from edge.errors import InputError
 from edge.files import read_text
-from edge.skin.kinds import Usual, usual
-from edge.skin.wiring import UNUSED, BusSpec, ChipSpec, read_buses
+from edge.i2c.chip import UNUSED, ChipSpec, Defaults
+from edge.skin.kinds import defaults_of
+from edge.skin.wiring import BusSpec, read_buses
 from edge.touch.layout import SkinLayout
 
 
@@ -24,14 +25,14 @@ class Signal:
     """From raw values to counts above baseline.
 
     Attributes:
-        dead_band_sigma: counts under so many standard deviations of the noise are 0.
-        dead_band_counts: and so are counts under this.
+        dead_band_sigma: counts under so many standard deviations of the noise become 0.
+        dead_band_counts: counts under this become 0 too.
         drift_counts_per_s: how fast the baseline follows while nothing touches.
-        drift_limit_counts: how far from the calibration it may go.
+        drift_limit_counts: how far from the calibration it may move.
         settle_s: how long after a contact it stays frozen.
-        saturation_counts: no touch takes a taxel further from its baseline: a value beyond is the
-            wire's, not the taxel's.
-        dead: taxels never to be used, (row, col).
+        saturation_counts: no touch takes a taxel further from its baseline; a value beyond it is a
+            fault of the wire.
+        dead: broken taxels, (row, col).
     """
 
     dead_band_sigma: float = 6.0
@@ -45,16 +46,15 @@ class Signal:
 
 @dataclass(frozen=True)
 class Reading:
-    """How the skin is read.
+    """How to read the skin.
 
     Attributes:
         rate_hz: of frames.
-        timeout_s: what a hung chip costs at most; adapters round it up to 10 ms.
+        timeout_s: longest time that a hung chip costs; adapters round it up to 10 ms.
         verify_mux: read a mux's control byte back after each selection.
-        recheck_frames: number of frames after which the settings of the next chip of each bus
-            are read again.
-        stuck_frames: a chip whose bytes do not change for so many frames is invalid; only
-            where the calibration has seen it make noise.
+        recheck_frames: number of frames between two checks of a chip's settings on each bus.
+        stuck_frames: a chip whose bytes do not change for so many frames is invalid, if the
+            calibration saw it make noise.
         region_of_interest: read the chips near the contact at full rate, the rest in turn.
     """
 
@@ -68,12 +68,12 @@ class Reading:
 
 @dataclass(frozen=True)
 class TaxelCalibration:
-    """What `edge-classify calibrate` measured with nothing touching.
+    """Rest values and noise as `edge-classify calibrate` measured them.
 
     Attributes:
         baseline: (rows, cols) raw counts, rounded means; 0 where a taxel could not be read.
         noise: (rows, cols) raw counts, standard deviations.
-        taken: when, in universal time, or None where unknown.
+        taken: time of measurement (UTC), or None where unknown.
     """
 
     baseline: NDArray[np.uint16]
@@ -100,7 +100,7 @@ class SkinFile:
 
     @property
     def uncovered(self) -> int:
-        """How many taxels no chip serves."""
+        """Number of taxels that no chip serves."""
         served = {t for chip in self.chips for t in chip.taxels} - {UNUSED}
         return self.layout.rows * self.layout.cols - len(served)
 
@@ -109,7 +109,7 @@ def load(path: str | os.PathLike[str]) -> SkinFile:
     """Read a skin's file.
 
     Raises:
-        InputError: it cannot be read or makes no sense; the sentence names file and key.
+        InputError: it cannot be read, or a value is not allowed.
     """
     return parse(read_text(path), os.fspath(path))
 
@@ -120,10 +120,10 @@ def shipped(name: str = "cody") -> Path:
 
 
 def parse(text: str, where: str = "skin") -> SkinFile:
-    """Read the text of a skin's file; `where` is what errors call it.
+    """Read the text of a skin's file; errors call it `where`.
 
     Raises:
-        InputError: it makes no sense.
+        InputError: a value is not allowed.
     """
     top = parse_toml(text, where)
     skin = top.table("skin", {})
@@ -131,13 +131,13 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     for key in (f.name for f in fields(SkinLayout)):
         skin.has(key)
     skin.done()
-    unsaid = usual(top.raw)
+    defaults = defaults_of(top.raw)
     given = dict(skin.raw)
-    if "threshold_counts" not in given and unsaid.threshold_counts:
-        given["threshold_counts"] = unsaid.threshold_counts
-        given.setdefault("onset_counts", unsaid.onset_counts)
+    if "threshold_counts" not in given and defaults.threshold_counts:
+        given["threshold_counts"] = defaults.threshold_counts
+        given.setdefault("onset_counts", defaults.onset_counts)
     layout = SkinLayout.from_dict(given, where=where)
-    signal, sign = _signal(top.table("signal", {}), layout, unsaid)
+    signal, sign = _signal(top.table("signal", {}), layout, defaults)
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
     calibration = None
@@ -147,8 +147,10 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
 
-def _signal(table: ConfigTable, layout: SkinLayout, unsaid: Usual) -> tuple[Signal, int | None]:
-    """The signal, and the sign of all chips that have none of their own, where it is given."""
+def _signal(
+    table: ConfigTable, layout: SkinLayout, defaults: Defaults
+) -> tuple[Signal, int | None]:
+    """The signal, and the sign of chips that give none, or None."""
     sign = table.whole("sign", 1, (1, -1)) if table.has("sign") else None
     dead = table.get("dead", [])
     if not isinstance(dead, list):
@@ -162,12 +164,12 @@ def _signal(table: ConfigTable, layout: SkinLayout, unsaid: Usual) -> tuple[Sign
             )
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
-        dead_band_counts=table.whole("dead_band_counts", unsaid.dead_band_counts, range(65536)),
+        dead_band_counts=table.whole("dead_band_counts", defaults.dead_band_counts, range(65536)),
         drift_counts_per_s=table.number(
-            "drift_counts_per_s", unsaid.drift_counts_per_s, 0.0, 65535.0
+            "drift_counts_per_s", defaults.drift_counts_per_s, 0.0, 65535.0
         ),
         drift_limit_counts=table.whole(
-            "drift_limit_counts", unsaid.drift_limit_counts, range(65536)
+            "drift_limit_counts", defaults.drift_limit_counts, range(65536)
         ),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
         saturation_counts=table.whole("saturation_counts", 65535, range(1, 65536)),
@@ -222,5 +224,5 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
-    """Frames a second that buses carry side by side, each with its bits a frame."""
+    """Frames a second that buses carry side by side, from each bus's bits a frame and clock."""
     return 1.0 / max(b / hz for b, hz in zip(bits, clocks, strict=True))

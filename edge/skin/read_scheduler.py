@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.i2c.chip import UNUSED
 from edge.i2c.tca9548a import SELECT_BITS, VERIFY_BITS
 from edge.skin.file import SkinFile
-from edge.skin.slot import frame_wire_bits
-from edge.skin.wiring import UNUSED, BusSpec
+from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -90,7 +90,7 @@ class ReadScheduler:
         budgets = [
             BusBudget(
                 bits=MARGIN * spec.clock_hz / reading.rate_hz,
-                costs=tuple(map(frame_wire_bits, spec.chips)),
+                costs=tuple(chip.frame_bits for chip in spec.chips),
                 select=SELECT_BITS + (VERIFY_BITS if reading.verify_mux else 0),
                 channels=_channels(spec),
             )

@@ -1,4 +1,4 @@
-"""The whole skin: its buses read side by side, one frame at a time."""
+"""The skin: its buses are read side by side, one frame at a time."""
 
 from __future__ import annotations
 
@@ -17,22 +17,17 @@ from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
 from edge.i2c.bus import Bus, LinuxBus
 from edge.skin.baseline import Baseline
-from edge.skin.buffers import Buffers, ChipGroup, buffers
-from edge.skin.bus_reader import BusReader
+from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, ChipState, Slot
 from edge.skin.calibration import dead_band
+from edge.skin.decoder import Decoder, chip_groups
 from edge.skin.file import SkinFile, load
-from edge.skin.read_scheduler import MARGIN, ReadScheduler
 from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
-from edge.skin.slot import NEVER, ChipState, Slot
-from edge.skin.wiring import UNUSED, BusSpec
+from edge.skin.read_scheduler import ReadScheduler
+from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
 FOLLOW_FRAMES = 4
 """The baseline follows drift in one frame of so many: drift is slow, and a step costs time."""
-NOISY = 1.0
-"""Standard deviation in counts from which a chip's bytes change with every conversion."""
-OLDEST_FRAMES = 2
-"""A chip read in every frame may miss one before its taxels are no longer valid."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +35,7 @@ class ChipStatus:
     """The state of one chip.
 
     Attributes:
-        bus, route, kind: where and what it is, for a person.
+        bus, route, kind: place and kind, for a person to read.
         taxels: flat indices.
         state: running, starting or down.
         error: why it is down.
@@ -71,7 +66,7 @@ class _Worker(threading.Thread):
         while (job := todo.get()) is not None:
             try:
                 read(*job)
-            except BaseException as error:  # raised again where the frame is put together
+            except BaseException as error:  # raised again by `Skin.read`
                 done.put(error)
             else:
                 done.put(None)
@@ -96,15 +91,15 @@ class Skin:
         clock: Clock | None = None,
         touch_counts: int | None = None,
     ) -> None:
-        """Take buses that are open; `start` then sets the chips up.
+        """Take open buses; `start` then sets the chips up.
 
         Args:
             file: which chip is where.
             buses: one for each of the file's buses, in their order; `close` closes them.
-            clock: the loop's, which the buses go by too; the kernel's where None.
-            touch_counts: a taxel above this is being touched: the baseline is frozen, and
-                region-of-interest reading turns to its chip. The file's threshold where None
-                or where that is lower.
+            clock: of the loop and the buses; the kernel's where None.
+            touch_counts: a taxel above this is touched: the baseline is frozen, and
+                region-of-interest reading turns to its chip. The file's threshold applies where
+                this is None or higher.
         """
         self.file, self.layout = file, file.layout
         self.clock: Clock = clock or SystemClock()
@@ -114,22 +109,29 @@ class Skin:
         self.touch_counts = threshold if touch_counts is None else min(threshold, touch_counts)
         self.oldest_s = self.period_s * (OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES)
         """How old a taxel's value may be."""
-        groups = buffers(file)
-        self.readers = [
-            BusReader(
+        groups = chip_groups(file)
+        rows = {i: row for g in groups for i, row in zip(g.chips.tolist(), g.rows, strict=True)}
+        self.readers: list[BusReader] = []
+        for bus, spec in zip(buses, file.buses, strict=True):
+            first = sum(len(reader.slots) for reader in self.readers)
+            reader = BusReader(
                 bus,
                 spec,
-                rows,
+                [rows[first + i] for i in range(len(spec.chips))],
                 verify_mux=file.reading.verify_mux,
                 recheck_frames=file.reading.recheck_frames,
             )
-            for bus, spec, rows in zip(buses, file.buses, groups.by_bus, strict=True)
-        ]
+            self.readers.append(reader)
         self._slots = [slot for reader in self.readers for slot in reader.slots]
-        self._owners = [reader for reader in self.readers for _ in reader.slots]
-        self._every: list[list[Slot]] = [reader.slots for reader in self.readers]
-        self._wire(groups)
-        self._file_signal()
+        self._decoder = Decoder(file, groups, self._slots)
+        calibration, n = file.calibration, file.layout.rows * file.layout.cols
+        self.baseline = Baseline(
+            np.zeros(n) if calibration is None else calibration.baseline.ravel(),
+            sign=self._decoder.sign,
+            dead_band=dead_band(file),
+            step_counts=file.signal.drift_counts_per_s * self.period_s * FOLLOW_FRAMES,
+            limit=file.signal.drift_limit_counts,
+        )
         self._last: Frame | None = None
         self._touched_at = self._followed_at = -math.inf
         self._since_follow = 0
@@ -149,7 +151,7 @@ class Skin:
 
         Args:
             file: the skin file or its path.
-            calibrated: refuse a file without calibration, whose counts would mean nothing.
+            calibrated: refuse a file without calibration: its counts would mean nothing.
             touch_counts: as for `Skin`.
 
         Raises:
@@ -175,70 +177,6 @@ class Skin:
             opened.pop_all()
         return skin
 
-    def _wire(self, groups: Buffers) -> None:
-        """Index arrays from stages and chips to taxels."""
-        n = self.layout.rows * self.layout.cols
-        limit = self.file.reading.stuck_frames
-        self._groups = [
-            ChipGroup([self._slots[i] for i in chips], chips, rows, first, limit)
-            for chips, rows, first in groups.groups
-        ]
-        total = sum(g.shape[0] * g.shape[1] for g in self._groups)
-        # The last stage and the last chip stand for a taxel that no chip serves.
-        self._raw = np.zeros(total + 1, dtype=np.uint16)
-        self._whole = np.zeros(total + 1, dtype=np.bool_)
-        self._unserved = np.ones(total + 1, dtype=np.bool_)
-        """Stages that are no taxel, or a dead one: whatever they read, their chip is fine."""
-        self._stage_of = np.full(n, total, dtype=np.intp)
-        self._chip_of = np.full(n, len(self._slots), dtype=np.intp)
-        self._sign = np.ones(n, dtype=np.int32)
-        self._highest = np.full(n, 0xFFFF, dtype=np.int32)
-        order = {id(slot): i for i, slot in enumerate(self._slots)}
-        for group in self._groups:
-            stage = group.stages.start
-            for slot in group.slots:
-                for taxel in slot.spec.taxels:
-                    if taxel != UNUSED:
-                        self._stage_of[taxel] = stage
-                        self._chip_of[taxel] = order[id(slot)]
-                        self._sign[taxel] = slot.spec.sign
-                        self._highest[taxel] = slot.spec.highest
-                    stage += 1
-        self._served = self._chip_of < len(self._slots)
-        """Taxels that have a chip and are not dead."""
-        for row, col in self.file.signal.dead:
-            self._served[row * self.layout.cols + col] = False
-        self._all_served = bool(self._served.all())
-        self._unserved[self._stage_of[self._served]] = False
-
-    def _file_signal(self) -> None:
-        """Baseline, dead band and stuck chips from the file."""
-        signal, calibration = self.file.signal, self.file.calibration
-        n = len(self._sign)
-        rest = np.zeros(n) if calibration is None else calibration.baseline.ravel()
-        self.baseline = Baseline(
-            rest,
-            sign=self._sign,
-            dead_band=dead_band(self.file),
-            step_counts=signal.drift_counts_per_s * self.period_s * FOLLOW_FRAMES,
-            limit=signal.drift_limit_counts,
-        )
-        reach = signal.saturation_counts + signal.drift_limit_counts
-        lowest = np.zeros(n, dtype=np.int32)
-        if calibration is not None:
-            lowest = np.maximum(self.baseline.counts - reach, 0)
-            np.minimum(self._highest, self.baseline.counts + reach, out=self._highest)
-        self._lowest = lowest.astype(np.uint16)
-        self._range = (self._highest - lowest).astype(np.uint16)
-        """What a taxel can read lies from `_lowest` to so much above it."""
-        if calibration is not None:
-            noisy = np.zeros(len(self._slots) + 1, dtype=np.bool_)
-            np.logical_or.at(noisy, self._chip_of, calibration.noise.ravel() >= NOISY)
-            for group in self._groups:
-                if group.slots[0].spec.kind != "block":
-                    group.noisy = noisy[group.chips]
-                    group.any_noisy = bool(group.noisy.any())
-
     def start(self) -> list[ChipStatus]:
         """Identify and set up all chips.
 
@@ -262,7 +200,7 @@ class Skin:
             ChipStatus(
                 bus=reader.bus.name,
                 route=slot.spec.route,
-                kind=slot.spec.kind,
+                kind=slot.spec.kind.name,
                 taxels=slot.spec.taxels,
                 state=slot.state.value,
                 error="" if slot.error is None else str(slot.error),
@@ -273,7 +211,7 @@ class Skin:
         ]
 
     def changes(self) -> list[ChipStatus]:
-        """The chips whose state is another than at the last call, or than at the start."""
+        """The chips whose state has changed since the last call, or since the start."""
         states = [slot.state for slot in self._slots]
         if states == self._states:
             return []
@@ -285,33 +223,33 @@ class Skin:
         return changed
 
     def read(self) -> Frame:
-        """One frame; with region-of-interest reading, some chips are as they were last read.
+        """Read one frame; with region-of-interest reading, some chips keep their last values.
 
         Returns:
-            A frame whose `times` say when each taxel was read; a taxel that could not be read,
+            A frame whose `times` tell when each taxel was read. A taxel that could not be read,
             is dead, or was last read more than `oldest_s` ago is not `valid` and reads 0.
         """
         clock = self.clock
-        clock.sleep_until(clock.now())  # buses that go by a virtual clock start together
+        clock.sleep_until(clock.now())  # lets the buses of a virtual clock start together
         t = clock.now()
         self._transfer(t)
         return self._assemble(t)
 
     def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
-        """The last frame's values as the chips gave them (rows, cols), and which are valid."""
+        """The last frame's raw values (rows, cols), and which of them are valid."""
         assert self._last is not None
         assert self._last.valid is not None
-        return self._raw[self._stage_of].reshape(self.layout.shape), self._last.valid
+        return self._decoder.values.reshape(self.layout.shape), self._last.valid
 
     def _transfer(self, t: float) -> None:
-        jobs = self._every
+        jobs: list[list[Slot]] = [reader.slots for reader in self.readers]
         if self.scheduler is not None:
             chosen = self.scheduler.plan(self._last, self.touch_counts)
             jobs = [
                 [reader.slots[i] for i in indices]
                 for reader, indices in zip(self.readers, chosen, strict=True)
             ]
-        deadline = t + MARGIN * self.period_s
+        deadline = t + self.period_s - LONGEST_STEP_S
         for worker, job in zip(self._workers, jobs[1:], strict=True):
             worker.todo.put((job, deadline))
         failed: BaseException | None = None
@@ -324,76 +262,21 @@ class Skin:
             raise failed
 
     def _assemble(self, t: float) -> Frame:
-        raw, whole, slots = self._raw, self._whole, self._slots
-        for group in self._groups:
-            parsed = group.parse()
-            if parsed is not None:
-                raw[group.stages] = parsed[0].reshape(-1)
-                whole[group.stages] = parsed[1].reshape(-1)
-        at = np.array([slot.at for slot in slots] + [NEVER])
-        good = np.array([slot.good for slot in slots] + [False])
-        self._suspect(good, at >= t)
-        good &= at >= t - self.oldest_s
-        values = raw.take(self._stage_of)
-        counts = self.baseline.above(values)
-        times = at.take(self._chip_of)
-        if whole[:-1].all() and good[:-1].all():
-            valid = self._served.copy()
-            if not self._all_served:
-                counts *= valid
-        else:
-            valid = good.take(self._chip_of)
-            valid &= whole.take(self._stage_of)
-            valid &= self._served
-            counts *= valid
-        # What lies under the lowest wraps round to above every range.
-        beyond = (values - self._lowest > self._range) & valid
-        if beyond.any():
-            valid &= ~beyond
-            counts *= valid
-            for i in np.unique(self._chip_of[beyond]).tolist():
-                self._owners[i].doubt(slots[i])
-        self._follow(values, counts, valid, times, t)
+        valid = self._decoder.decode(t, t - self.oldest_s)
+        counts = self.baseline.above(self._decoder.values)
+        counts *= valid
+        self._follow(counts, valid, t)
         shape = self.layout.shape
         self._last = Frame(
             t=t,
             counts=counts.reshape(shape),
             valid=valid.reshape(shape),
-            times=times.reshape(shape),
+            times=self._decoder.times.reshape(shape),
         )
         return self._last
 
-    def _suspect(self, good: NDArray[np.bool_], fresh: NDArray[np.bool_]) -> None:
-        """Judge chips by what they serve: damaged words, or bytes that never change."""
-        for group in self._groups:
-            all_whole = bool(self._whole[group.stages].all())
-            if not all_whole or group.doubtful:
-                whole = self._whole[group.stages] | self._unserved[group.stages]
-                by_chip = np.all(whole.reshape(group.shape), axis=1)
-                for i, slot, fine in zip(group.chips, group.slots, by_chip, strict=True):
-                    if slot.good:
-                        self._owners[i].judge(slot, bool(fine))
-                group.doubtful = not all_whole
-            if not group.any_noisy:
-                continue
-            same = (group.rows == group.before).all(axis=1)
-            np.copyto(group.before, group.rows)
-            group.unchanged += fresh[group.chips]
-            group.unchanged *= same & group.noisy
-            if int(group.unchanged.max()) >= group.limit:
-                for i in np.flatnonzero(group.unchanged >= group.limit).tolist():
-                    self._owners[group.chips[i]].judge(group.slots[i], False)
-                    good[group.chips[i]] = False
-
-    def _follow(
-        self,
-        values: NDArray[np.uint16],
-        counts: NDArray[np.uint16],
-        valid: NDArray[np.bool_],
-        times: NDArray[np.float64],
-        t: float,
-    ) -> None:
-        """Let the baseline follow drift, unless something touches or has just touched."""
+    def _follow(self, counts: NDArray[np.uint16], valid: NDArray[np.bool_], t: float) -> None:
+        """Let the baseline follow drift, except during a contact and shortly after it."""
         if self.file.calibration is None:
             return
         if int(counts.max()) > self.touch_counts:
@@ -403,7 +286,8 @@ class Skin:
             return
         self._since_follow = 0
         if t - self._touched_at >= self.file.signal.settle_s:
-            self.baseline.follow(values, valid & (times >= self._followed_at))
+            fresh = self._decoder.times >= self._followed_at
+            self.baseline.follow(self._decoder.values, valid & fresh)
         self._followed_at = t
 
     def close(self) -> None:

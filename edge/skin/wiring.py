@@ -8,61 +8,19 @@ from dataclasses import dataclass
 
 from edge.config import ConfigTable, shown
 from edge.errors import InputError
-from edge.i2c import ad7147, block, mpr121, tca9548a
+from edge.i2c import tca9548a
 from edge.i2c.bus import device_path
-from edge.skin.kinds import KINDS, usual_of
+from edge.i2c.chip import UNUSED, ChipKind, ChipSpec
+from edge.skin.kinds import KINDS
 from edge.touch.layout import SkinLayout
 
 FASTEST_MUX_HZ = 400_000
 SERIAL_PORT = re.compile(r"(/dev/(tty|serial/|cu\.).*|COM\d+)")
-ADDRESSES = range(0x08, 0x78)
-"""7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
-SHARED = ("kind", "mux", "block", "bits", "decimation")
-"""Keys that a bus may give for all its chips."""
-
-
-UNUSED = -1
-"""A stage that is no taxel."""
-
-
-@dataclass(frozen=True)
-class ChipSpec:
-    """One chip: where it is, and which taxel each of its stages is.
-
-    Attributes:
-        kind: a driver's name.
-        address: 7 bits.
-        taxels: flat index (row * cols + col) of each stage, `UNUSED` for none.
-        mux, channel: the way to it, or None where it hangs on the bus itself.
-        sign: 1 where a touch raises the raw value, -1 where it lowers it.
-        decimation: of an AD7147.
-        bits: of a block's taxel.
-    """
-
-    kind: str
-    address: int
-    taxels: tuple[int, ...]
-    mux: int | None = None
-    channel: int | None = None
-    sign: int = 1
-    decimation: int = 64
-    bits: int = 16
-
-    @property
-    def route(self) -> str:
-        """The way to it as a person reads it: mux, channel and address."""
-        way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "
-        return f"{way}address {self.address:#04x}"
-
-    @property
-    def highest(self) -> int:
-        """The largest raw value that it measures; an AD7147 that reads 0xFFFF is at its end."""
-        return {"ad7147": 0xFFFE, "mpr121": 1023}.get(self.kind, (1 << self.bits) - 1)
 
 
 @dataclass(frozen=True)
 class BusSpec:
-    """One adapter and its chips, in the order in which they are read.
+    """One adapter and its chips, in reading order.
 
     Attributes:
         device: such as `/dev/i2c-1`, or a serial port.
@@ -85,10 +43,10 @@ def read_buses(
     Args:
         tables: one for each bus.
         layout: the skin's.
-        sign: of a chip that has none of its own; its kind's where None.
+        sign: of chips that give none; their kind's default where None.
 
     Raises:
-        InputError: a value makes no sense, or two chips claim one address or one taxel.
+        InputError: a value is not allowed, or two chips claim one address or one taxel.
     """
     buses = tuple(_bus(table, layout, sign) for table in tables)
     _check_buses(buses, layout, tables[0].where)
@@ -100,15 +58,20 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     device, clock_hz = _port(table) if serial else _adapter(table)
     if table.has("kind"):
         _kind(table)
-    shared = {key: table.raw[key] for key in SHARED if table.has(key)}
+    options = {name for kind in KINDS.values() for name in kind.options}
+    shared = {key: table.raw[key] for key in ("kind", "mux", "block") if table.has(key)}
+    shared_options = {key: table.raw[key] for key in sorted(options) if table.has(key)}
     chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     table.done()
     if serial and len(chips) > 1:
         raise InputError(f"{table.called('chips')} has {len(chips)}; a serial port has one")
-    specs = [
-        _chip(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix), layout, sign, serial)
-        for chip in chips
-    ]
+    specs = []
+    for chip in chips:
+        kind = _kind(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix))
+        own = {key: value for key, value in shared_options.items() if key in kind.options}
+        merged = ConfigTable({**shared, **own, **chip.raw}, chip.where, chip.prefix)
+        merged.has("kind")
+        specs.append(_chip(merged, kind, layout, sign, serial))
     return BusSpec(device, tuple(specs), clock_hz, serial)
 
 
@@ -136,47 +99,48 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
     return device_path(device), table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
 
 
-def _kind(table: ConfigTable) -> str:
-    kind = table.get("kind")
-    if not isinstance(kind, str) or kind not in KINDS:
-        kinds = ", ".join(f"{name} ({what})" for name, what in KINDS.items())
+def _kind(table: ConfigTable) -> ChipKind:
+    name = table.get("kind")
+    if not isinstance(name, str) or name not in KINDS:
+        kinds = ", ".join(f"{kind.name} ({kind.description})" for kind in KINDS.values())
         raise table.fail("kind", f"one of {kinds}")
-    return kind
+    return KINDS[name]
 
 
-def _chip(table: ConfigTable, layout: SkinLayout, sign: int | None, serial: bool) -> ChipSpec:
-    kind = _kind(table)
-    if serial and kind != "block":
-        raise InputError(f"{table.called('kind')} is {kind}; a serial port carries block alone")
+def _chip(
+    table: ConfigTable, kind: ChipKind, layout: SkinLayout, sign: int | None, serial: bool
+) -> ChipSpec:
     address = 0
+    if serial and not kind.serial:
+        raise InputError(f"{table.called('kind')} is {kind.name}; a serial port carries block only")
     if serial and table.has("address"):
         raise InputError(f"{table.called('address')} has no meaning on a serial port; leave it out")
     if not serial:
-        addresses = {"ad7147": ad7147.ADDRESSES, "mpr121": mpr121.ADDRESSES}.get(kind, ADDRESSES)
-        address = table.whole("address", allowed=addresses, form="#04x")
+        address = table.whole("address", allowed=kind.addresses, form="#04x")
     mux = channel = None
     if table.has("mux"):
         mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")
         channel = table.whole("channel", allowed=range(tca9548a.CHANNELS))
     elif table.has("channel"):
         raise InputError(f"{table.called('channel')} needs mux, the address of the mux")
-    bits = table.whole("bits", 16, block.BITS)
-    decimation = table.whole("decimation", 64, tuple(ad7147.DECIMATION))
+    options = {
+        name: table.whole(name, option.default, option.allowed)
+        for name, option in kind.options.items()
+    }
     taxels = _taxels(table, layout)
-    stages = {"ad7147": ad7147.STAGES, "mpr121": mpr121.ELECTRODES}.get(kind, len(taxels))
-    if len(taxels) != stages:
+    if kind.stages is not None and len(taxels) != kind.stages:
         raise InputError(
-            f"{table.called('taxels')} names {len(taxels)} taxels, but an {kind.upper()} has "
-            f"{stages} stages; write [] for a stage that is no taxel"
+            f"{table.called('taxels')} names {len(taxels)} taxels, but an {kind.name.upper()} has "
+            f"{kind.stages} stages; write [] for a stage without a taxel"
         )
-    if not 1 <= len(taxels) <= block.MOST_TAXELS:
+    if not 1 <= len(taxels) <= kind.most_taxels:
         raise InputError(
             f"{table.called('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
-            f"{block.MOST_TAXELS}"
+            f"{kind.most_taxels}"
         )
-    own = table.whole("sign", usual_of(kind, bits).sign if sign is None else sign, (1, -1))
+    own = table.whole("sign", kind.defaults(options).sign if sign is None else sign, (1, -1))
     table.done()
-    return ChipSpec(kind, address, taxels, mux, channel, own, decimation, bits)
+    return ChipSpec(kind, address, taxels, mux, channel, own, options)
 
 
 def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:

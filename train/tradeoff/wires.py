@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass, replace
 
 from edge.fake.player import frame_bits
-from edge.i2c import ad7147
+from edge.i2c import ad7147, block
+from edge.i2c.chip import UNUSED, ChipSpec
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
-from edge.skin.wiring import UNUSED, BusSpec, ChipSpec
+from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
 FRAMES = 100
@@ -58,7 +59,7 @@ def spread(layout: SkinLayout, buses: int, clock_hz: int = 400_000) -> SkinFile:
             if channel >= CHANNELS:
                 raise ValueError(f"{taxels} taxels need more than {buses} buses")
             chips.append(
-                ChipSpec("ad7147", ad7147.ADDRESSES[chip], group, mux=MUX, channel=channel)
+                ChipSpec(ad7147.KIND, ad7147.KIND.addresses[chip], group, mux=MUX, channel=channel)
             )
         specs.append(BusSpec(f"fake-{bus}", tuple(chips), clock_hz=clock_hz))
     return SkinFile("spread", layout, tuple(specs))
@@ -83,7 +84,7 @@ def wires(layout: SkinLayout) -> list[Wire]:
         many = len(shipped.buses)
         name = f"MPR121, {many} bus{'es' if many > 1 else ''} at {clock} kHz"
         found.append(count(name, replace(shipped, layout=layout)))
-    block = ChipSpec("block", 0x08, tuple(range(taxels)))
-    served = SkinFile("block", layout, (BusSpec("fake", (block,), clock_hz=1_000_000),))
+    chip = ChipSpec(block.KIND, 0x08, tuple(range(taxels)))
+    served = SkinFile("block", layout, (BusSpec("fake", (chip,), clock_hz=1_000_000),))
     found.append(count("microcontroller, 1 bus at 1 MHz", served))
     return found

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeTCA9548A
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
 from edge.i2c.bus import BusGone, BusNack, BusRefused, BusTimeout, fetch, read, send, write
+from edge.i2c.tca9548a import FakeTCA9548A
 
 
 class Echo:
@@ -94,6 +94,13 @@ def test_time_advances_by_the_bits_only_where_it_is_asked_for():
         assert fake.bits == 1 + 18 + 1 + 45 + 1
     assert still.now() == 0.0
     assert timed.now() == pytest.approx(66 / 100_000)
+
+
+def test_the_overhead_of_software_is_paid_for_each_transaction():
+    fake = bus(timed=True, clock_hz=100_000, overhead_s=100e-6)
+    for _ in range(3):
+        send(fake, 0x10, [0])
+    assert fake.now() == pytest.approx(3 * (20 / 100_000 + 100e-6))
 
 
 def test_buses_run_side_by_side_on_one_clock():

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from edge.fake.chips import FakeAD7147, FakeBlock, FakeMPR121
-from edge.i2c.ad7147 import AD7147
-from edge.i2c.block import Block
-from edge.i2c.mpr121 import MPR121
+from edge.i2c import ad7147, block, mpr121
+from edge.i2c.ad7147 import AD7147, FakeAD7147
+from edge.i2c.block import Block, FakeBlock
+from edge.i2c.chip import ChipSpec
+from edge.i2c.mpr121 import MPR121, FakeMPR121
 
 VALUES = np.arange(12, dtype=np.uint16) * 37 + 300
 
@@ -14,10 +15,13 @@ def sense(t):
     return VALUES
 
 
-def parsed(chip):
-    chip.bus.transfer(chip.frame)
-    values, whole = chip.parse(chip.frame.buffer[None])
-    return values[0], whole[0]
+def parsed(chip, bits=16):
+    """Read a chip of 12 taxels: its values, and which of them are intact."""
+    chip.read()
+    kind = {AD7147: ad7147.KIND, MPR121: mpr121.KIND, Block: block.KIND}[type(chip)]
+    spec = ChipSpec(kind, chip.address, tuple(range(12)), options={"bits": bits})
+    values, intact = kind.parse(chip.frame.buffer[None], spec)
+    return values[0], intact[0]
 
 
 CHIPS = {

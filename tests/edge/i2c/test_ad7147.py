@@ -3,21 +3,23 @@
 import numpy as np
 
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeAD7147
 from edge.i2c import ad7147
-from edge.i2c.ad7147 import AD7147
+from edge.i2c.ad7147 import AD7147, FakeAD7147
 from edge.i2c.bus import wire_bits
 from tests.edge.i2c.chips import parsed, sense
 
 
-def test_writes_the_start_sequence_of_the_notes():
-    table = ad7147.settings_table()
-    assert table[0] == (0x80, (0xFFFE, 0x1FFF, 0))
-    assert table[6] == (0xB0, (0xEFFF, 0x1FFF, 0))
-    assert table[7] == (0xB8, (0xFFFF, 0x1FFE, 0))
-    assert table[11] == (0xD8, (0xFFFF, 0x1EFF, 0))
-    assert table[12:] == ((0x00, (0x02B0,)), (0x02, (0, 0, 0, 0, 0, 0x0400)), (0x01, (0x0FFF,)))
-    assert ad7147.settings_table(256)[12] == (0x00, (0x00B0,))
+def test_writes_all_eight_registers_of_each_stage_then_the_system_registers():
+    rows = dict(ad7147.start_rows())
+    written = {first + i: value for first, values in rows.items() for i, value in enumerate(values)}
+    assert [written[0x80 + i] for i in range(8)] == [0xFFFE, 0x1FFF, 0, 0x2626, *[1600] * 4]
+    connections = {s: (written[0x80 + 8 * s], written[0x81 + 8 * s]) for s in (6, 7, 11)}
+    assert connections == {6: (0xEFFF, 0x1FFF), 7: (0xFFFF, 0x1FFE), 11: (0xFFFF, 0x1EFF)}
+    assert set(range(0x80, 0xE0)) <= written.keys()
+    assert list(rows)[-1] == 0
+    assert [written[i] for i in range(8)] == [0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400]
+    assert dict(ad7147.start_rows(256))[0][0] == 0x00B0
+    assert max(2 + 2 * len(values) for values in rows.values()) <= 61  # a CP2112's buffer
 
 
 def test_parses_big_endian_words():
@@ -57,3 +59,24 @@ def test_model_converts_in_its_own_time():
     list(chip.settings())
     bus.sleep(0.020)
     assert parsed(chip)[0].tolist() == [18432] * 12
+
+
+def test_a_chip_that_has_lost_its_settings_converts_stage_0_alone_and_no_value_is_intact():
+    model = FakeAD7147(sense)
+    bus = FakeBus(chips={0x2C: model})
+    chip = AD7147(bus, 0x2C)
+    list(chip.settings())
+    model.reset()
+    values, intact = parsed(chip)
+    assert values[0] > 0
+    assert not values[1:].any()
+    assert not intact.any()
+
+
+def test_every_row_that_is_read_back_tells_a_reset():
+    model = FakeAD7147(sense)
+    chip = AD7147(FakeBus(chips={0x2C: model}), 0x2C)
+    list(chip.settings())
+    assert all(chip.healthy() for _ in range(26))
+    model.reset()
+    assert not any(chip.healthy() for _ in range(13))

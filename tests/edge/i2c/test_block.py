@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeBlock
 from edge.i2c import block
-from edge.i2c.block import Block
+from edge.i2c.block import Block, FakeBlock
 from tests.edge.i2c.chips import sense
 
 
@@ -35,5 +34,5 @@ def test_tells_every_single_flipped_bit():
     flipped = np.repeat(good[None], good.size * 8, axis=0)
     for i in range(good.size * 8):
         flipped[i, i // 8] ^= 1 << i % 8
-    assert chip.parse(good[None])[1].all()
-    assert not chip.parse(flipped)[1].any()
+    assert block.parse(good[None], 12, 16)[1].all()
+    assert not block.parse(flipped, 12, 16)[1].any()

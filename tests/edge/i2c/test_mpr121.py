@@ -1,12 +1,13 @@
 """The MPR121: stopped, written and started; its words and its bits on the wire."""
 
 import numpy as np
+import pytest
 
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeMPR121
 from edge.i2c import mpr121
 from edge.i2c.bus import fetch, send, wire_bits
-from edge.i2c.mpr121 import MPR121
+from edge.i2c.chip import WrongChip
+from edge.i2c.mpr121 import MPR121, FakeMPR121
 from tests.edge.i2c.chips import sense
 
 
@@ -29,14 +30,33 @@ def test_model_loses_writes_while_it_runs():
     assert fetch(bus, 0x5A, bytes([mpr121.CONFIG2]), 1) == b"\x20"
 
 
-def test_parses_low_byte_first_and_tells_a_damaged_word():
+def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():
     data = np.zeros((1, 24), dtype=np.uint8)
     data[0, :6] = 0x34, 0x02, 0x34, 0x06, 0xFF, 0x03
+    data[0, 6:8] = 0xFE, 0x03
     values, whole = mpr121.parse(data)
-    assert values[0, :3].tolist() == [0x234, 0x634, 0x3FF]
-    assert whole[0].tolist() == [True, False, True] + [False] * 9
+    assert values[0, :4].tolist() == [0x234, 0x634, 1023, 1022]
+    assert whole[0].tolist() == [True, False, False, True] + [False] * 8
 
 
 def test_frame_is_246_bits():
     chip = MPR121(FakeBus(chips={0x5A: FakeMPR121(sense)}), 0x5A)
     assert wire_bits(chip.frame.messages) == 246
+
+
+def test_over_current_is_named_with_its_resistor():
+    """It forbids ECR, so that the chip cannot start."""
+    model = FakeMPR121(sense)
+    model.over_current = True
+    chip = MPR121(FakeBus(chips={0x5A: model}), 0x5A)
+    with pytest.raises(WrongChip, match="over-current; check the resistor at its pin REXT"):
+        list(chip.settings())
+
+
+def test_over_current_while_it_runs_shows_as_lost_settings():
+    model = FakeMPR121(sense)
+    chip = MPR121(FakeBus(chips={0x5A: model}), 0x5A)
+    list(chip.settings())
+    model.over_current = True
+    model.write(b"\x00", 0.0)
+    assert not chip.healthy()

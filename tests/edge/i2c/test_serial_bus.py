@@ -119,8 +119,8 @@ def bus(board):
 
 
 def frame(chip):
-    chip.bus.transfer(chip.frame)
-    taxels, whole = chip.parse(chip.frame.buffer[None])
+    chip.read()
+    taxels, whole = block.parse(chip.frame.buffer[None], TAXELS, 16)
     return taxels[0].tolist(), bool(whole.all())
 
 

@@ -115,7 +115,7 @@ def test_adapter_and_fake_refuse_the_same_shapes_with_the_same_errors(library):
         """
         from edge.i2c.bus import BusError, LinuxBus, read, send, write
         from edge.fake.bus import FakeBus
-        from edge.fake.chips import FakeTCA9548A
+        from edge.i2c.tca9548a import FakeTCA9548A
         shapes = [
             [read(0x70, 1), write(0x70, [1])],
             [write(0x70, [1]), read(0x2C, 2)],

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeAD7147, FakeTCA9548A
 from edge.fake.faults import Fault
-from edge.i2c.ad7147 import AD7147
+from edge.i2c.ad7147 import AD7147, FakeAD7147
 from edge.i2c.bus import BusFault, bus_error
-from edge.i2c.tca9548a import TCA9548A
+from edge.i2c.tca9548a import TCA9548A, FakeTCA9548A
 from tests.edge.i2c.chips import parsed
 
 

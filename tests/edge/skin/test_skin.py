@@ -8,10 +8,10 @@ import pytest
 
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.i2c import ad7147, mpr121
 from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
-from edge.skin.buffers import SEQUENCE_FRAMES
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
@@ -22,9 +22,9 @@ PAD = skinfile.load(skinfile.shipped("mpr121"))
 PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 
 
-def on_buses(n, *, kind="ad7147", verify=False, recheck=100_000):
+def on_buses(n, *, kind=ad7147.KIND, verify=False, recheck=100_000):
     """The 32 chips of Cody's skin shared out over n buses."""
-    base = 0x5A if kind == "mpr121" else 0x2C
+    base = kind.addresses[0]
     channels = [CODY.chips[4 * i : 4 * i + 4] for i in range(8)]
     share = [channels[i::n] for i in range(n)]
     buses = tuple(
@@ -45,14 +45,14 @@ def on_buses(n, *, kind="ad7147", verify=False, recheck=100_000):
 @pytest.mark.parametrize(
     ("kind", "buses", "hz_100", "hz_400"),
     [
-        ("ad7147", 1, 12.0, 48.1),
-        ("ad7147", 2, 24.0, 96.2),
-        ("ad7147", 3, 32.1, 128.2),
-        ("ad7147", 4, 48.1, 192.3),
-        ("mpr121", 1, 12.5, 49.8),
-        ("mpr121", 2, 24.9, 99.6),
-        ("mpr121", 3, 33.2, 132.8),
-        ("mpr121", 4, 49.8, 199.2),
+        (ad7147.KIND, 1, 12.0, 48.1),
+        (ad7147.KIND, 2, 24.0, 96.2),
+        (ad7147.KIND, 3, 32.1, 128.2),
+        (ad7147.KIND, 4, 48.1, 192.3),
+        (mpr121.KIND, 1, 12.5, 49.8),
+        (mpr121.KIND, 2, 24.9, 99.6),
+        (mpr121.KIND, 3, 33.2, 132.8),
+        (mpr121.KIND, 4, 49.8, 199.2),
     ],
 )
 def test_the_wire_carries_the_frame_rates_of_the_notes(kind, buses, hz_100, hz_400):
@@ -84,54 +84,6 @@ def test_every_taxel_is_where_the_file_says(file):
     np.testing.assert_array_equal(frame.counts, np.where(picture < max(floor, 1), 0, picture))
 
 
-def test_block_chips_of_each_width_serve_a_whole_skin():
-    for bits in (8, 12, 16):
-        chip = replace(
-            CODY.chips[0], kind="block", address=0x28, mux=None, channel=None, bits=bits,
-            taxels=tuple(range(384)),
-        )  # fmt: skip
-        file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
-        picture = PICTURE % 100
-        with fake_skin(file, lambda t, p=picture: p) as skin:
-            frame = skin.read()
-        np.testing.assert_array_equal(frame.counts, picture)
-        assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
-
-
-def test_a_microcontroller_that_hangs_is_told_by_its_sequence_number():
-    chip = replace(
-        CODY.chips[0], kind="block", address=0x28, mux=None, channel=None,
-        taxels=tuple(range(384)),
-    )  # fmt: skip
-    file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
-    with fake_skin(file, lambda t: PICTURE) as skin:
-        valid = []
-        for k in range(100):
-            if k < 50:
-                skin.clock.sleep_until(k * 0.01)  # then its time stands still
-            valid.append(bool(skin.read().valid.all()))
-    assert valid.index(False) == 49 + SEQUENCE_FRAMES
-    assert not any(valid[49 + SEQUENCE_FRAMES :])
-
-
-def test_chips_of_different_kinds_make_one_skin():
-    ad, mpr, mcu = CODY.chips[0], CODY.chips[1], CODY.chips[2:]
-    block = replace(
-        ad, kind="block", address=0x28, mux=None, channel=None,
-        taxels=tuple(t for chip in mcu for t in chip.taxels),
-    )  # fmt: skip
-    file = replace(
-        CODY,
-        buses=(
-            BusSpec("a", (ad, replace(mpr, kind="mpr121", address=0x5B))),
-            BusSpec("b", (block,)),
-        ),
-    )
-    picture = PICTURE % 400
-    with fake_skin(file, lambda t: picture) as skin:
-        np.testing.assert_array_equal(skin.read().counts, picture)
-
-
 def test_the_sign_is_turned_back():
     file = replace(
         CODY,
@@ -142,47 +94,6 @@ def test_the_sign_is_turned_back():
     with fake_skin(file, lambda t: PICTURE) as skin:
         np.testing.assert_array_equal(skin.read().counts, PICTURE)
         assert skin.raw()[0][3, 5] == 20946 - PICTURE[3, 5]
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(sign):
-    """Rest 20946, saturation 30000 counts and 2000 of drift: the wire's ones are beyond."""
-    signal = replace(CODY.signal, saturation_counts=30_000)
-    chip = replace(CODY.chips[0], sign=sign)
-    bus = replace(CODY.buses[0], chips=(chip,))
-    file = replace(CODY, buses=(bus,), signal=signal, reading=Reading(recheck_frames=100))
-    for raw, reached in ((1, True), (52_946, True), (52_947, False), (0xFFFF, False)):
-        with still(file) as skin:
-            [reader] = skin.readers
-            [slot], send, before = reader.slots, reader.slots[0].send, reader.bus.transactions
-
-            def spoiled(transfer, row=slot.row, send=send, raw=raw):
-                send(transfer)
-                row[8:10] = divmod(raw, 256)
-
-            slot.send = spoiled
-            valid = skin.read().valid
-            skin.read()
-            checks = reader.bus.transactions - before - 2
-        assert bool(valid[1, 1]) is reached
-        assert valid.sum() == 12 - (not reached)
-        assert checks == (not reached)
-
-
-def test_dead_and_uncovered_taxels_are_never_valid():
-    first = CODY.buses[0]
-    signal = replace(CODY.signal, dead=((2, 3),))
-    bare = replace(CODY, buses=(replace(first, chips=first.chips[:1]),), signal=signal)
-    with fake_skin(bare, lambda t: PICTURE) as skin:
-        frame = skin.read()
-    expected = np.zeros((16, 24), dtype=bool)
-    expected[:4, :3] = True
-    np.testing.assert_array_equal(frame.valid, expected)
-    assert (frame.counts[~expected] == 0).all()
-    assert np.isfinite(frame.times).all()
-    dead_inside = replace(bare, signal=replace(signal, dead=((1, 1),)))
-    with fake_skin(dead_inside, lambda t: PICTURE) as skin:
-        assert not skin.read().valid[1, 1]
 
 
 def test_each_bus_has_a_thread_of_its_own():
@@ -285,19 +196,6 @@ def test_closing_twice_is_fine_and_ends_the_threads():
     assert threading.active_count() == before
 
 
-def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
-    noise = np.full((16, 24), 4.0)
-    file = calibrated(CODY)
-    file = replace(file, calibration=replace(file.calibration, noise=noise))
-    quiet = np.zeros((16, 24), dtype=np.uint16)
-    with fake_skin(file, lambda t: quiet, noise_counts=4.0, seed=1) as skin:
-        for _ in range(150):
-            assert skin.read().valid.all()
-    with fake_skin(file, lambda t: quiet) as skin:
-        valid = [bool(skin.read().valid.all()) for _ in range(150)]
-    assert valid.index(False) == file.reading.stuck_frames
-
-
 def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
     def absent(*spec):
         raise BusMissing("no such bus")
@@ -308,18 +206,3 @@ def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
     for file, wanted in ((CODY, False), (calibrated(CODY), True)):
         with pytest.raises(BusMissing):
             Skin.open(file, calibrated=wanted)
-
-
-@pytest.mark.parametrize(("rest", "valid"), [(1000, False), (7999, False), (8000, True)])
-def test_a_value_further_below_its_baseline_than_any_touch_is_not_valid(rest, valid):
-    """By 40000 counts of the file's `saturation_counts` and 2000 of drift."""
-
-    def resting_at(counts):
-        calibration = replace(calibrated(CODY).calibration, baseline=np.full((16, 24), counts))
-        return replace(CODY, calibration=calibration)
-
-    clock = VirtualClock()
-    buses = fake_buses(resting_at(rest), lambda t: np.zeros((16, 24), np.uint16), clock)
-    with Skin(resting_at(50_000), buses, clock=clock) as skin:
-        skin.start()
-        assert skin.read().valid.all() == skin.read().valid.any() == valid

@@ -5,15 +5,15 @@ from dataclasses import replace
 import pytest
 
 from edge.errors import InputError
+from edge.i2c.chip import UNUSED
 from edge.skin import file as skinfile
-from edge.skin.wiring import UNUSED
 from tests.edge.skin.small import SMALL
 
 
 def test_first_and_block_number_the_stages_row_by_row():
     chip = skinfile.parse(SMALL).buses[0].chips[1]
     assert chip.taxels == (3, 4, 5, 9, 10, 11, 15, 16, 17, 21, 22, 23)
-    assert (chip.kind, chip.mux, chip.channel, chip.address) == ("ad7147", 0x70, 0, 0x2D)
+    assert (chip.kind.name, chip.mux, chip.channel, chip.address) == ("ad7147", 0x70, 0, 0x2D)
 
 
 def test_taxels_name_each_stage_and_an_empty_one_is_none():
@@ -84,7 +84,7 @@ def test_a_bus_is_named_by_its_number(number):
 def test_a_microcontroller_may_stand_on_a_serial_port():
     (bus,) = skinfile.parse(SERIAL).buses
     assert (bus.device, bus.serial, bus.clock_hz) == ("/dev/ttyACM0", True, 115_200)
-    assert (bus.chips[0].kind, bus.chips[0].address) == ("block", 0)
+    assert (bus.chips[0].kind.name, bus.chips[0].address) == ("block", 0)
 
 
 def test_a_microcontroller_may_serve_a_single_taxel():
@@ -98,7 +98,7 @@ def test_a_microcontroller_may_serve_a_single_taxel():
         ("serial =", "device =", 'is a serial port, not an I2C bus; write serial = "/dev/ttyACM0"'),
         ('serial = "/dev/ttyACM0"', 'device = "COM3"', "COM3 is a serial port"),
         ("[[bus]]", "[[bus]]\ndevice = 1", "give it or serial, not both"),
-        ('"block"', '"mpr121"', "kind is mpr121; a serial port carries block alone"),
+        ('"block"', '"mpr121"', "kind is mpr121; a serial port carries block only"),
         (
             '"block"',
             '"microcontroller"',
@@ -130,4 +130,4 @@ def test_the_slowest_clock_is_of_1000_hertz():
 
 def test_the_largest_value_of_a_microcontroller_is_that_of_its_bits():
     chip = skinfile.load(skinfile.shipped("matrix")).chips[0]
-    assert replace(chip, bits=12).highest == 4095
+    assert replace(chip, options={"bits": 12}).highest == 4095

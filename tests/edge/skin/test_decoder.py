@@ -1,0 +1,136 @@
+"""From bytes to trusted values: which taxels are valid, and which chips are doubted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from edge.fake.clock import VirtualClock
+from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
+from edge.i2c import block, mpr121
+from edge.i2c.block import UNCHANGED_FRAMES
+from edge.skin import file as skinfile
+from edge.skin.file import Reading
+from edge.skin.skin import Skin
+from edge.skin.wiring import BusSpec
+
+CODY = skinfile.load(skinfile.shipped("cody"))
+PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
+
+
+def test_block_chips_of_each_width_serve_a_whole_skin():
+    for bits in (8, 12, 16):
+        chip = replace(
+            CODY.chips[0], kind=block.KIND, address=0x28, mux=None, channel=None,
+            options={"bits": bits},
+            taxels=tuple(range(384)),
+        )  # fmt: skip
+        file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
+        picture = PICTURE % 100
+        with fake_skin(file, lambda t, p=picture: p) as skin:
+            frame = skin.read()
+        np.testing.assert_array_equal(frame.counts, picture)
+        assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
+
+
+def test_a_microcontroller_that_hangs_is_told_by_its_sequence_number():
+    chip = replace(
+        CODY.chips[0], kind=block.KIND, options={}, address=0x28, mux=None, channel=None,
+        taxels=tuple(range(384)),
+    )  # fmt: skip
+    file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
+    with fake_skin(file, lambda t: PICTURE) as skin:
+        valid = []
+        for k in range(100):
+            if k < 50:
+                skin.clock.sleep_until(k * 0.01)  # then its time stands still
+            valid.append(bool(skin.read().valid.all()))
+    assert valid.index(False) == 49 + UNCHANGED_FRAMES
+    assert not any(valid[49 + UNCHANGED_FRAMES :])
+
+
+def test_chips_of_different_kinds_make_one_skin():
+    ad, mpr, mcu = CODY.chips[0], CODY.chips[1], CODY.chips[2:]
+    served = replace(
+        ad, kind=block.KIND, options={}, address=0x28, mux=None, channel=None,
+        taxels=tuple(t for chip in mcu for t in chip.taxels),
+    )  # fmt: skip
+    file = replace(
+        CODY,
+        buses=(
+            BusSpec("a", (ad, replace(mpr, kind=mpr121.KIND, options={}, address=0x5B))),
+            BusSpec("b", (served,)),
+        ),
+    )
+    picture = PICTURE % 400
+    with fake_skin(file, lambda t: picture) as skin:
+        np.testing.assert_array_equal(skin.read().counts, picture)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(sign):
+    """Rest 20946, saturation 30000 counts and 2000 of drift: the wire's ones are beyond."""
+    signal = replace(CODY.signal, saturation_counts=30_000)
+    chip = replace(CODY.chips[0], sign=sign)
+    bus = replace(CODY.buses[0], chips=(chip,))
+    file = replace(CODY, buses=(bus,), signal=signal, reading=Reading(recheck_frames=100))
+    for raw, reached in ((1, True), (52_946, True), (52_947, False), (0xFFFF, False)):
+        with still(file) as skin:
+            [reader] = skin.readers
+            [slot], before = reader.slots, reader.bus.transactions
+
+            def spoiled(row=slot.row, read=slot.chip.read, raw=raw):
+                read()
+                row[8:10] = divmod(raw, 256)
+
+            slot.chip.read = spoiled
+            valid = skin.read().valid
+            skin.read()
+            checks = reader.bus.transactions - before - 2
+        assert bool(valid[1, 1]) is reached
+        assert valid.sum() == 12 - (not reached)
+        assert checks == (not reached)
+
+
+def test_dead_and_uncovered_taxels_are_never_valid():
+    first = CODY.buses[0]
+    signal = replace(CODY.signal, dead=((2, 3),))
+    bare = replace(CODY, buses=(replace(first, chips=first.chips[:1]),), signal=signal)
+    with fake_skin(bare, lambda t: PICTURE) as skin:
+        frame = skin.read()
+    expected = np.zeros((16, 24), dtype=bool)
+    expected[:4, :3] = True
+    np.testing.assert_array_equal(frame.valid, expected)
+    assert (frame.counts[~expected] == 0).all()
+    assert np.isfinite(frame.times).all()
+    dead_inside = replace(bare, signal=replace(signal, dead=((1, 1),)))
+    with fake_skin(dead_inside, lambda t: PICTURE) as skin:
+        assert not skin.read().valid[1, 1]
+
+
+def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
+    noise = np.full((16, 24), 4.0)
+    file = calibrated(CODY)
+    file = replace(file, calibration=replace(file.calibration, noise=noise))
+    quiet = np.zeros((16, 24), dtype=np.uint16)
+    with fake_skin(file, lambda t: quiet, noise_counts=4.0, seed=1) as skin:
+        for _ in range(150):
+            assert skin.read().valid.all()
+    with fake_skin(file, lambda t: quiet) as skin:
+        valid = [bool(skin.read().valid.all()) for _ in range(150)]
+    assert valid.index(False) == file.reading.stuck_frames
+
+
+@pytest.mark.parametrize(("rest", "valid"), [(1000, False), (7999, False), (8000, True)])
+def test_a_value_further_below_its_baseline_than_any_touch_is_not_valid(rest, valid):
+    """By 40000 counts of the file's `saturation_counts` and 2000 of drift."""
+
+    def resting_at(counts):
+        calibration = replace(calibrated(CODY).calibration, baseline=np.full((16, 24), counts))
+        return replace(CODY, calibration=calibration)
+
+    clock = VirtualClock()
+    buses = fake_buses(resting_at(rest), lambda t: np.zeros((16, 24), np.uint16), clock)
+    with Skin(resting_at(50_000), buses, clock=clock) as skin:
+        skin.start()
+        assert skin.read().valid.all() == skin.read().valid.any() == valid
