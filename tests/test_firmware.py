@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from edge.fake.bus import FakeBus
-from edge.i2c.block import Block
+from edge.i2c.block import Block, parse
 from edge.i2c.chip import WrongChip
 from edge.i2c.serial_bus import SerialBus
 from edge.skin import file as skinfile
@@ -72,7 +72,7 @@ def test_its_registers_are_what_the_driver_reads_over_i2c(host, bits):
         assert chip.healthy()
         bus.transfer(chip.frame)
         assert chip.frame.buffer[:2].tobytes() == n.to_bytes(2, "big")
-        taxels, whole = chip.parse(chip.frame.buffer[None])
+        taxels, whole = parse(chip.frame.buffer[None], TAXELS, bits)
         assert whole.all()
         assert taxels[0].tolist() == ([0] * TAXELS if n == 0 else values(bits, n - 1).tolist())
         assert unknown == b""
@@ -97,7 +97,7 @@ def test_its_frames_come_over_a_serial_port(plugged):
     seen = []
     for _ in range(5):
         bus.transfer(chip.frame)
-        taxels, whole = chip.parse(chip.frame.buffer[None])
+        taxels, whole = parse(chip.frame.buffer[None], TAXELS, 12)
         assert whole.all()
         seen.append(taxels[0].tolist())
     # Two requests came before: the one at opening, and the driver's for the identity.
@@ -112,7 +112,7 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     for noise in (b"\x05", b"\0\0", b"\xff" * 300, b"\x04\x10\x01\x01\0", b"\x03\x10\0"):
         bus._port.write(noise + b"\0")
         bus.transfer(chip.frame)
-        assert chip.parse(chip.frame.buffer[None])[1].all()
+        assert parse(chip.frame.buffer[None], TAXELS, 12)[1].all()
     bus.close()
 
 
@@ -142,5 +142,5 @@ def test_the_sketch_says_what_the_example_skin_says():
     (chip,) = bus.chips
     assert "kRows = 10, kCols = 10, kAddress = 0x28" in sketch
     assert "taxels::Registers<kRows * kCols, 12>" in sketch
-    assert (len(chip.taxels), chip.bits) == (100, 12)
+    assert (len(chip.taxels), chip.option("bits")) == (100, 12)
     assert f"Serial.begin({bus.clock_hz})" in sketch

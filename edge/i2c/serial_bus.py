@@ -1,9 +1,9 @@
 """A microcontroller on a serial port, with the face of an I2C bus.
 
-The registers of `edge.i2c.block` travel in packets, so that its driver runs unchanged. A request is
-the pointer, a tag and their CRC-16; the answer is the tag and what stands behind the pointer, which
-ends in a CRC-16 of its own. Packets are encoded with COBS (consistent overhead byte stuffing), so
-that a zero byte always means the end of a packet, wherever reading begins.
+Packets carry the registers of `edge.i2c.block`, so that its driver runs unchanged. A request is the
+pointer, a tag and their CRC-16; the answer is the tag and the register at the pointer, which ends
+in a CRC-16 of its own. Packets are encoded with COBS (consistent overhead byte stuffing), so that
+a zero byte always ends a packet, wherever reading begins.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from edge.i2c.block import IDENTITY, sealed
 from edge.i2c.bus import BusError, Message, Transfer, bus_error, read, write
 
 BOOT_S = 3.0
-"""Many boards restart when their port is opened; the bootloader of an Arduino takes 2 s."""
+"""Many boards restart when their port is opened; an Arduino's bootloader takes 2 s."""
 PING_S = 0.1
 LONGEST_PACKET = 16384
 """More bytes than this without a zero are noise."""
@@ -28,11 +28,11 @@ REMEDIES = {
     errno.ENOENT: "no such serial port; is the microcontroller plugged in?",
     errno.EACCES: "may not be opened; add yourself to the group dialout",
     errno.EBUSY: "another program has the port open; close it",
-    errno.ETIMEDOUT: "no whole answer came in time; check the firmware and the baud rate",
+    errno.ETIMEDOUT: "no complete answer came in time; check the firmware and the baud rate",
     errno.ENODEV: "the port has gone; plug the microcontroller in again",
-    errno.EOPNOTSUPP: "a serial port carries the frames of a microcontroller alone (kind block)",
+    errno.EOPNOTSUPP: "a serial port carries only the frames of a microcontroller (kind block)",
 }
-"""What to do about each error, by errno."""
+"""Remedies by errno."""
 
 
 def encode(data: bytes) -> bytes:
@@ -48,13 +48,13 @@ def encode(data: bytes) -> bytes:
         run = data[at : end if end >= 0 else at + 254]
         out.append(len(run) + 1)
         out += run
-        # A run of 254 bytes stands for no zero; the packet's end stands for one that is left out.
+        # No zero follows a run of 254 bytes; the packet's end stands for the last zero.
         at += len(run) + (len(run) < 254)
     return bytes(out) + b"\0"
 
 
 def decode(packet: bytes) -> bytes | None:
-    """What a packet (without its final zero) carries, or None where it was cut short.
+    """The data of a packet without its final zero, or None if it was cut short.
 
     >>> decode(bytes([2, 17, 1, 2, 34])).hex(" "), decode(bytes([5, 17]))
     ('11 00 00 22', None)
@@ -85,7 +85,7 @@ def serial_bits(messages: Sequence[Message]) -> int:
 
 
 def serial_error(code: int, port: str) -> BusError:
-    """The named error of an errno, with a sentence that names the port."""
+    """Build the named error of an errno; its message names the port."""
     error = bus_error(code, port)
     remedy = REMEDIES.get(code, "the transfer broke off; check the cable")
     named = type(error)(f"{port}: {remedy} ({errno.errorcode.get(code, code)})")
@@ -109,16 +109,18 @@ class SerialBus:
             port: such as `/dev/ttyACM0`, `/dev/serial/by-id/...` or `COM3`.
             baud: bits per second; a port over USB ignores it.
             timeout_s: how long an answer may take.
-            boot_s: how long to wait for the first answer; it is no error if none comes.
+            boot_s: how long to wait for the first answer; if none comes, that is no error.
 
         Raises:
             InputError: pyserial is not installed.
-            BusError: the port is not there or may not be opened.
+            BusError: the port does not exist or may not be opened.
         """
         self.name, self.baud, self.timeout_s = port, baud, timeout_s
         self._port: Any = None
         self._received = bytearray()
         self._tag = 0
+        self._heard = False
+        """Some bytes have come since the last request."""
         self.reopen()
         ends = self.now() + boot_s
         ping = self.prepare(write(0, IDENTITY), read(0, 10))
@@ -134,13 +136,13 @@ class SerialBus:
     sleep = staticmethod(time.sleep)
 
     def reopen(self) -> None:
-        """Open the port unless it is open, and forget what has come.
+        """Open the port unless it is open, and discard the bytes that have come.
 
-        A port that merely did not answer is not closed: opening it restarts many boards.
+        A port that did not answer is not closed: opening it restarts many boards.
 
         Raises:
             InputError: pyserial is not installed.
-            BusError: the port is not there or may not be opened.
+            BusError: the port does not exist or may not be opened.
         """
         try:
             import serial
@@ -164,10 +166,10 @@ class SerialBus:
         return Transfer(messages)
 
     def transfer(self, prepared: Transfer) -> None:
-        """Ask for what stands behind a pointer, and read the answer into the last message.
+        """Ask for the register at a pointer, and read the answer into the last message.
 
         Raises:
-            BusError: the port is gone, or no whole answer came in time.
+            BusError: the port is gone, or no intact answer came in time.
         """
         self._exchange(prepared, self.timeout_s)
 
@@ -181,30 +183,30 @@ class SerialBus:
         try:
             answer = self._ask(int(messages[0].buffer[0]), self.now() + timeout_s)
         except OSError as error:
-            # The timeout of a write carries no errno, nor do pyserial's errors of a lost port.
+            # Neither a write's timeout nor pyserial's error of a lost port has an errno.
             hung = type(error).__name__ == "SerialTimeoutException"
             if not hung:
                 self.close()
             raise serial_error(errno.ETIMEDOUT if hung else errno.ENODEV, self.name) from None
-        if answer is None:
-            raise serial_error(errno.ETIMEDOUT, self.name)
         if len(answer) != len(into):
-            raise serial_error(errno.EIO, self.name)
+            # Noise is a fault, and is read again at once; silence is a timeout.
+            raise serial_error(errno.EIO if self._heard else errno.ETIMEDOUT, self.name)
         into[:] = np.frombuffer(answer, dtype=np.uint8)
 
-    def _ask(self, pointer: int, ends: float) -> bytes | None:
-        """What stands behind a pointer, or None where no answer comes by the time `ends`."""
+    def _ask(self, pointer: int, ends: float) -> bytes:
+        """The register at a pointer, or nothing if no intact answer comes by the time `ends`."""
         self._tag = (self._tag + 1) % 256
+        self._heard = False
         self._port.write(encode(sealed(bytes([pointer, self._tag]))))
         while self.now() < ends:
             packet = self._packet(ends)
-            # The answer to an earlier request, which came too late, bears another tag.
+            # An answer to an earlier request that came too late has another tag.
             if packet is not None and packet[:1] == bytes([self._tag]):
                 return packet[1:]
-        return None
+        return b""
 
     def _packet(self, ends: float) -> bytes | None:
-        """The next packet that is whole, or None by the time `ends`."""
+        """The data of the next packet; None if it is damaged, or none comes by the time `ends`."""
         while True:
             packet, zero, rest = self._received.partition(b"\0")
             if zero:
@@ -216,10 +218,12 @@ class SerialBus:
             if left <= 0.0:
                 return None
             self._port.timeout = left
-            self._received += self._port.read(max(1, self._port.in_waiting))
+            data = self._port.read(max(1, self._port.in_waiting))
+            self._heard |= bool(data)
+            self._received += data
 
     def close(self) -> None:
-        """Let the port go; twice is fine."""
+        """Close the port; calling it twice is fine."""
         if self._port is not None:
             port, self._port = self._port, None
             port.close()

@@ -138,13 +138,20 @@ def test_a_wrong_crc_marks_the_frame_as_not_whole(board, bus):
     assert frame(chip)[1]
 
 
-@pytest.mark.parametrize("cut", [lambda a: b"", lambda a: a[: len(a) // 2]])
-def test_half_an_answer_is_a_timeout_and_the_next_is_whole(board, bus, cut):
+@pytest.mark.parametrize(
+    ("cut", "error", "sentence"),
+    [
+        (lambda a: b"", BusTimeout, "no complete answer came in time"),
+        (lambda a: a[: len(a) // 2], BusFault, "the transfer broke off"),
+    ],
+)
+def test_silence_is_a_timeout_and_half_an_answer_a_fault(board, bus, cut, error, sentence):
+    """A fault is read again at once, a timeout after a pause."""
     chip = Block(bus, 0, taxels=TAXELS)
     board.change = lambda answer, _: cut(answer)
     bus.timeout_s = HASTY_S
-    with pytest.raises(BusTimeout, match="no whole answer came in time"):
-        chip.bus.transfer(chip.frame)
+    with pytest.raises(error, match=sentence):
+        chip.read()
     board.change = lambda answer, _: answer
     bus.timeout_s = PATIENT_S
     bus.reopen()
@@ -243,3 +250,17 @@ def test_a_skin_over_a_serial_port_survives_being_unplugged(board, tmp_path):
         while not skin.read().valid.all():
             assert time.monotonic() < ends
             time.sleep(0.01)
+
+
+def test_noise_costs_a_skin_no_frame(board, tmp_path):
+    """Half of an answer is asked for again within the same frame."""
+    path = tmp_path / "skin.toml"
+    path.write_text(
+        "[skin]\nrows = 2\ncols = 3\n[read]\ntimeout_s = 0.5\n"
+        f'[[bus]]\nserial = "{board.port}"\nkind = "block"\n'
+        "chips = [{ first = [0, 0], block = [2, 3] }]"
+    )
+    with Skin.open(path, calibrated=False) as skin:
+        noisy = board.asked + 1
+        board.change = lambda answer, number: answer[: 5 if number == noisy else None]
+        assert skin.read().valid.all()

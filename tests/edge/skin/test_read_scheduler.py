@@ -166,9 +166,9 @@ def test_features_and_decisions_agree_with_full_reading(recordings, exported):
         errors.append(np.sqrt(((near - full) ** 2).mean(axis=1)) / span)
         decisions = [model.decide(vector.ravel()) for vector in (full, near)]
         same += all(decisions[0][task].label == decisions[1][task].label for task in decisions[0])
-    # The onset may be that late, so force and motion are within 2.5 % of their range; area rises
-    # in steps, and each may come 10 ms early or late.
+    # The onset may be that late, so force and motion are within 2.5 % of their range. Area rises
+    # in steps, which may come 10 ms early or late: one of the 40 samples may differ by the range.
     force, area, motion = np.transpose(errors)
     assert max(force.max(), motion.max()) < 0.025
-    assert np.median(area) < 0.06
+    assert np.median(area) <= np.sqrt(1 / 40) + 1e-9
     assert same >= 3
