@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from edge.classifier import Classifier
-from edge.commands.run import chip_event
 from edge.events import Decided
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
@@ -224,14 +223,9 @@ def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
     heard = []
     with fake_skin(CODY, lambda t: QUIET, faults=[lost]) as skin:
         for frame in Loop(skin, lasts_s=0.5).frames():
-            heard += [chip_event(status, round(frame.t, 3)) for status in skin.changes()]
-    down, up = heard
-    assert (down["t"], down["state"], down["place"]) == (
-        0.1, "down", "mux 0x70 channel 1 address 0x2e",
-    )  # fmt: skip
-    assert down["error"].endswith(
-        "does not answer; check its power, wiring and address (EREMOTEIO)"
-    )
-    assert up["state"] == "running"
-    assert "error" not in up
-    assert 0.2 <= up["t"] <= 0.2 + PAUSE_S + 0.01
+            heard += [(round(frame.t, 3), status) for status in skin.changes()]
+    (failed_at, down), (back_at, up) = heard
+    assert (failed_at, down.state, down.route) == (0.1, "down", "mux 0x70 channel 1 address 0x2e")
+    assert down.error.endswith("check its power, wiring and address (EREMOTEIO)")
+    assert (up.state, up.error) == ("running", "")
+    assert 0.2 <= back_at <= 0.2 + PAUSE_S + 0.01
