@@ -25,8 +25,7 @@ from edge.touch.features import FEATURES, SAMPLES
 from train.dataset import load_trials
 from train.evaluate import stratified_folds
 from train.stopping import THRESHOLDS, finest
-from train.tradeoff.accuracy import Chooser
-from train.tradeoff.early import FOLDS, StoppingComparison, compare_stopping
+from train.tradeoff.early import FOLDS, Chooser, StoppingComparison, compare_stopping
 from train.tradeoff.run import DECISION_POINTS_S, GRIDS, NAMES
 
 

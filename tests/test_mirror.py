@@ -46,6 +46,7 @@ TOPICS = {
 THROUGH = {
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
+    "train/report/work.py": "train/study/test_study_report.py",
     "edge/commands/source.py": "edge/commands/test_live_commands.py",
     "edge/commands/summary.py": "edge/commands/test_replay_verify.py",
     "edge/config.py": "edge/skin/test_file.py",

@@ -1,1 +1,1 @@
-"""What the reports share: tables, figures, HTML."""
+"""Sections, figures and scores that the reports are built from."""

@@ -1,87 +1,84 @@
-"""Beyond the paper's three features: named sets and outside peers on the same folds."""
+"""Beyond the paper's three features: other feature sets and other methods on the same folds."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
-from edge.touch.contact import FeatureSeries
 from edge.touch.feature_sets import SETS, expand
-from edge.touch.features import WINDOW_S, feature_vector, widths
+from edge.touch.features import WINDOW_S, widths
 from edge.touch.layout import SkinLayout
-from train.evaluate import Labels, Result, SearchGrid, evaluate, group_folds, stratified_folds
+from train.evaluate import Labels, Result, SearchGrid, group_folds, stratified_folds
 from train.report import figures
-from train.report.tables import Figure, Section, Table, percent
+from train.report.score import interval, nested, percent
+from train.report.section import Figure, Section, Table
+from train.report.skins import View, vectors
+from train.stopping import finest
 from train.study.context import Context
-from train.study.skins import View
 
+TABLE, UNSEEN = "beyond", "beyond, objects not met"
 OURS = (("paper", "pca"), ("paper", "lda"), ("contact", "lda"), ("moments", "lda"))
-"""Sets of features and how they are projected: the paper's way first."""
+"""Feature sets and their projections, the paper's way first."""
 SAMPLES = 20
 """Times at which a feature is sampled."""
 SCALING = "IV"
 TREES = 100
 TIMES = 10
-"""Times at which every taxel is sampled, for the peers."""
+"""Times at which every taxel is sampled for the other methods."""
 GROUP_TASK = "object"
-PARTS = 4
-"""Parts of the trials in the learning curve: one of them, two, three, all."""
+QUARTERS = 4
+"""Shares of the trials in the learning curve: one quarter, two, three, all."""
 CURVE = (("paper", "pca"), ("contact", "lda"))
 
 Peer = Callable[[NDArray[np.float64], NDArray[np.str_], NDArray[np.float64]], NDArray[np.str_]]
-"""Taxels over time (n, times, taxels) and labels of training trials, then new trials; labels."""
-
-
-def _flat(X: NDArray[np.float64]) -> NDArray[np.float64]:
-    return X.reshape(len(X), -1)
-
-
-def _statistics(X: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.hstack([X.mean(axis=1), X.std(axis=1), X.max(axis=1)])
+"""(taxels over time (n, times, taxels), their labels, new trials) -> labels."""
 
 
 def extra_trees(
     X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
 ) -> NDArray[np.str_]:
-    """Extra trees on every taxel at ten times."""
-    trees = ExtraTreesClassifier(TREES, random_state=0).fit(_flat(X), y)
-    return np.asarray(trees.predict(_flat(new)))
+    """Labels by extra trees on every taxel at ten times."""
+    trees = ExtraTreesClassifier(TREES, random_state=0).fit(X.reshape(len(X), -1), y)
+    return np.asarray(trees.predict(new.reshape(len(new), -1)))
 
 
 def forest(
     X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
 ) -> NDArray[np.str_]:
-    """A random forest on each taxel's mean, deviation and maximum."""
-    trees = RandomForestClassifier(TREES, random_state=0).fit(_statistics(X), y)
-    return np.asarray(trees.predict(_statistics(new)))
+    """Labels by a random forest on each taxel's mean, deviation and maximum."""
+
+    def statistics(X: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.hstack([X.mean(axis=1), X.std(axis=1), X.max(axis=1)])
+
+    trees = RandomForestClassifier(TREES, random_state=0).fit(statistics(X), y)
+    return np.asarray(trees.predict(statistics(new)))
 
 
 def minirocket(
     X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
 ) -> NDArray[np.str_]:
-    """MiniRocket and ridge of aeon (Dempster, Schmidt and Webb, 2021) on every taxel."""
+    """Labels by aeon's MiniRocket and ridge (Dempster, Schmidt and Webb, 2021) on every taxel."""
     convolutions = importlib.import_module("aeon.classification.convolution_based")
     series, others = X.transpose(0, 2, 1), new.transpose(0, 2, 1)
-    return np.asarray(
-        convolutions.MiniRocketClassifier(random_state=0).fit(series, y).predict(others)
-    )
+    model = convolutions.MiniRocketClassifier(random_state=0).fit(series, y)
+    return np.asarray(model.predict(others))
 
 
 def peers() -> dict[str, Peer]:
-    """What else is widely used; MiniRocket where aeon is installed."""
-    found: dict[str, Peer] = {
+    """Widely used methods by name; MiniRocket only where aeon is installed."""
+    usual: dict[str, Peer] = {
         f"{TREES} extra trees on every taxel": extra_trees,
         f"{TREES} random trees on each taxel's mean, deviation, maximum": forest,
     }
     if importlib.util.find_spec("aeon") is None:
-        return found
-    return {**found, "MiniRocket and ridge on every taxel": minirocket}
+        return usual
+    return {**usual, "MiniRocket and ridge on every taxel": minirocket}
 
 
 def taxels(context: Context) -> NDArray[np.float64]:
@@ -96,14 +93,6 @@ def taxels(context: Context) -> NDArray[np.float64]:
     return np.stack(rows)
 
 
-def vectors(series: Sequence[FeatureSeries | None], name: str) -> NDArray[np.float64]:
-    """(n, width) the vectors of a set; zeros where there was no contact."""
-    names = SETS[name]
-    rows = [None if s is None else feature_vector(s, WINDOW_S, SAMPLES, names) for s in series]
-    width = next(len(row) for row in rows if row is not None)
-    return np.stack([np.zeros(width) if row is None else row for row in rows])
-
-
 def _ours(
     X: NDArray[np.float64],
     y: Labels,
@@ -112,141 +101,128 @@ def _ours(
     name: str,
     projection: str,
 ) -> dict[str, Result]:
-    names = SETS[name]
-    columns = widths(names, SAMPLES, layout)
-    grid = SearchGrid(SCALING, projection)
-    table = evaluate(X, y, folds, [grid], features=names, widths=columns)
-    return {task: table.nested(task) for task in y}
+    columns = widths(SETS[name], SAMPLES, layout)
+    return nested(X, y, SearchGrid(SCALING, projection), SETS[name], widths=columns, folds=folds)
 
 
 def _theirs(
     X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64], peer: Peer
 ) -> dict[str, Result]:
-    found = {}
+    right = dict.fromkeys(y, 0)
     for task, labels in y.items():
-        right = 0
         for fold in range(int(folds.max()) + 1):
             own = folds == fold
-            right += int((peer(X[~own], labels[~own], X[own]) == labels[own]).sum())
-        found[task] = Result(right, len(labels))
-    return found
+            right[task] += int((peer(X[~own], labels[~own], X[own]) == labels[own]).sum())
+    return {task: Result(right[task], len(labels)) for task, labels in y.items()}
+
+
+def _call(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    return function(*arguments)
 
 
 def section(context: Context) -> Section:
-    """Sets of features, discriminants and peers; how many trials they need."""
+    """Feature sets, discriminants and other methods, and the trials that they need."""
     y, layout = context.labels, context.dataset.layout
-    finest = max(sorted(y), key=lambda task: len(set(y[task])))
     sets = list(dict.fromkeys(name for name, _ in OURS))
-    view = View(layout, names=expand(sets))
-    (series,) = context.follow_again("every feature", [view])
-    X = {name: vectors(series, name) for name in sets}
+    (series,) = context.follow_again("every feature", [View(layout, names=expand(sets))])
+    X = {name: vectors(series, WINDOW_S, SAMPLES, SETS[name]) for name in sets}
     raw = taxels(context)
-    folds = {"trials": stratified_folds(y[finest])}
+    folds = {TABLE: stratified_folds(y[finest(y)])}
     others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
     if GROUP_TASK in y and others:
-        folds["objects"] = group_folds(y[GROUP_TASK])
-    cases: list[tuple[str, str, Callable[..., Any], tuple[Any, ...]]] = []
-    for how, fold in folds.items():
-        asked = y if how == "trials" else others
+        folds[UNSEEN] = group_folds(y[GROUP_TASK])
+    cases: dict[tuple[str, str], tuple[Callable[..., Any], tuple[Any, ...]]] = {}
+    for table, fold in folds.items():
+        asked = y if table == TABLE else others
         for name, projection in OURS:
-            words = f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"
-            cases.append((words, how, _ours, (X[name], asked, fold, layout, name, projection)))
-        for words, peer in peers().items():
-            cases.append((words, how, _theirs, (raw, asked, fold, peer)))
-    answers = context.map("sets and peers", _call, [(f, given) for _, _, f, given in cases])
-    results: dict[str, dict[str, dict[str, Result]]] = {}
-    for (words, how, _, _), found in zip(cases, answers, strict=True):
-        results.setdefault(words, {})[how] = found
-    table = Table(
-        "beyond_sets",
-        "Nested accuracy: trials left out, and whole objects left out",
-        ("task", "accuracy %", "95 % interval", "objects not met %", "what decides"),
-        narrow=5,
-    )
+            method = f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"
+            cases[table, method] = _ours, (X[name], asked, fold, layout, name, projection)
+        for method, peer in peers().items():
+            cases[table, method] = _theirs, (raw, asked, fold, peer)
+    answers = context.map("sets and peers", _call, list(cases.values()))
+    results: dict[tuple[str, str, str], Result] = {
+        (table, method, task): result
+        for (table, method), answer in zip(cases, answers, strict=True)
+        for task, result in answer.items()
+    }
+    methods = list(dict.fromkeys(method for _, method in cases))
+    rows = []
     for task in y:
-        for words, by in results.items():
-            low, high = by["trials"][task].interval
-            unseen = by.get("objects", {}).get(task)
-            table.rows.append(
-                (
-                    task,
-                    percent(by["trials"][task].accuracy),
-                    f"{100 * low:.0f} to {100 * high:.0f}",
-                    "" if unseen is None else percent(unseen.accuracy),
-                    words,
-                )
+        for method in methods:
+            result, unseen = results[TABLE, method, task], results.get((UNSEEN, method, task))
+            rows.append(
+                {
+                    "task": task,
+                    "accuracy %": percent(result.accuracy),
+                    "95 % interval": interval(result),
+                    "objects not met %": "" if unseen is None else percent(unseen.accuracy),
+                    "method": method,
+                }
             )
     png = figures.bars(
-        [words.replace("`", "") for words in results],
-        {task: [by["trials"][task] for by in results.values()] for task in y},
+        [method.replace("`", "") for method in methods],
+        {task: [results[TABLE, method, task] for method in methods] for task in y},
         title="Features and methods, trials left out",
     )
     text = [
-        "The paper's three features are not all that a skin tells. Named feature sets (in "
-        "`edge/touch/feature_sets.py`) on principal components (PCA) or discriminants (LDA), "
-        "beside outside methods on every taxel, on the same folds. Every number of ours is nested: "
-        "shrinkage, components and k are chosen by the other folds alone; the outside methods take "
-        "their usual settings.",
-        _best(results, y),
-        "`make export` chooses among the sets by itself, and says what a decision with each costs.",
+        "Other feature sets (see `edge/touch/feature_sets.py`) on principal components (PCA) or "
+        "discriminants (LDA), beside other methods on every taxel, on the same folds. All our "
+        "numbers are nested: shrinkage, components and k are chosen by the other folds alone. The "
+        "other methods take their usual settings.",
+        "`make export` chooses among the feature sets by itself, and prints what a decision with "
+        "each costs.",
     ]
     if len(peers()) < 3:
         text.append("MiniRocket is left out, as aeon is not installed (`pip install aeon`).")
+    title = "Nested accuracy with trials left out, and with whole objects left out"
     return Section(
         "Beyond three features",
         text,
-        [table, _learning(context, X, y, finest)],
+        [Table("beyond_sets", title, rows, narrow=5), _learning(context, X, y)],
         [Figure("beyond", "Features and methods", png)],
+        numbers={key: percent(result.accuracy) for key, result in results.items()},
     )
 
 
-def _call(function: Callable[..., Any], given: tuple[Any, ...]) -> Any:
-    return function(*given)
+def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels) -> Table:
+    """Accuracy against the number of trials.
 
-
-def _best(results: dict[str, dict[str, dict[str, Result]]], y: Labels) -> str:
-    parts = []
-    for task in y:
-        words, by = max(results.items(), key=lambda item: item[1]["trials"][task].accuracy)
-        parts.append(f"{task} {100 * by['trials'][task].accuracy:.1f} % by {words}")
-    return "Best: " + "; ".join(parts) + "."
-
-
-def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels, finest: str) -> Table:
-    """Accuracy against the number of trials: how many touches are worth recording.
-
-    Which trials they are matters as much as how many: each share is drawn once for each part that
-    it may begin with.
+    Which trials are drawn matters as much as how many, so each share is drawn once from each
+    quarter that it can begin with.
     """
-    layout = context.dataset.layout
-    parts = stratified_folds(y[finest], PARTS)
-    cases, heads = [], []
-    for count in range(1, PARTS + 1):
-        for first in range(PARTS if count < PARTS else 1):
-            some = np.flatnonzero((parts - first) % PARTS < count)
-            labels = {task: one[some] for task, one in y.items() if len(set(one[some])) > 1}
-            if len(some) < 20 or not labels:
+    labels, layout = y[finest(y)], context.dataset.layout
+    quarter = stratified_folds(labels, QUARTERS)
+    cases: list[tuple[str, str, int]] = []
+    work = []
+    for count in range(1, QUARTERS + 1):
+        for first in range(QUARTERS if count < QUARTERS else 1):
+            some = np.flatnonzero((quarter - first) % QUARTERS < count)
+            own = {task: each[some] for task, each in y.items() if len(set(each[some])) > 1}
+            if len(some) < 20 or not own:
                 continue
             for name, projection in CURVE:
-                folds = stratified_folds(y[finest][some])
-                heads.append((count, name, projection))
-                cases.append((_ours, (X[name][some], labels, folds, layout, name, projection)))
-    found: dict[tuple[str, str, int], list[Result]] = {}
-    answers = context.map("learning curve", _call, cases)
-    for (count, name, projection), by in zip(heads, answers, strict=True):
-        for task, result in by.items():
+                folds = stratified_folds(labels[some])
+                cases.append((name, projection, count))
+                work.append((X[name][some], own, folds, layout, name, projection))
+    draws: dict[tuple[str, str, int], list[Result]] = {}
+    for (name, projection, count), tasks in zip(
+        cases, context.map("learning curve", _ours, work), strict=True
+    ):
+        for task, result in tasks.items():
             key = task, f"`{name}`, {projection.upper()}", count
-            found.setdefault(key, []).append(result)
+            draws.setdefault(key, []).append(result)
     rows = []
-    for (task, words, _), results in sorted(found.items()):
-        shares = [result.accuracy for result in results]
-        spread = f"{100 * min(shares):.0f} to {100 * max(shares):.0f}" if len(shares) > 1 else ""
-        trials = round(float(np.mean([result.total for result in results])))
-        rows.append((task, trials, percent(float(np.mean(shares))), spread, words))
-    return Table(
-        "learning",
-        f"More trials: nested accuracy among so many, the mean of {PARTS} draws",
-        ("task", "trials", "accuracy %", "lowest to highest draw %", "what decides"),
-        rows,
-        narrow=5,
-    )
+    for (task, method, _), results in sorted(draws.items()):
+        shares = [100 * result.accuracy for result in results]
+        spread = f"{min(shares):.0f} to {max(shares):.0f}" if len(shares) > 1 else ""
+        rows.append(
+            {
+                "task": task,
+                "trials": round(float(np.mean([result.total for result in results]))),
+                "accuracy %": round(float(np.mean(shares)), 2),
+                "lowest to highest draw %": spread,
+                "method": method,
+            }
+        )
+    title = f"Nested accuracy by number of trials, the mean of {QUARTERS} draws"
+    return Table("learning", title, rows, narrow=5)

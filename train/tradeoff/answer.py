@@ -3,215 +3,263 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.patheffects import withStroke
 
-from edge.commands.summary import wilson
-from train.evaluate import Labels
-from train.report.tables import Figure, Section, Table
-from train.tradeoff import plots
-from train.tradeoff.board import Board
+from train.evaluate import Labels, Result
+from train.report.figures import COLOURS, STYLE, canvas, curve, png
+from train.report.score import interval, majority
+from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.early import FOLDS, StoppingComparison
+from train.tradeoff.measured import Measured
 
 SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows of the tables."""
 SURE = (0.5, 0.7, 0.9)
-"""Confidences of the tables at which waiting ends, where no error rate can be certified."""
+"""Confidences of the tables where no error rate can be certified."""
+ACROSS = 3
+"""Most panels beside each other."""
+ROOM = 0.15
+"""Accuracy above which there is room for words below the line of guessing."""
+CLOSE = 0.06
+"""Accuracies whose names would cover each other."""
 
 
-@dataclass(frozen=True)
-class Answer:
-    """A way to decide one task, its time and its accuracy.
-
-    Attributes:
-        how: in words.
-        seconds: from onset to decision; the mean where it varies.
-        right: trials decided rightly.
-        total: trials.
-        command: that has it.
-    """
-
-    how: str
-    seconds: float
-    right: int
-    total: int
-    command: str
-
-    @property
-    def accuracy(self) -> float:
-        """0 to 1."""
-        return self.right / self.total
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % (Wilson)."""
-        return wilson(self.right, self.total)
-
-
-def answers(found: StoppingComparison, after_s: float) -> list[Answer]:
-    """Fixed windows, then deciding when sure.
+def answers(compared: StoppingComparison, after_s: float) -> list[Row]:
+    """The rows of a task's table: fixed windows, then early decisions.
 
     Args:
-        found: a task's held-out decisions.
-        after_s: seconds from the end of the window to the decision: the wire and the arithmetic.
+        compared: the task's held-out decisions.
+        after_s: seconds from the end of the window to the decision, on the wire and in arithmetic.
     """
-    n = found.trials
-    rows = []
-    for window, right in zip(found.decision_points_s, found.right, strict=True):
-        if window in SHOWN_S:
-            command = f"make export EXPORT='--window {window:g}'"
-            how = f"after {window:g} s"
-            rows.append(Answer(how, window + after_s, int(right.sum()), n, command))
-    able = [one for one in found.certified if one.folds > FOLDS // 2]
-    for before, one in zip([None, *able], able, strict=False):
-        if before is not None and (one.mean_s, one.wrong) == (before.mean_s, before.wrong):
-            continue  # the same rule is certified for the smaller error
-        command = f"edge-classify run --error {one.asked:g}"
-        how = f"when sure, at most {100 * one.asked:g} % wrong"
-        rows.append(Answer(how, one.mean_s + after_s, round((1 - one.wrong) * n), n, command))
-    for threshold, seconds, wrong in [] if able else found.when_sure():
+
+    def row(how: str, seconds: float, result: Result, command: str) -> Row:
+        return {
+            "time s": round(seconds + after_s, 3),
+            "accuracy %": round(100 * result.accuracy, 1),
+            "95 % interval": interval(result),
+            "how": how,
+            "command": f"`{command}`" if command else "",
+        }
+
+    rows = [
+        row(f"after {window:g} s", window, result, f"make export EXPORT='--window {window:g}'")
+        for window, result in compared.results.items()
+        if window in SHOWN_S
+    ]
+    able = [certified for certified in compared.certified if certified.folds > FOLDS // 2]
+    for before, now in zip([None, *able], able, strict=False):
+        # The same rule may be certified for the smaller error already.
+        if before is None or (now.mean_s, now.wrong) != (before.mean_s, before.wrong):
+            how = f"when sure, at most {100 * now.asked:g} % wrong"
+            command = f"edge-classify run --error {now.asked:g}"
+            rows.append(row(how, now.mean_s, compared.result(now.wrong), command))
+    for threshold, seconds, wrong in [] if able else compared.when_sure():
         if threshold in SURE:
             how = f"when {100 * threshold:.0f} % sure; no error rate is certified"
-            rows.append(Answer(how, seconds + after_s, round((1 - wrong) * n), n, ""))
+            rows.append(row(how, seconds, compared.result(wrong), ""))
     return rows
 
 
-def gain(found: StoppingComparison) -> tuple[float, float, float]:
-    """(mean seconds, share wrong then, share wrong of a fixed window of that length): the most
-    that deciding when sure gains between 0.4 s and 90 % of the full window."""
-    points = np.array(found.decision_points_s)
-    best = (float(points[-1]), float(found.fixed[-1]), float(found.fixed[-1]))
-    for _, seconds, wrong in found.when_sure():
-        fixed = float(np.interp(seconds, points, found.fixed))
+def gain(compared: StoppingComparison) -> tuple[float, float, float]:
+    """Mean seconds, share wrong, and share wrong of a fixed window of the same length.
+
+    Of the threshold that gains most between 0.4 s and 90 % of the full window.
+    """
+    points = np.array(compared.decision_points_s)
+    best = float(points[-1]), float(compared.fixed[-1]), float(compared.fixed[-1])
+    for _, seconds, wrong in compared.when_sure():
+        fixed = float(np.interp(seconds, points, compared.fixed))
         if 0.4 <= seconds <= 0.9 * points[-1] and fixed - wrong > best[2] - best[1]:
             best = seconds, wrong, fixed
     return best
 
 
-def sentence(task: str, found: StoppingComparison, labels: Sequence[str]) -> str:
-    """What a task's table says."""
-    windows = [w for w in (0.2, 0.4, 1.0, 1.2) if w in found.decision_points_s]
-    shares = [1.0 - found.fixed[found.decision_points_s.index(w)] for w in windows]
-    fixed = ", ".join(f"{100 * a:.0f} % at {w:g} s" for w, a in zip(windows, shares, strict=True))
-    _, counts = np.unique(labels, return_counts=True)
-    guess, most = 100 / len(counts), 100 * counts.max() / counts.sum()
-    seconds, wrong, beside = gain(found)
-    error = float(np.sqrt((wrong * (1 - wrong) + beside * (1 - beside)) / found.trials))
+def sentence(task: str, compared: StoppingComparison, labels: Sequence[str]) -> str:
+    """A paragraph on a task's accuracy after fixed windows, early, and by guessing."""
+    results = compared.results
+    fixed = ", ".join(
+        f"{100 * results[w].accuracy:.0f} % at {w:g} s"
+        for w in (0.2, 0.4, 1.0, 1.2)
+        if w in results
+    )
+    seconds, wrong, beside = gain(compared)
+    error = float(np.sqrt((wrong * (1 - wrong) + beside * (1 - beside)) / compared.trials))
     # The best of many thresholds is ahead by one standard error by luck alone.
     if beside - wrong > 2 * error:
         early = (
-            f"Deciding when sure: {100 * (1 - wrong):.0f} % at {seconds:.2f} s on average, where a "
-            f"fixed window as long gives {100 * (1 - beside):.0f} %."
+            f"Deciding when sure reaches {100 * (1 - wrong):.0f} % at {seconds:.2f} s on average; "
+            f"a fixed window of that length gives {100 * (1 - beside):.0f} %."
         )
     else:
-        early = (
-            "Deciding when sure gains nothing that is beyond chance over a fixed window here: take "
-            "the window."
-        )
+        early = "Deciding when sure is no better than chance against a fixed window: take a window."
+    guess, most = 100 / len(set(labels)), 100 * majority(np.array(labels)).accuracy
     return (
-        f"{task}: {fixed}. {early} Guessing is right {guess:.0f} % of the time, always naming the "
-        f"most frequent label {most:.0f} %."
+        f"{task}: {fixed}. {early} Guessing is right {guess:.0f} % of the time, the most frequent "
+        f"label {most:.0f} %."
     )
 
 
-def section(
-    both: Mapping[str, StoppingComparison],
-    y: Labels,
-    wire_s: float,
-    board: Board,
-    features: int,
-) -> Section:
-    """The answer, task by task, and the picture.
-
-    Args:
-        both: held-out decisions of each task.
-        y: its labels.
-        wire_s: from the end of the window until its last frame is read.
-        board: whose arithmetic it is.
-        features: feature types measured.
-    """
-    arithmetic_s = board.arithmetic_s(features)
-    tables = []
-    for task, found in both.items():
-        table = Table(
-            f"answer_{task}",
-            task,
-            ("time s", "accuracy %", "95 % interval", "how", "command"),
-            narrow=4,
-        )
-        for one in answers(found, wire_s + arithmetic_s):
-            low, high = one.interval
-            table.rows.append(
-                (
-                    round(one.seconds, 3),
-                    round(100 * one.accuracy, 1),
-                    f"{100 * low:.0f} to {100 * high:.0f}",
-                    one.how,
-                    f"`{one.command}`" if one.command else "",
-                )
-            )
-        tables.append(table)
-    text = [sentence(task, found, y[task].tolist()) for task, found in both.items()]
-    wide, narrow = (plots.answer(both, y, wire_s, arithmetic_s, phone=p) for p in (False, True))
+def section(measured: Measured) -> Section:
+    """The answer for each task, and the picture."""
+    after_s = measured.wire_s + measured.arithmetic_s
+    compared = measured.comparisons
+    wide, narrow = (picture(measured, phone=phone) for phone in (False, True))
     title = "Accuracy against time to decision, a panel a task; below, where the time goes"
-    return Section("The answer", text, tables, [Figure("tradeoff", title, wide, narrow)])
-
-
-def reasons(wire_s: float, board: Board, features: int, breakaways: Mapping[str, float]) -> Section:
-    """Where the time goes, what is waited for, and how to have each answer.
-
-    Args:
-        wire_s, board, features: as for `section`.
-        breakaways: {object: seconds} before which a movable object stands still.
-    """
-    arithmetic_s = board.arithmetic_s(features)
-    notes = []
-    notes.append(
-        f"Of the time, waiting is nearly all: the last frame's way over the wire takes "
-        f"{1e3 * wire_s:.1f} ms, and all arithmetic of a decision {1e3 * arithmetic_s:.2f} ms on "
-        f"{board.name}."
+    return Section(
+        "The answer",
+        [sentence(task, own, measured.y[task].tolist()) for task, own in compared.items()],
+        [
+            Table(f"answer_{task}", task, answers(own, after_s), narrow=4)
+            for task, own in compared.items()
+        ],
+        [Figure("tradeoff", title, wide, narrow)],
     )
-    if breakaways:
-        slow = sorted(breakaways.values())
+
+
+def reasons(measured: Measured) -> Section:
+    """Where the time goes, the physics behind it, and the commands."""
+    notes = [
+        f"Nearly all of the time is waiting. The last frame's way over the wire takes "
+        f"{1e3 * measured.wire_s:.1f} ms, all arithmetic of a decision "
+        f"{1e3 * measured.arithmetic_s:.2f} ms on {measured.board.name}."
+    ]
+    if measured.breakaways:
+        times = measured.breakaways.values()
         notes.append(
-            "What is waited for is mostly physics: an object that can move stands still, and so "
-            "looks like one that cannot, until the arm pushes harder than friction holds. In this "
-            f"scene that takes {slow[0]:.2f} to {slow[-1]:.2f} s from onset, by object."
+            "The wait is mostly physics: until the arm pushes harder than friction holds, an "
+            "object that can move stands still and looks like one that cannot. In this scene that "
+            f"takes {min(times):.2f} to {max(times):.2f} s from onset, depending on the object."
         )
     notes.append(
-        "Ready-made: `make export FRONT=fast`, `FRONT=balanced` or `FRONT=accurate` takes a "
-        "window, features and scaling from the best settings below; `FRONT=500` the most accurate "
-        "one within 500 ms, `FRONT=0.8` the fastest one that reaches 80 %. `edge-classify run "
-        "--error 0.1` decides as soon as it is sure, so that at most one decision in ten is wrong; "
-        "what the trials cannot certify is refused, with the smallest error that they can."
+        "`make export FRONT=fast`, `FRONT=balanced` or `FRONT=accurate` takes window, features and "
+        "scaling from the best settings below, `FRONT=500` the most accurate setting within "
+        "500 ms, `FRONT=0.8` the fastest that reaches 80 %. `edge-classify run --error 0.1` "
+        "decides as soon as it is sure, with at most one decision in ten wrong. An error rate that "
+        "the trials cannot certify is refused, with the smallest one that they can; leave a margin "
+        "above it."
     )
     return Section("Why, and how to have it", notes)
 
 
+def glossary(measured: Measured) -> Section:
+    """The words of the report."""
+    return Section("Words", terms=GLOSSARY)
+
+
 GLOSSARY = {
-    "accuracy": "The share of held-out contacts whose label is named rightly. Held out means that "
-    "the contact took no part in fitting the model, nor in choosing its features, projection or "
-    "number of neighbours (nested cross-validation).",
-    "95 % interval": "Wilson's, for a share of so many trials.",
-    "confidence": "The calibrated probability that the label named is right.",
+    "accuracy": "The share of held-out contacts whose label is right. A held-out contact took no "
+    "part in fitting the model, nor in choosing its features, projection or number of neighbours "
+    "(nested cross-validation).",
+    "95 % interval": "Wilson's binomial interval.",
+    "confidence": "The calibrated probability that the label is right.",
     "certified": "Shown by the exact binomial test on calibration trials, with 90 % confidence: "
-    "decisions of contacts like the trained ones are wrong at most so often (learn-then-test).",
+    "decisions on contacts like the trained ones are wrong at most this often (learn-then-test).",
     "onset": "The first frame of a contact.",
     "window": "The time from onset that a decision looks at.",
-    "wire": "On average half a frame's period until the next frame, and that frame's way over I2C.",
-    "arithmetic": "Tracking the last frame, computing the features, and the decision.",
-    "scaling": "none, or Methods I to V of the paper's Eqs. 1 to 5.",
+    "wire": "On average half a frame's period until the next frame, and that frame's time on I2C.",
+    "arithmetic": "Tracking the last frame, computing the features, and deciding.",
+    "scaling": "None, or Methods I to V of the paper's Eqs. 1 to 5.",
     "components, k": "Coordinates that the projection keeps, and neighbours that vote.",
     "front": "The settings that no other beats in both time and accuracy.",
     "the paper": "Bhattacharjee, Rehg and Kemp, Haptic classification and recognition of objects "
     "using a tactile sensing forearm, IROS 2012. Its setting: all taxels, three features, no "
     "scaling, 1.2 s.",
-    "breakaway": "mu_s m g / (k v): when the arm's spring, tightened at its speed v, overcomes "
-    "static friction (or tips what is narrow and high).",
+    "breakaway": "mu_s m g / (k v): the time until the arm's spring, tightened at its speed v, "
+    "overcomes static friction (or tips what is tall and narrow).",
 }
 
 
-def glossary() -> Section:
-    """Words that the report could not do without."""
-    return Section("Words", terms=GLOSSARY)
+def picture(measured: Measured, *, phone: bool = False) -> bytes:
+    """Accuracy against time, a panel a task; below, where the time goes.
+
+    On a phone the panels stand below each other.
+    """
+    compared, m = measured.comparisons, len(measured.comparisons)
+    across = 1 if phone else m if m <= ACROSS else -(-m // 2)
+    down = -(-m // across)
+    size = (4.2, 2.8 * down + 2.4) if phone else (3.7 * across + 0.4, 3.3 * down + 2.2)
+    with mpl.rc_context({**STYLE, "font.size": 10.0}):
+        figure = canvas(*size)
+        pair: Any = figure.subfigures(2, 1, height_ratios=[size[1] - 2.0, 2.0])
+        upper, lower = pair
+        grid = upper.subplots(down, across, squeeze=False, sharey=True)
+        for axes, (task, own) in zip(grid.flat, compared.items(), strict=False):
+            _panel(axes, task, own, measured.y, measured.wire_s + measured.arithmetic_s)
+        for axes in grid.flat[m:]:
+            axes.set_visible(False)
+        for axes in grid[:, 0]:
+            axes.set_ylabel("decisions that are right, %")
+        handles = grid.flat[0].get_legend_handles_labels()
+        upper.legend(*handles, loc="outside upper center", ncols=2, fontsize=9)
+        _split(lower, measured.wire_s, measured.arithmetic_s, compared)
+        return png(figure)
+
+
+def _panel(axes: Any, task: str, compared: StoppingComparison, y: Labels, after_s: float) -> None:
+    """Draw a task's accuracy against time, after fixed windows and when sure."""
+    results, labels = compared.results, y[task]
+    chance = {"guessing": 1 / len(set(labels.tolist())),
+              "most frequent label": majority(labels).accuracy}  # fmt: skip
+    lowest, highest = min(chance.values()), max(chance.values())
+    for share in chance.values():
+        axes.axhline(100 * share, color="0.55", lw=1, ls=(0, (1, 2)))
+    if highest - lowest < CLOSE:
+        chance = {" or ".join(chance): highest}
+    for name, share in chance.items():
+        below = len(chance) == 1 and lowest > ROOM
+        axes.text(
+            0.98, 100 * lowest - 1 if below else 100 * share + 1, name, fontsize=8, color="0.35",
+            ha="right", va="top" if below else "bottom", transform=axes.get_yaxis_transform(),
+        )  # fmt: skip
+    sure = sorted((seconds, wrong) for _, seconds, wrong in compared.when_sure())
+    curve(axes, 0, "after a fixed time", [w + after_s for w in results], list(results.values()))
+    curve(
+        axes, 1, "when sure (mean time)", [seconds + after_s for seconds, _ in sure],
+        [compared.result(wrong) for _, wrong in sure], marker="", lw=1.8,
+    )  # fmt: skip
+    for window in (0.4, compared.decision_points_s[-1]):
+        if window in results:
+            share = 100 * results[window].accuracy
+            # Above the curves, where no line of guessing can be.
+            axes.annotate(
+                f"{share:.0f} %", (window + after_s, share), xytext=(-3, 7),
+                textcoords="offset points", fontsize=9, ha="right", color=COLOURS[0],
+                path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            )  # fmt: skip
+    axes.set_xlim(0, compared.decision_points_s[-1] + 0.08)
+    axes.set(ylim=(0, 106), yticks=range(0, 101, 20), xlabel="seconds from first contact")
+    axes.set_title(f"{task} ({len(set(labels.tolist()))} labels)")
+
+
+def _split(
+    figure: Any, wire_s: float, arithmetic_s: float, compared: Mapping[str, StoppingComparison]
+) -> None:
+    """Draw the time of a decision after the full window, and its end magnified."""
+    window = next(iter(compared.values())).decision_points_s[-1]
+    after_ms = 1e3 * (wire_s + arithmetic_s)
+    stages = [
+        (f"waiting {window:g} s", 1e3 * window, COLOURS[0], ""),
+        (f"wire {1e3 * wire_s:.0f} ms", 1e3 * wire_s, COLOURS[1], "//"),
+        (f"arithmetic {1e3 * arithmetic_s:.1f} ms", 1e3 * arithmetic_s, COLOURS[2], "xx"),
+    ]
+    rows = figure.subplots(2, 1)
+    start = 1e3 * window - 0.25 * after_ms
+    ends = (0.0, 1e3 * window + after_ms), (start, 1e3 * window + 1.02 * after_ms)
+    for axes, limits in zip(rows, ends, strict=True):
+        left = 0.0
+        for name, length, colour, hatch in stages:
+            axes.barh(0, length, left=left, color=colour, hatch=hatch, ec="white", lw=0, label=name)
+            left += length
+        axes.set(xlim=limits, yticks=[])
+        axes.grid(visible=False)
+        axes.spines["left"].set_visible(False)
+    rows[0].axvline(start, color="0.2", lw=0.8)
+    rows[1].set_xlabel(
+        f"milliseconds from first contact: above from 0, below the last {ends[1][1] - start:.0f}"
+    )
+    handles = rows[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside upper center", ncols=3, fontsize=9)

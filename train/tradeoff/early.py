@@ -1,4 +1,4 @@
-"""Deciding as soon as it is sure, beside waiting for a fixed window, on trials held out."""
+"""Deciding as soon as it is certain enough, beside fixed windows, on trials held out."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from edge.model.stopping import StoppingRule
-from train.evaluate import Labels, stratified_folds
+from train.evaluate import Labels, Result, evaluate, stratified_folds
+from train.evaluate import SearchGrid as Grid
 from train.pipeline import Choice, ContactClassifier
 from train.simulate.scene_model import Scene
 from train.stopping import (
+    FEWER_FOLDS,
+    MANY_TRIALS,
     NEVER,
     THRESHOLDS,
     SequentialClassifier,
@@ -25,7 +28,7 @@ from train.stopping import (
     stops,
     withheld,
 )
-from train.tradeoff.accuracy import NestedChoice
+from train.stopping import FOLDS as CHOOSING_FOLDS
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -33,8 +36,59 @@ RATES = (0.02, 0.05, 0.1, 0.2)
 BINS = 10
 G = 9.80665
 
+
+@dataclass(frozen=True)
+class NestedChoice:
+    """What some trials choose, and what they choose without each of their folds.
+
+    Attributes:
+        choices: {task: Choice} by all of them.
+        folds: (n,) from 0.
+        without: [fold]{task: Choice}, by the trials of the other folds.
+    """
+
+    choices: dict[str, Choice]
+    folds: NDArray[np.int64]
+    without: list[dict[str, Choice]]
+
+
 Choose = Callable[[NDArray[np.int64]], NestedChoice]
 """Chooses every task's features, projection and k by some rows of the trials alone."""
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """Chooses every task's projection and neighbours by some of the trials alone.
+
+    Attributes:
+        X: (n, p) at the full window.
+        y: {task: (n,) labels}.
+        grids: the candidates.
+        features: names of the types in X.
+        widths: columns of each; equal where None.
+    """
+
+    X: NDArray[np.float64]
+    y: Labels
+    grids: tuple[Grid, ...]
+    features: tuple[str, ...]
+    widths: tuple[int, ...] | None = None
+
+    def __call__(self, rows: NDArray[np.int64]) -> NestedChoice:
+        """The candidates that are best in a cross-validation among the rows."""
+        y = {task: labels[rows] for task, labels in self.y.items()}
+        count = CHOOSING_FOLDS if len(rows) < MANY_TRIALS else FEWER_FOLDS
+        folds = stratified_folds(y[finest(y)], count)
+        form = {"features": self.features, "widths": self.widths}
+        table = evaluate(self.X[rows], y, folds, self.grids, **form)  # type: ignore[arg-type]
+        return NestedChoice(
+            {task: table.choices[task][table.chosen(task)] for task in y},
+            folds,
+            [
+                {task: table.choices[task][table.without(task, fold)] for task in y}
+                for fold in range(int(folds.max()) + 1)
+            ],
+        )
 
 
 @dataclass(frozen=True)
@@ -43,9 +97,9 @@ class Certified:
 
     Attributes:
         asked: the error rate.
-        folds: how many of `FOLDS` certified it.
-        wrong: share of decisions that were wrong, `unknown` among them; NaN of no fold.
-        unknown: share of decisions that name nothing, as the touch is unlike all trained ones.
+        folds: number of the `FOLDS` folds that certified it.
+        wrong: share of wrong decisions, `unknown` among them; NaN where no fold certified it.
+        unknown: share of decisions that name nothing, as the contact is unlike all trained ones.
         early: share of trials decided before the full window.
         mean_s: mean time to decision.
     """
@@ -60,16 +114,16 @@ class Certified:
 
 @dataclass(frozen=True)
 class StoppingComparison:
-    """Deciding when sure and waiting for a fixed window, on the same held-out trials.
+    """Deciding early and waiting for a fixed window, on the same held-out trials.
 
     Attributes:
         decision_points_s: windows.
         right: (decision points, n) whether each fixed window's decision is right.
         confidence: (decision points, n) calibrated.
-        labels: (decision points, n) named.
-        certified: an entry an asked error.
-        hindsight_s: mean of the first window from which on each trial is decided as rightly or
-            wrongly as at the full one: what no rule that stops on these answers could undercut.
+        labels: (decision points, n) labels named.
+        certified: one entry for each asked error.
+        hindsight_s: mean time of stopping each trial at the first window after which its answer
+            stays as right or wrong as at the full one; no rule on these answers can be faster.
     """
 
     decision_points_s: tuple[float, ...]
@@ -81,7 +135,7 @@ class StoppingComparison:
 
     @property
     def trials(self) -> int:
-        """Held out in turn."""
+        """Number of trials held out in turn."""
         return int(self.right.shape[1])
 
     @property
@@ -89,16 +143,27 @@ class StoppingComparison:
         """(decision points,) share wrong at each fixed window."""
         return 1.0 - np.asarray(self.right.mean(axis=1))
 
+    @property
+    def results(self) -> dict[float, Result]:
+        """{window: its result}."""
+        counts = self.right.sum(axis=1).tolist()
+        pairs = zip(self.decision_points_s, counts, strict=True)
+        return {window: Result(count, self.trials) for window, count in pairs}
+
+    def result(self, wrong: float) -> Result:
+        """The result of deciding all trials with that share wrong."""
+        return Result(round((1 - wrong) * self.trials), self.trials)
+
     def when_sure(self) -> list[tuple[float, float, float]]:
         """(confidence asked for, mean seconds, share wrong) of stopping at each threshold."""
         seconds = np.array(self.decision_points_s)
-        found = []
+        curve = []
         for threshold in (NEVER, *THRESHOLDS.tolist()):
             rule = StoppingRule(1.0, 0.0, threshold, len(seconds) - 1)
             at = stops(self.confidence, rule)
             wrong = 1.0 - float(self.right[at, np.arange(self.trials)].mean())
-            found.append((threshold, float(seconds[at].mean()), wrong))
-        return found
+            curve.append((threshold, float(seconds[at].mean()), wrong))
+        return curve
 
     def reliability(self) -> list[tuple[float, float, int]]:
         """(mean confidence, share right, decisions) of `BINS` equal ranges of confidence."""
@@ -113,14 +178,13 @@ class StoppingComparison:
     @property
     def calibration_error(self) -> float:
         """Expected calibration error: the bins' mean gap of confidence and share right."""
-        bins = self.reliability()
-        total = sum(count for _, _, count in bins)
-        return sum(count * abs(said - was) for said, was, count in bins) / total
+        said, right, counts = np.array(self.reliability()).T
+        return float(np.average(np.abs(said - right), weights=counts))
 
 
 @dataclass(frozen=True)
 class _Fold:
-    """What one fold held out gives, by task."""
+    """The answers to one fold held out, by task."""
 
     test: NDArray[np.int64]
     named: dict[str, NDArray[np.str_]]
@@ -146,48 +210,33 @@ def compare_stopping(
         y: {task: (n,) labels}.
         decision_points_s: windows in seconds.
         features: names of the types.
-        choose: by the training rows alone.
+        choose: chooses by the training rows alone.
         widths: columns of each type; equal where None.
         jobs: processes.
     """
-    points, n = X.shape[:2]
     folds = stratified_folds(y[finest(y)], FOLDS)
-    seconds = np.array(decision_points_s)
-    tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
     work = (
-        delayed(_held_out)(X, y, test, decision_points_s, tuple(features), choose, widths)
-        for test in tests
+        delayed(_held_out)(
+            X, y, np.flatnonzero(folds == k), decision_points_s, tuple(features), choose, widths
+        )
+        for k in range(FOLDS)
     )
-    parts = Parallel(n_jobs=jobs, return_as="generator")(work)
-    found = list(tqdm(parts, total=FOLDS, desc="deciding when sure"))
+    answered = Parallel(n_jobs=jobs, return_as="generator")(work)
+    held_out = list(tqdm(answered, total=FOLDS, desc="deciding early"))
     comparisons = {}
     for task, labels in y.items():
-        named = np.empty((points, n), dtype=labels.dtype)
-        confidence = np.empty((points, n))
-        for part in found:
-            named[:, part.test] = part.named[task]
-            confidence[:, part.test] = part.confidence[task]
+        named = np.empty(X.shape[:2], dtype=labels.dtype)
+        confidence = np.empty(X.shape[:2])
+        for fold in held_out:
+            named[:, fold.test] = fold.named[task]
+            confidence[:, fold.test] = fold.confidence[task]
         right = named == labels
-        certified = []
-        for error in ERRORS:
-            rows = []
-            for part in found:
-                rule = part.rules[task][error]
-                if rule is None:
-                    continue
-                at = stops(part.confidence[task], rule)
-                every = np.arange(len(part.test))
-                unknown = part.unknown[task][at, every]
-                wrong = ~right[:, part.test][at, every] | unknown
-                rows.append(np.stack([wrong, unknown, at < points - 1, seconds[at]]))
-            means = np.hstack(rows).mean(axis=1) if rows else np.full(4, np.nan)
-            certified.append(Certified(error, len(rows), *means.tolist()))
         comparisons[task] = StoppingComparison(
             tuple(decision_points_s),
             right,
             confidence,
             named,
-            certified,
+            [_certified(error, task, held_out, right, decision_points_s) for error in ERRORS],
             hindsight(right, decision_points_s),
         )
     return comparisons
@@ -225,6 +274,29 @@ def _held_out(
     return _Fold(test, named, confidence, unknown, rules)
 
 
+def _certified(
+    error: float,
+    task: str,
+    folds: Sequence[_Fold],
+    right: NDArray[np.bool_],
+    decision_points_s: Sequence[float],
+) -> Certified:
+    """The decisions at one asked error."""
+    seconds = np.array(decision_points_s)
+    rows = []
+    for fold in folds:
+        rule = fold.rules[task][error]
+        if rule is None:
+            continue
+        at = stops(fold.confidence[task], rule)
+        every = np.arange(len(fold.test))
+        unknown = fold.unknown[task][at, every]
+        wrong = ~right[:, fold.test][at, every] | unknown
+        rows.append(np.stack([wrong, unknown, at < len(seconds) - 1, seconds[at]]))
+    means = np.hstack(rows).mean(axis=1) if rows else np.full(4, np.nan)
+    return Certified(error, len(rows), *means.tolist())
+
+
 def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> float:
     """Mean seconds until `right` (decision_points, n) keeps its final value."""
     same = right == right[-1]
@@ -234,17 +306,19 @@ def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> f
 
 @dataclass(frozen=True)
 class NoveltyCount:
-    """Contacts with objects that were trained, and with objects that were not.
+    """Contacts with trained objects and with others that are called unknown, at one rate.
 
     Attributes:
         novelty_rate: share of contacts with trained objects that are called unknown.
         known: trials of trained objects.
-        strange: trials of objects left out whole, and how many of them are called unknown.
+        strange: trials of objects left out entirely.
+        unknown: number of the strange trials that are called unknown.
     """
 
     novelty_rate: float
     known: int
-    strange: tuple[int, int]
+    strange: int
+    unknown: int
 
 
 def novelty(
@@ -255,7 +329,9 @@ def novelty(
     widths: Sequence[int] | None = None,
     rates: Sequence[float] = RATES,
 ) -> list[NoveltyCount]:
-    """A third of the labels is left out whole, in turn; of the others a fold at a time is known.
+    """One count for each rate; none where too few labels are left.
+
+    A third of the labels is left out entirely, in turn; of the others, one fold at a time.
 
     Args:
         X: (n, p) at the full window.
@@ -264,9 +340,6 @@ def novelty(
         features: names of the types.
         widths: columns of each; equal where None.
         rates: novelty rates.
-
-    Returns:
-        An entry a rate; none where too few labels are left.
     """
     names = np.unique(labels)
     folds = stratified_folds(labels, FOLDS)
@@ -290,35 +363,31 @@ def novelty(
         return []
     near, far = np.concatenate(known), np.concatenate(strange)
     return [
-        NoveltyCount(rate, len(near), (len(far), int((far > np.quantile(near, 1.0 - rate)).sum())))
+        NoveltyCount(rate, len(near), len(far), int((far > np.quantile(near, 1 - rate)).sum()))
         for rate in rates
     ]
 
 
-def fixed_time(found: StoppingComparison, wrong: float) -> float | None:
-    """The shortest fixed window, interpolated, with at most so large a share wrong; or None."""
-    least = np.minimum.accumulate(found.fixed)
-    if wrong < least[-1]:
+def fixed_time(compared: StoppingComparison, wrong: float) -> float | None:
+    """The shortest fixed window, interpolated, with at most that share wrong; or None."""
+    lowest, points = np.minimum.accumulate(compared.fixed), compared.decision_points_s
+    if not wrong >= lowest[-1]:
         return None
-    after = int(np.argmax(least <= wrong))
+    after = int(np.argmax(lowest <= wrong))
     if after == 0:
-        return found.decision_points_s[0]
-    high, low = least[after - 1], least[after]
-    share = (high - wrong) / (high - low)
-    return float(
-        found.decision_points_s[after - 1]
-        + share * (found.decision_points_s[after] - found.decision_points_s[after - 1])
-    )
+        return points[0]
+    ends = slice(after - 1, after + 1)
+    return float(np.interp(-wrong, -lowest[ends], points[ends]))
 
 
 def breakaway_times(scene: Scene) -> dict[str, float]:
-    """{object: seconds} before which an object that can move does not: mu_s m g / (k v).
+    """{object: seconds} until an object that can move does: mu_s m g / (k v).
 
-    What is narrow and high tips before it slides: where its base over twice the contact's height
-    is less than mu_s, it takes mu_s's place. Values are the middles of the scene's.
+    A tall and narrow object tips before it slides: where its base over twice the contact's height
+    is less than mu_s, that ratio takes mu_s's place. Values are the middles of the scene's.
 
-    k is the arm's stiffness at the contact along its motion, v the speed of its equilibrium
-    point there; the spring between them is all that pushes. What is soft besides only delays.
+    k is the arm's stiffness at the contact along its motion, v the speed of its equilibrium point
+    there; the spring between them is all that pushes. A soft cover only delays.
     """
     q = np.array(scene.start)
 
@@ -335,12 +404,12 @@ def breakaway_times(scene: Scene) -> dict[str, float]:
     speed = float(np.linalg.norm(velocity))
     pull = jacobian.T @ (velocity / speed)
     stiffness = 1.0 / float((pull**2 / np.array(scene.stiffness)).sum())
-    found = {}
+    times = {}
     for thing in scene.objects:
         if "movable" in thing.conditions and "mass_kg" in thing.values:
             values = {key: value.middle for key, value in thing.values.items()}
-            share = values["friction_static"]
+            ratio = values["friction_static"]
             if values.get("base_m", 0.0) > 0.0 and values.get("height_m", 0.0) > 0.0:
-                share = min(share, values["base_m"] / (2.0 * values["height_m"]))  # it tips
-            found[thing.name] = share * values["mass_kg"] * G / (stiffness * speed)
-    return found
+                ratio = min(ratio, values["base_m"] / (2.0 * values["height_m"]))  # it tips
+            times[thing.name] = ratio * values["mass_kg"] * G / (stiffness * speed)
+    return times

@@ -54,7 +54,10 @@ def test_each_combination_is_judged_with_its_own_numbers():
             if table == reading.table:
                 ours[reading.key, setting, task] = percent
     (table,) = compare(ours, theirs, 1120).tables
-    within = {row[:2]: int(row[2].split()[0]) for row in table.rows}
+    within = {
+        (row["statistics"], row["coarse taxels"]): int(row["within interval"].split()[0])
+        for row in table.rows
+    }
     in_table = {t: sum(key[0] == t for key in theirs) for t in ("I", "II", "III")}
     assert within[EACH_TRIAL.instead_of, BY_MEAN.instead_of] == 0
     assert within[EACH_TRIAL.name, BY_MEAN.instead_of] == in_table["II"]

@@ -8,12 +8,12 @@ import pytest
 
 from edge.errors import InputError
 from train.dataset import load_trials
+from train.report.skins import follow, vectors
 from train.simulate import scene as scenes
 from train.simulate.run import simulate, write
 from train.study import robust
 from train.study.context import Context
 from train.study.robust import UNCHANGED, anew, groups, variants
-from train.study.skins import follow, vectors
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 THINGS = ("plastic bin", "bed pillow")
@@ -34,7 +34,7 @@ def context(scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("trials")
     write(scene, folder)
     data = load_trials([folder])
-    return Context(data, scene, jobs=1)
+    return Context(data, scene)
 
 
 def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
@@ -96,6 +96,6 @@ def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_
         list(simulate(weak))
     folder = tmp_path / "crates"
     write(alone, folder)
-    crates = Context(load_trials([folder]), alone, jobs=1)
+    crates = Context(load_trials([folder]), alone)
     (series,) = anew(crates, {"weak": weak}).values()
     assert all(contact is not None for contact in series)

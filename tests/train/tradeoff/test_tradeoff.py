@@ -16,19 +16,14 @@ from edge.touch.layout import SkinLayout
 from export.__main__ import main as export
 from tests import browser
 from train.__main__ import main as train
-from train.evaluate import SearchGrid
+from train.evaluate import Result, SearchGrid
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.pipeline import Choice
-from train.study.score import Result
 from train.tradeoff import answer, board, early
-from train.tradeoff.accuracy import (
-    Chooser,
-    MeasuredPoint,
-    NestedChoice,
-    nested,
-    pareto_front,
-)
+from train.tradeoff.early import Chooser, NestedChoice
+from train.tradeoff.measured import MeasuredPoint
 from train.tradeoff.run import tradeoff
+from train.tradeoff.settings import pareto_front
 from train.tradeoff.wires import count, spread, wires
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
@@ -73,23 +68,6 @@ def test_a_slower_wire_brings_every_nth_frame():
     assert thin.peak.tolist() == thin.sums[:, 1].tolist() == [0, 4, 8]
 
 
-def test_nested_accuracy_of_labels_by_chance_is_chance():
-    """Choosing among 78 cells on the score that is reported would flatter it."""
-    rng = np.random.default_rng(0)
-    X, y = rng.normal(size=(80, 30)), rng.choice(["a", "b"], 80)
-    found = nested(X, {"t": y}, "none", ("max_force",))["t"]
-    assert abs(found.accuracy - 0.5) < 0.15
-
-
-def test_nested_accuracy_of_what_is_plain_is_one():
-    rng = np.random.default_rng(0)
-    y = np.repeat(["a", "b", "c"], 20)
-    X = rng.normal(size=(60, 30)) + 20.0 * (y == "a")[:, None] - 20.0 * (y == "b")[:, None]
-    found = nested(X, {"t": y}, "IV", ("max_force", "contact_area", "contact_motion"))["t"]
-    assert (found.right, found.total) == (60, 60)
-    assert (found.components, found.k) == (1, 1)
-
-
 def test_what_is_chosen_without_a_fold_is_chosen_by_the_others_alone():
     """One feature tells all trials but those of a fold, the other nearly all."""
     rng = np.random.default_rng(0)
@@ -125,7 +103,7 @@ def point(seconds, right, **changes):
         "wire_s": 0.0,
         "arithmetic_s": 0.0,
         "result": Result(right, 100),
-        "whole": True,
+        "own_skin": True,
     }
     return MeasuredPoint(**{**given, **changes})
 
@@ -258,7 +236,7 @@ class TestEarly:
         rule = early.Certified(0.1, early.FOLDS, 0.1, 0.0, 1.0, 0.6)
         bolder = early.Certified(0.3, early.FOLDS, 0.3, 0.0, 1.0, 0.4)
         found.certified.extend([rule, replace(rule, asked=0.2), bolder])
-        commands = [row.command for row in answer.answers(found, 0.01)]
+        commands = [row["command"].strip("`") for row in answer.answers(found, 0.01)]
         assert [c for c in commands if "--error" in c] == [
             "edge-classify run --error 0.1",
             "edge-classify run --error 0.3",
@@ -292,10 +270,10 @@ class TestEarly:
         X = rng.normal(size=(120, 12))
         choice = Choice("none", 3, 1)
         alike = early.novelty(X, labels, choice, ("max_force",), rates=(0.1,))[0]
-        assert alike.strange[1] / alike.strange[0] < 0.3
+        assert alike.unknown / alike.strange < 0.3
         X[:, 0] += 100.0 * np.repeat(np.arange(6), 20)
         apart = early.novelty(X, labels, choice, ("max_force",), rates=(0.1,))[0]
-        assert apart.strange[1] == apart.strange[0]
+        assert apart.unknown == apart.strange
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
@@ -363,13 +341,14 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, cap
 def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, monkeypatch):
     from edge.recording import save
     from train.dataset import load_trials
-    from train.tradeoff import run as whole
+    from train.tradeoff import run as running
+    from train.tradeoff import settings
 
     for kind in ("hard", "soft"):
         for seed in range(20):
             save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
-    monkeypatch.setattr(whole, "WINDOWS", (1.2,))
-    monkeypatch.setattr(whole, "DECISION_POINTS_S", (0.4, 1.2))
+    monkeypatch.setattr(settings, "WINDOWS", (1.2,))
+    monkeypatch.setattr(running, "DECISION_POINTS_S", (0.4, 1.2))
     digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
     path = board_file(tmp_path / "board.json", digest)
     out = tmp_path / "out"
@@ -381,7 +360,7 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
     again = tradeoff([str(tmp_path / "data")], tmp_path / "2", str(path), scene_path=str(SCENE))
     assert again.read_bytes() == report.read_bytes()
     assert not browser.available() or browser.faults(report) == []
-    for name in ("tradeoff.png", "settings.png", "early_category.png", "reliability.png"):
+    for name in ("tradeoff.png", "settings.png", "breakaway.png", "reliability.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader((out / "points.csv").read_text().splitlines()))
     for cells in rows:

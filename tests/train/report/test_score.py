@@ -1,10 +1,20 @@
-"""Scores of the study: the best cell, transfers, baselines."""
+"""Scores of the reports: their columns, the best cell, transfers, nested accuracy, baselines."""
 
 import numpy as np
 import pytest
 
 from train.crossval import leave_one_out
-from train.study.score import Result, grid_search, majority, transfer
+from train.evaluate import SearchGrid
+from train.report.score import (
+    Result,
+    grid_search,
+    interval,
+    majority,
+    nested,
+    percent,
+    score,
+    transfer,
+)
 
 ONE = ("max_force",)
 
@@ -49,3 +59,33 @@ def test_a_change_that_moves_trials_among_others_costs():
 
 def test_the_majority():
     assert majority(np.array(["a", "b", "b"])).accuracy == pytest.approx(2 / 3)
+
+
+def test_nested_accuracy_of_labels_by_chance_is_chance():
+    """Choosing among 78 cells on the score that is reported would flatter it."""
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(80, 30)), rng.choice(["a", "b"], 80)
+    assert abs(nested(X, {"t": y}, SearchGrid(), ONE)["t"].accuracy - 0.5) < 0.15
+
+
+def test_nested_accuracy_of_clear_classes_is_one():
+    rng = np.random.default_rng(0)
+    y = np.repeat(["a", "b", "c"], 20)
+    X = rng.normal(size=(60, 30)) + 20.0 * (y == "a")[:, None] - 20.0 * (y == "b")[:, None]
+    result = nested(X, {"t": y}, SearchGrid("IV"), ONE)["t"]
+    assert (result.right, result.total, result.components, result.k) == (60, 60, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("share", "printed"), [(0.0, 0.0), (1.0, 100.0), (0.98571, 98.57), (2 / 3, 66.67)]
+)
+def test_percent_has_two_places(share, printed):
+    assert percent(share) == printed
+
+
+def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
+    searched, plain = score(Result(10, 20, components=3, k=2)), score(Result(10, 20))
+    assert list(searched) == list(plain) == ["accuracy %", "from %", "to %", "k", "components"]
+    assert searched["from %"] < 50.0 < searched["to %"]
+    assert (searched["k"], plain["k"]) == (2, "")
+    assert interval(Result(10, 20)) == "30 to 70"

@@ -7,26 +7,28 @@ import csv
 import html
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from edge.files import write_whole
-from train.report.tables import Figure, Section, Table
+from train.report.section import Figure, Section, Table
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b2430; --paper: #fff; --line: #d5dbe3; --soft: #eef2f6;
   --link: #1f5fa8; --miss: #fdf0ec; }
 @media (prefers-color-scheme: dark) { :root { --ink: #dde3ea; --paper: #14191f; --line: #39434f;
   --soft: #222a33; --link: #8ab8f0; --miss: #3a2620; }
-  img { filter: invert(.92) hue-rotate(180deg); } }
+  img { filter: invert(.92) hue-rotate(180deg); mix-blend-mode: lighten; } }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper);
   margin: 0 auto; max-width: 68rem; padding: 1.2rem; overflow-wrap: break-word; }
-h1 { font-size: 1.6rem; line-height: 1.2; } a { color: var(--link); }
-h2 { font-size: 1.25rem; margin-top: 2.6rem; border-bottom: 1px solid var(--line); }
-h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; } summary { cursor: pointer; }
-p, dl { max-width: 46rem; } nav li { line-height: 1.5; } dt { font-weight: 600; }
+h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .5rem; } a { color: var(--link); }
+h2 { font-size: 1.25rem; margin: 1.6rem 0 .6rem; } summary { cursor: pointer; }
+summary h2 { display: inline-block; font-size: 1.1rem; margin: .5rem 0; }
+details.section { border-top: 1px solid var(--line); }
+h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
+p, dl { max-width: 46rem; } dt { font-weight: 600; }
 dd { margin: 0 0 .6rem 1.2rem; } code { font-size: .93em; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
@@ -46,29 +48,33 @@ KEYS = 4
 
 
 def table_csv(table: Table) -> dict[str, str]:
-    """{file name: CSV text} of the table, what a clock measured in a file of its own."""
-    timed = {table.columns.index(column) for column in table.timed}
-    every = range(len(table.columns))
-    files = {f"{table.name}.csv": [i for i in every if i not in timed]}
-    if timed:
-        files[f"{table.name}_timings.csv"] = [i for i in every if i in timed or i < KEYS]
-    return {name: _csv(table, columns) for name, columns in files.items()}
+    """{file name: CSV text} of the table; columns that a clock measured have their own file."""
+    columns = table.columns
+    files = {f"{table.name}.csv": [c for c in columns if c not in table.timed]}
+    if table.timed:
+        timings = [c for i, c in enumerate(columns) if i < KEYS or c in table.timed]
+        files[f"{table.name}_timings.csv"] = timings
+    return {name: _csv(table, shown) for name, shown in files.items()}
 
 
-def _csv(table: Table, columns: Sequence[int]) -> str:
+def _csv(table: Table, columns: Sequence[str]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([row[i] for i in columns] for row in [table.columns, *table.rows])
+    writer.writerows([columns, *([row[c] for c in columns] for row in table.rows)])
     return text.getvalue()
 
 
 def _text(text: str) -> str:
-    """Escaped, with what stands between backquotes as code."""
+    """The text escaped; words between backquotes become code."""
     return CODE.sub(r"<code>\1</code>", html.escape(text, quote=False))
 
 
+def _paragraphs(texts: Iterable[str]) -> list[str]:
+    return [f"<p>{_text(text)}</p>" for text in texts]
+
+
 def _decimals(values: Sequence[Any]) -> int:
-    """How many decimals, at most two, show what differs in a column's numbers."""
+    """The decimals, at most two, that a column of numbers needs."""
     shown = (f"{value:.2f}".rstrip("0") for value in values if isinstance(value, float))
     return max((len(text) - text.index(".") - 1 for text in shown), default=0)
 
@@ -85,7 +91,7 @@ def _table(table: Table) -> str:
         f"<th{' class=more' if i >= table.narrow else ''}>{_text(column)}</th>"
         for i, column in enumerate(table.columns[: table.wide])
     )
-    decimals = [_decimals(column) for column in zip(*table.rows, strict=True)]
+    decimals = [_decimals(column) for column in zip(*table.cells, strict=True)]
     rows = "\n".join(
         f"<tr{' class=no' if row[-1] == 'no' else ''}>"
         + "".join(
@@ -93,7 +99,7 @@ def _table(table: Table) -> str:
             for i, value in enumerate(row[: table.wide])
         )
         + "</tr>"
-        for row in table.rows
+        for row in table.cells
     )
     files = "All columns: " if len(table.columns) > table.wide else ""
     files += ", ".join(f'<a href="{name}">{name}</a>' for name in table_csv(table))
@@ -114,40 +120,46 @@ def _figure(figure: Figure) -> str:
     return f"<figure>{image}</figure>"
 
 
-def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
-    """The whole report as HTML; images are in it, and tables link to the CSV files beside it."""
-    parts = [
-        "<!doctype html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>",
-        f"<h1>{_text(title)}</h1>",
-        *(f"<p>{_text(text)}</p>" for text in lead),
-        "<nav><ol>",
-        *(
-            f'<li><a href="#s{i}">{_text(section.title)}</a></li>'
-            for i, section in enumerate(sections)
-        ),
-        "</ol></nav>",
+def _section(section: Section, folded: bool) -> str:
+    heading = f"<h2>{_text(section.title)}</h2>"
+    terms = [f"<dt>{_text(a)}</dt><dd>{_text(b)}</dd>" for a, b in section.terms.items()]
+    body = [
+        section.widget,
+        *_paragraphs(section.text),
+        *map(_figure, section.figures),
+        *(_table(table) for table in section.tables if table.rows),
+        *(["<dl>", *terms, "</dl>"] if terms else []),
     ]
-    for i, section in enumerate(sections):
-        parts.append(f'<h2 id="s{i}">{_text(section.title)}</h2>')
-        parts += [f"<p>{_text(text)}</p>" for text in section.text]
-        parts += map(_figure, section.figures)
-        parts += map(_table, section.tables)
-        if section.terms:
-            terms = (f"<dt>{_text(a)}</dt><dd>{_text(b)}</dd>" for a, b in section.terms.items())
-            parts += ["<dl>", *terms, "</dl>"]
-    return "\n".join([*parts, "</body></html>\n"])
+    if not folded:
+        return "\n".join([heading, *body])
+    head = f'<details class="section"><summary>{heading}</summary>'
+    return "\n".join([head, *body, "</details>"])
+
+
+def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
+    """The report as HTML: the first section open, the others folded, the images in the page."""
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>",
+            f"<h1>{_text(title)}</h1>",
+            *_paragraphs(lead),
+            *(_section(section, i > 0) for i, section in enumerate(sections)),
+            "</body></html>\n",
+        ]
+    )
 
 
 def write(out: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> Path:
-    """Write report.html, PNGs and CSVs into a folder, each whole or not at all."""
+    """Write report.html, PNGs and CSVs into a folder, each whole or not at all; the page's path."""
     files: dict[str, bytes] = {}
     for section in sections:
         files |= {f"{figure.name}.png": figure.png for figure in section.figures}
         for table in section.tables:
-            files |= {name: text.encode() for name, text in table_csv(table).items()}
+            if table.rows:
+                files |= {name: text.encode() for name, text in table_csv(table).items()}
     files["report.html"] = page(title, lead, sections).encode()
     for name, data in files.items():
         with write_whole(out / name) as file:

@@ -1,4 +1,4 @@
-"""The same recordings through another skin: coarser, thinned out, with another threshold."""
+"""The same recordings through other skins: coarser, with fewer chips, another threshold."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ def follow(
     names: Sequence[str] = FEATURES,
     horizon_s: float = WINDOW_S,
 ) -> list[FeatureSeries | None]:
-    """The first contact of each recording; None where there is none."""
-    found: list[FeatureSeries | None] = []
+    """The first contact of each recording, or None."""
+    contacts: list[FeatureSeries | None] = []
     for recording in recordings:
         device = for_device(layout, recording.layout)
         tracker = ContactTracker(device, tracking, chain=chain, horizon_s=horizon_s, features=names)
         contact = first_contact(recording, tracker)
-        found.append(None if contact is None else contact[1])
-    return found
+        contacts.append(None if contact is None else contact[1])
+    return contacts
 
 
 @dataclass(frozen=True)
 class View:
-    """Another way to see the same recordings.
+    """The same recordings, seen through another skin.
 
     Attributes:
         layout: the skin, with its thresholds.
-        change: of each recording, or None; it goes to other processes, so it is no lambda.
-        names: of the features to measure.
-        of: the trials that are seen so; all where None.
+        change: applied to each recording, if given; other processes run it, so it is no lambda.
+        names: names of the features to measure.
+        of: numbers of the trials that are seen in this way; all where None.
     """
 
     layout: SkinLayout
@@ -61,8 +61,8 @@ def follow_views(
     tracking: TrackSettings,
     chain: Chain | None,
 ) -> list[dict[int, FeatureSeries | None]]:
-    """The first contact of some recordings, by their number, as each of the views shows it."""
-    found: list[dict[int, FeatureSeries | None]] = []
+    """For each view, {number: first contact} of the recordings."""
+    shown: list[dict[int, FeatureSeries | None]] = []
     for view in views:
         seen = {
             i: recording if view.change is None else view.change(recording)
@@ -70,8 +70,8 @@ def follow_views(
             if view.of is None or i in view.of
         }
         contacts = follow(list(seen.values()), view.layout, tracking, chain, view.names)
-        found.append(dict(zip(seen, contacts, strict=True)))
-    return found
+        shown.append(dict(zip(seen, contacts, strict=True)))
+    return shown
 
 
 def vectors(
@@ -80,18 +80,18 @@ def vectors(
     samples: int = SAMPLES,
     names: Sequence[str] = FEATURES,
 ) -> NDArray[np.float64]:
-    """(n, names * samples); zeros where there was no contact."""
-    X = np.zeros((len(series), len(names) * samples))
-    for row, contact in zip(X, series, strict=True):
-        if contact is not None:
-            row[:] = feature_vector(contact, window_s, samples, names)
-    return X
+    """(n, width) feature vectors; zeros for trials without contact."""
+    form = window_s, samples, names
+    rows = [None if contact is None else feature_vector(contact, *form) for contact in series]
+    width = max((len(row) for row in rows if row is not None), default=len(names) * samples)
+    return np.stack([np.zeros(width) if row is None else row for row in rows])
 
 
 def pooled_layout(layout: SkinLayout) -> SkinLayout:
-    """The skin whose taxels are 2 x 2 of this one's (the last row or column alone where odd).
+    """The skin whose taxels each cover 2 x 2 of this one's; an odd last row or column stays single.
 
-    A larger taxel's centre lies between those of its parts. The threshold stays: it is a force.
+    A larger taxel's centre lies midway between the taxels that it covers. The threshold stays the
+    same, as it is a force.
     """
     rows, cols = (layout.rows + 1) // 2, (layout.cols + 1) // 2
     pitch = layout.pitch_m
@@ -105,8 +105,7 @@ def pooled_layout(layout: SkinLayout) -> SkinLayout:
             for a, b in zip(angles[::2], others, strict=True)
         )
     along, around = pitch if isinstance(pitch, tuple) else (pitch, pitch)
-    wider = None
-    z = layout.row0_z_m
+    wider, z = None, layout.row0_z_m
     if along is not None and around is not None:
         wider = (2.0 * along, 2.0 * around)
         z -= 0.5 * along
@@ -130,41 +129,41 @@ def pool(frames: NDArray[Any], by: np.ufunc = np.add) -> NDArray[Any]:
 
 
 def pooled(recording: Recording, layout: SkinLayout, by: np.ufunc) -> Recording:
-    """The recording as a skin of larger taxels would have made it.
+    """The recording that a skin of larger taxels would have made.
 
     Args:
-        recording: its invalid taxels count as nothing.
-        layout: of the larger taxels.
-        by: numpy.add: a larger taxel carries the sum of its parts' forces, as a plate over
-            them would; numpy.maximum: it reads the most loaded part alone.
+        recording: its invalid taxels count as zero.
+        layout: the skin of larger taxels.
+        by: numpy.add where a larger taxel carries the sum of the forces, as a plate would;
+            numpy.maximum where it reads only the most loaded taxel under it.
     """
     frames = recording.frames.astype(np.uint32)
     valid = recording.valid
     wider: NDArray[np.bool_] | None = None
     if valid is not None:
         frames *= valid
-        parts = pool(valid.reshape(-1, *valid.shape[-2:]).astype(np.uint8), np.maximum) > 0
-        wider = parts if valid.ndim == 3 else parts[0]
+        pooled_valid = pool(valid.reshape(-1, *valid.shape[-2:]).astype(np.uint8), np.maximum) > 0
+        wider = pooled_valid if valid.ndim == 3 else pooled_valid[0]
     counts = np.minimum(pool(frames, by), 65535).astype(np.uint16)
     meta = {**recording.meta, "skin": layout.to_dict()}
     return replace(recording, frames=counts, valid=wider, meta=meta)
 
 
 def pooled_down(recording: Recording, layouts: Sequence[SkinLayout], by: np.ufunc) -> Recording:
-    """`pooled` again and again, through skins each of which is the one before, pooled."""
+    """The recording `pooled` through each of these skins in turn."""
     for layout in layouts:
         recording = pooled(recording, layout, by)
     return recording
 
 
 def thinned(shape: tuple[int, int], keep: int) -> NDArray[np.bool_]:
-    """(rows, cols) the taxels of 1 in `keep` chips (2, 4, 8, ...), spread like a checkerboard."""
+    """(rows, cols) the taxels of 1 in `keep` chips (2, 4, 8, ...), evenly spread."""
     rows, cols = np.indices(shape)
     rows, cols = rows // BLOCK[0], cols // BLOCK[1]
     kept = np.ones(shape, dtype=bool)
     step = 1
     while keep > 1:
-        # Of each pair of neighbours one is kept, first diagonally, then in every other row.
+        # Alternately a checkerboard of the chips that are left, and every other row of them.
         kept &= (rows // step + cols // step) % 2 == 0
         keep //= 2
         if keep > 1:

@@ -3,31 +3,31 @@
 import csv
 import io
 
+import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from tests import browser
-from train.report.html import page, table_csv, write
-from train.report.tables import Figure, Section, Table
+from train.report.page import page, table_csv, write
+from train.report.section import Figure, Section, Table, counted
 
 WIDE = Table(
     "wide",
     "Many columns and rows",
-    tuple(f"a longer heading {i}" for i in range(20)),
-    [tuple(f"cell {i} with several words" for i in range(20))] * 40,
+    [{f"a longer heading {i}": f"cell {i} with several words" for i in range(20)}] * 40,
 )
 
 HOSTILE = '<script>alert("1 & 2")</script>'
 
 
 def table(**more):
-    columns = ("case", "n", "seconds")
-    return Table("speed", "How fast", columns, [("a,b", 1, 0.5), (HOSTILE, 2, 0.25)], **more)
+    rows = [{"case": "a,b", "n": 1, "seconds": 0.5}, {"case": HOSTILE, "n": 2, "seconds": 0.25}]
+    return Table("speed", "How fast", rows, **more)
 
 
 def test_what_is_not_ours_is_escaped():
     text = page(HOSTILE, [HOSTILE], [Section(HOSTILE, [HOSTILE], [table()])])
     assert "<script>" not in text
-    assert text.count("&lt;script&gt;") == 7  # title twice, lead, contents, heading, text, cell
+    assert text.count("&lt;script&gt;") == 6  # title twice, lead, heading, text, cell
 
 
 def test_a_table_is_the_same_in_its_csv():
@@ -39,8 +39,9 @@ def test_a_table_is_the_same_in_its_csv():
 
 
 def test_a_column_has_as_many_decimals_as_its_numbers_need():
-    rows = [(1, 54.30, 2.0, 0.125), (2, 60.0, 3.0, 0.5)]
-    text = page("t", [], [Section("s", tables=[Table("t", "T", ("n", "a", "b", "c"), rows)])])
+    values = (1, 54.30, 2.0, 0.125), (2, 60.0, 3.0, 0.5)
+    rows = [dict(zip("nabc", row, strict=True)) for row in values]
+    text = page("t", [], [Section("s", tables=[Table("t", "T", rows)])])
     cells = [part.split("<")[0] for part in text.split('<td class="number">')[1:]]
     assert cells == ["1", "54.3", "2", "0.12", "2", "60.0", "3", "0.50"]
 
@@ -67,6 +68,24 @@ def test_a_long_table_is_folded_and_a_wide_one_is_cut_to_what_fits():
     assert "a longer heading 9" in text
     assert "a longer heading 10" not in text
     assert table_csv(WIDE)["wide.csv"].startswith(",".join(WIDE.columns))
+
+
+def test_the_first_section_is_open_and_the_others_are_folded():
+    text = page("Title", [], [Section("One"), Section("Two", ["below"])])
+    assert text.index("One") < text.index("<details") < text.index("Two") < text.index("below")
+
+
+def test_a_table_without_rows_is_left_out(tmp_path):
+    write(tmp_path, "Title", [], [Section("One", tables=[Table("empty", "Nothing", [])])])
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert "Nothing" not in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(1, "1 recording"), (2, "2 recordings"), (1120, "1,120 recordings")]
+)
+def test_counts_agree_with_their_nouns(count, words):
+    assert counted(count, "recording") == words
 
 
 def test_words_are_explained_and_code_is_set_as_code():

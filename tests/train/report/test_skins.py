@@ -7,8 +7,8 @@ import pytest
 
 from edge.recording import Recording
 from edge.touch.layout import SkinLayout
+from train.report.skins import masked, pool, pooled, pooled_layout, thinned
 from train.study.resolution import layouts
-from train.study.skins import masked, pool, pooled, pooled_layout, thinned
 
 
 def test_pooling_keeps_the_sum_of_forces_and_maximum_the_peak(forearm, make_touch):

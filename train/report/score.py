@@ -1,0 +1,144 @@
+"""Accuracies of the reports: nested, leave-one-out, transferred, and their columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from edge.touch.features import FEATURES
+from train.crossval import MAX_COMPONENTS, MAX_K, accuracies, neighbours, split_neighbours
+from train.evaluate import Labels, Result, SearchGrid, evaluate, stratified_folds
+from train.pipeline import vote
+from train.stopping import finest
+
+
+def percent(share: float) -> float:
+    """The share in percent, rounded to two places as in the paper."""
+    return round(100.0 * share, 2)
+
+
+def interval(result: Result) -> str:
+    """The 95 % interval in whole percent, as in `79 to 90`."""
+    low, high = result.interval
+    return f"{100 * low:.0f} to {100 * high:.0f}"
+
+
+def score(result: Result) -> dict[str, Any]:
+    """The columns of an accuracy: its 95 % interval, and the numbers that were searched."""
+    low, high = result.interval
+    return {
+        "accuracy %": percent(result.accuracy),
+        "from %": percent(low),
+        "to %": percent(high),
+        "k": result.k or "",
+        "components": result.components or "",
+    }
+
+
+def nested(
+    X: NDArray[np.float64],
+    y: Labels,
+    grid: SearchGrid,
+    features: Sequence[str],
+    *,
+    widths: Sequence[int] | None = None,
+    folds: NDArray[np.int64] | None = None,
+    jobs: int = 1,
+    progress: str | None = None,
+) -> dict[str, Result]:
+    """Each task's nested accuracy over a grid; see `train.evaluate`.
+
+    Args:
+        X: (n, p) feature vectors.
+        y: {task: (n,) labels}.
+        grid: the settings to choose from.
+        features: names of the feature types in X.
+        widths: columns of each; equal where None.
+        folds: (n,) from 0; ten that spread the labels evenly where None.
+        jobs: processes.
+        progress: heading of a progress bar, if one is wanted.
+    """
+    folds = stratified_folds(y[finest(y)]) if folds is None else folds
+    table = evaluate(
+        X, y, folds, [grid], features=features, widths=widths, jobs=jobs, progress=progress
+    )
+    return {task: table.nested(task) for task in y}
+
+
+def best_cell(grid: NDArray[np.float64]) -> tuple[int, int]:
+    """(row, column) of the highest entry; of equal ones the first row, then the first column."""
+    row, column = np.unravel_index(int(np.argmax(grid)), grid.shape)
+    return int(row), int(column)
+
+
+def votes(
+    rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int
+) -> NDArray[np.str_]:
+    """(t,) labels by vote of the neighbours (t, components, k) among trials with labels y."""
+    classes, labels = np.unique(y, return_inverse=True)
+    winners, _ = vote(labels[rows[:, components - 1, :k]], len(classes))
+    return np.asarray(classes[winners])
+
+
+def grid_search(
+    X: NDArray[np.float64],
+    y: Labels,
+    scaling: str = "none",
+    features: Sequence[str] = FEATURES,
+) -> dict[str, Result]:
+    """Each task's best leave-one-out accuracy over 1 to 20 components and k (section IV-A)."""
+    rows = neighbours(
+        X, scaling=scaling, features=features, max_components=min(MAX_COMPONENTS, len(X) - 1)
+    )
+    results = {}
+    for task, labels in y.items():
+        row, column = best_cell(accuracies(rows, labels))
+        said = votes(rows, labels, row + 1, column + 1)
+        right = int((said == labels).sum())
+        results[task] = Result(right, len(labels), row + 1, column + 1, said)
+    return results
+
+
+def transfer(
+    X: NDArray[np.float64],
+    y: Labels,
+    chosen: Mapping[str, Result],
+    changed: NDArray[np.float64],
+) -> dict[str, Result]:
+    """Each task's accuracy when trained on trials as they are and tested on changed ones.
+
+    The changed version of a trial shares its random draws, so it would be recognised by itself:
+    as in leave-one-out, the training set is always without it.
+
+    Args:
+        X: (n, p) training trials.
+        y: labels of both.
+        chosen: components and k of each task, as `grid_search` chose them on X.
+        changed: (n, p) the same trials, changed.
+    """
+    n = len(X)
+    stacked = np.concatenate([X, changed])
+    form = "none", MAX_COMPONENTS, min(MAX_K, n - 1)
+    with threadpool_limits(1):
+        rows = np.concatenate(
+            [
+                split_neighbours(stacked, np.delete(np.arange(n), i), np.array([n + i]), *form)
+                for i in range(n)
+            ]
+        )
+    results = {}
+    for task, best in chosen.items():
+        said = votes(rows, y[task], best.components, best.k)
+        right = int((said == y[task]).sum())
+        results[task] = Result(right, n, best.components, best.k, said)
+    return results
+
+
+def majority(y: NDArray[np.str_]) -> Result:
+    """The accuracy of always naming the most frequent label."""
+    _, counts = np.unique(y, return_counts=True)
+    return Result(int(counts.max()), len(y))

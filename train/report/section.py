@@ -1,0 +1,90 @@
+"""The elements of a report: sections of text, tables and figures, with their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+Row = dict[str, Any]
+"""{column: cell} of a table."""
+Numbers = dict[tuple[str, str, str], float]
+"""{(table, setting, task): accuracy in percent}."""
+
+
+@dataclass
+class Table:
+    """A table of the report, which is also written as a CSV file.
+
+    Attributes:
+        name: name of its file.
+        title: heading above it.
+        rows: its rows, all with the columns of the first, the most telling column first. A
+            table without rows is left out of the report.
+        timed: columns that a clock measured, so that they differ from run to run; they go to a
+            CSV file of their own.
+        narrow: number of columns, from the first, that a phone shows; the CSV has them all.
+        wide: number of columns that a screen shows.
+    """
+
+    name: str
+    title: str
+    rows: Sequence[Row]
+    timed: tuple[str, ...] = ()
+    narrow: int = 4
+    wide: int = 10
+
+    @property
+    def columns(self) -> list[str]:
+        """The headings."""
+        return list(self.rows[0]) if self.rows else []
+
+    @property
+    def cells(self) -> list[list[Any]]:
+        """The cells of each row, in the order of `columns`."""
+        return [[row[column] for column in self.columns] for row in self.rows]
+
+
+@dataclass
+class Figure:
+    """A plot of the report, which is also written as a PNG file.
+
+    Attributes:
+        name: name of its file.
+        title: description for readers who cannot see it.
+        png: its bytes.
+        narrow: the bytes of a version drawn for a phone, if there is one.
+    """
+
+    name: str
+    title: str
+    png: bytes
+    narrow: bytes | None = None
+
+
+@dataclass
+class Section:
+    """A heading with paragraphs, plots and tables, and the numbers behind them.
+
+    Attributes:
+        title: the heading.
+        text: paragraphs.
+        tables: shown below the plots.
+        figures: shown below the text.
+        terms: {word: explanation} of a glossary.
+        numbers: accuracies that other sections draw conclusions from.
+        widget: HTML with its own script, shown above the text.
+    """
+
+    title: str
+    text: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    figures: Sequence[Figure] = ()
+    terms: Mapping[str, str] = field(default_factory=dict)
+    numbers: Numbers = field(default_factory=dict)
+    widget: str = ""
+
+
+def counted(count: int, noun: str) -> str:
+    """The count with its noun, as in `1 recording` and `2 recordings`."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
