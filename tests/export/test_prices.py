@@ -1,6 +1,7 @@
 """What a decision costs by its model's size, measured, and read again for the report."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from edge.errors import InputError
 from edge.recording import save
 from export import prices as measured
 from train.dataset import load_trials
-from train.tradeoff import prices
+from train.tradeoff import arithmetic, prices
 
 
 @pytest.fixture(scope="module")
@@ -45,13 +46,18 @@ def test_rows_beyond_the_recorded_ones_are_like_them_and_the_same_every_time():
 
 def test_the_report_sets_accuracy_beside_the_price(written, recordings):
     dataset = load_trials([recordings], horizon_s=1.2)
-    found = prices.section(prices.read(written, dataset.digest), dataset, "category")
-    sizes, learning = found.tables
-    accuracy = [row[-1] for row in sizes.rows]
+    measured = SimpleNamespace(
+        prices=prices.read(written, dataset.digest),
+        dataset=dataset,
+        main="category",
+        y={"category": dataset.labels("category")},
+    )
+    sizes, learning = arithmetic.sizes(measured).tables
+    accuracy = [row["accuracy %"] for row in sizes.rows]
     assert accuracy[-2] == ""  # nothing is known of rows that were never recorded
     assert 0.0 < accuracy[2] <= 100.0
     assert sizes.timed == ("decision us",)
-    assert learning.rows[-1][0] == 16
+    assert learning.rows[-1]["trials"] == 16
 
 
 @pytest.mark.parametrize(
