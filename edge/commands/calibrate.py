@@ -1,7 +1,8 @@
 """Measure rest values and noise and write them into the skin file.
 
 Reads the skin while nothing touches it, and writes each taxel's mean and standard deviation into
-the skin file. The old file is kept as skin.toml.bak.
+the skin file. The old file is kept as skin.toml.bak. A skin that is touched, or has taxels that
+cannot be read or are saturated, is refused.
 """
 
 from __future__ import annotations
@@ -19,15 +20,18 @@ from edge.commands.output import Output
 from edge.commands.source import open_skin
 from edge.errors import InputError
 from edge.skin.calibration import save_calibration
-from edge.skin.file import TaxelCalibration
+from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
+from edge.skin.wiring import UNUSED
 
 LOG = logging.getLogger(__name__)
 
 FRAMES = 1000
 """As many as the paper's lab averaged for its baseline."""
 FEWEST_FRAMES, MOST_FRAMES = 20, 1_000_000
+MIN_SHARE = 0.5
+"""Smallest share of the frames in which a taxel must be valid."""
 RESTLESS, RESTLESS_COUNTS = 10.0, 5.0
 """A taxel is being touched, or broken, if its noise exceeds this factor times the median noise plus
 so many counts."""
@@ -45,11 +49,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force",
         action="store_true",
-        help="write the calibration even if something seems to touch the skin",
+        help="write the calibration even if something seems to touch the skin; taxels without a "
+        "usable value keep their former one",
     )
 
 
-def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCalibration, int]:
+def measure(
+    skin: Skin, frames: int, lasts_s: float = math.inf
+) -> tuple[TaxelCalibration, NDArray[np.int64], int]:
     """Mean and standard deviation of each taxel's raw values, from sums of whole numbers.
 
     Args:
@@ -58,7 +65,7 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCa
         lasts_s: the greatest time to read for.
 
     Returns:
-        The calibration, and the number of frames that it was taken from.
+        The calibration, the number of valid values of each taxel, and the number of frames.
     """
     shape = skin.layout.shape
     n = np.zeros(shape, dtype=np.int64)
@@ -74,7 +81,7 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> tuple[TaxelCa
         seen += 1
         if seen == frames:
             break
-    return TaxelCalibration(*mean_and_deviation(n, total, squares)), seen
+    return TaxelCalibration(*mean_and_deviation(n, total, squares)), n, seen
 
 
 def mean_and_deviation(
@@ -93,6 +100,29 @@ def mean_and_deviation(
     return mean.astype(np.uint16), np.sqrt(np.maximum(variance, 0.0))
 
 
+def unusable(
+    file: SkinFile, baseline: NDArray[np.uint16], share: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(rows, cols), True for working taxels without a usable rest value.
+
+    They were valid in less than `MIN_SHARE` of the frames, or rest at an end of the chip's range:
+    a saturated input, or 0, which only a block's values may have at rest.
+
+    Args:
+        file: the skin's.
+        baseline: (rows, cols) rest values.
+        share: (rows, cols) shares of frames in which a taxel was valid.
+    """
+    rest, bad = baseline.ravel(), share.ravel() < MIN_SHARE
+    served = np.zeros(rest.size, dtype=bool)
+    for chip in file.chips:
+        taxels = [taxel for taxel in chip.taxels if taxel != UNUSED]
+        served[taxels] = True
+        bad[taxels] |= (rest[taxels] >= chip.highest) | (chip.kind != "block") & (rest[taxels] == 0)
+    unusable: NDArray[np.bool_] = (served & bad).reshape(baseline.shape) & file.layout.alive
+    return unusable
+
+
 def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Taxels (row, col) that vary far more than the others, the worst first."""
     limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
@@ -105,12 +135,29 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure, refuse a skin that is being touched, and write."""
     if arguments.skin is None:
         raise InputError("give --skin skin.toml, the file into which the calibration is written")
+    former = load(arguments.skin).calibration
     with open_skin(arguments, calibrated=False) as opened:
         LOG.info("measuring; keep everything off the skin")
-        calibration, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
-        unread = int((~opened.skin.raw()[1]).sum()) if seen else 0
+        calibration, valid, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
+        file = opened.skin.file
     if seen < FEWEST_FRAMES:
         raise InputError(f"only {seen} frames could be read; at least {FEWEST_FRAMES} are needed")
+    lost = unusable(file, calibration.baseline, valid / seen)
+    if lost.any():
+        row, col = np.argwhere(lost)[0].tolist()
+        problem = (
+            f"taxels that cannot be calibrated: {lost.sum()}, the first at [{row}, {col}], which "
+            f"was valid in {valid[row, col]} of {seen} frames and rests at "
+            f"{calibration.baseline[row, col]}"
+        )
+        if former is None or not arguments.force:
+            raise InputError(
+                f"{problem}; check the chips with `edge-classify scan`, list broken taxels under "
+                "dead in [signal], or keep the taxels' former values, if any, with --force"
+            )
+        LOG.warning(f"{problem}; their former values are kept")
+        calibration.baseline[lost] = former.baseline[lost]
+        calibration.noise[lost] = former.noise[lost]
     moving = restless(calibration.noise)
     if moving and not arguments.force:
         row, col = moving[0]
@@ -123,8 +170,6 @@ def run(arguments: argparse.Namespace) -> int:
     backup = save_calibration(
         arguments.skin, TaxelCalibration(calibration.baseline, calibration.noise, taken)
     )
-    if unread:
-        LOG.warning(f"taxels that could not be read: {unread}")
     median, largest = float(np.median(calibration.noise)), float(calibration.noise.max())
     Output.of(arguments).event(
         {
@@ -134,7 +179,7 @@ def run(arguments: argparse.Namespace) -> int:
             "frames": seen,
             "noise_median": round(median, 3),
             "noise_largest": round(largest, 3),
-            "unread": unread,
+            "kept": int(lost.sum()),
             "moving": moving,
         },
         f"{arguments.skin}: calibrated from {seen} frames; noise in counts: median {median:.1f}, "

@@ -1,7 +1,8 @@
 """Wait for contacts and save each as a labelled trial.
 
 Waits for a contact, saves it with a short lead-in as one .npz file, and waits for the next one.
-Existing files are never overwritten. The exit status is 1 if nothing was saved.
+Existing files are never overwritten. With --joints, --fake plays at the original speed. The exit
+status is 1 if nothing was saved, or if --joints gave no angles.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ import argparse
 import logging
 import math
 import re
-import signal
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ import numpy as np
 
 from edge.commands.options import add_arm, add_joints, add_skin, open_arm, within
 from edge.commands.output import Output
-from edge.commands.source import open_joints, open_skin
+from edge.commands.source import ending_signals, open_joints, open_skin
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
@@ -181,11 +181,13 @@ def run(arguments: argparse.Namespace) -> int:
     dof = arguments.dof if arm is None else arm.dof
     if arguments.joints is not None and dof is None:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
+    if arguments.fake is not None and arguments.joints is not None:
+        arguments.real_time = True  # the source of joint angles goes by the real clock
     virtual = arguments.fake is not None and not arguments.real_time
     with (
         open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
         # Before this point a signal ends the program at once, as nothing can be lost.
-        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
+        stop_on(*ending_signals()) as stop,
         open_joints(arguments, opened, arm, dof) as joints,
         Lines(
             form=Output.of(arguments).line,
@@ -224,6 +226,9 @@ def run(arguments: argparse.Namespace) -> int:
             recorder.save(trials.rest(), complete=False)
     if not recorder.saved:
         LOG.warning("there was no contact; nothing was saved")
+    elif arguments.joints is not None and not recorder.any_joints:
+        LOG.error("--joints gave no angles at the times of the frames")
+        return 1
     return 0 if recorder.saved else 1
 
 
@@ -239,6 +244,7 @@ class Recorder:
         lines: where the `saved` events go.
         posed: whether to warn about frames without joint angles.
         saved: the number of trials saved so far.
+        any_joints: whether a saved frame had joint angles.
     """
 
     out: str
@@ -248,6 +254,7 @@ class Recorder:
     lines: Lines
     posed: bool
     saved: int = 0
+    any_joints: bool = False
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
         """Save the frames of a trial, if there is one."""
@@ -267,6 +274,7 @@ class Recorder:
             except NameTaken:  # another recorder in this folder was faster
                 continue
         self.saved += 1
+        self.any_joints |= trial.joints is not None
         if without and self.posed:
             LOG.warning(f"{path}: {without} of {len(frames)} frames have no joint angles")
         event = {

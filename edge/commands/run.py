@@ -1,15 +1,14 @@
 """Read the skin and decide, live.
 
-Reads the skin and reports contacts, decisions, and chips that fail or recover. Ctrl-C or SIGTERM
-ends it cleanly after the current frame, a second one at once. It tells systemd when it is ready and
-that it is alive.
+Reads the skin and reports contacts, decisions, and chips that fail or recover. Ctrl-C, SIGTERM or
+SIGHUP ends it cleanly after the current frame, a second one at once. It tells systemd when it is
+ready and that it is alive.
 """
 
 from __future__ import annotations
 
 import argparse
 import logging
-import signal
 import time
 from contextlib import ExitStack
 from typing import Any
@@ -17,7 +16,13 @@ from typing import Any
 from edge.classifier import Classifier
 from edge.commands.options import add_error, add_joints, add_skin, check_error
 from edge.commands.output import Output
-from edge.commands.source import check_joints, chip_event, open_joints, open_skin
+from edge.commands.source import (
+    check_joints,
+    chip_event,
+    ending_signals,
+    open_joints,
+    open_skin,
+)
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
 from edge.runtime.systemd import Notifier
@@ -82,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
             patient=lambda: virtual and not stop.asked,
         )
         # Before this point a signal ends the program at once, as nothing can be lost.
-        stop = stack.enter_context(stop_on(signal.SIGINT, signal.SIGTERM))
+        stop = stack.enter_context(stop_on(*ending_signals()))
         stack.enter_context(lines)
         on_skin = arguments.without_joints == "skin"
         if not on_skin:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +24,18 @@ from edge.touch.arm import Chain
 from edge.touch.layout import for_device
 
 LOG = logging.getLogger(__name__)
+
+
+def ending_signals() -> list[int]:
+    """The signals that end a command after the current frame.
+
+    SIGHUP, sent when an ssh session drops, is one unless it was ignored from the start, as under
+    nohup.
+    """
+    signals: list[int] = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        signals.append(signal.SIGHUP)
+    return signals
 
 
 def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:

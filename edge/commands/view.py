@@ -11,7 +11,6 @@ import argparse
 import os
 import select
 import shutil
-import signal
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
@@ -20,7 +19,7 @@ from contextlib import contextmanager, suppress
 from edge.classifier import Classifier
 from edge.commands import terminal
 from edge.commands.options import add_joints, add_skin, within
-from edge.commands.source import check_joints, open_joints, open_skin
+from edge.commands.source import check_joints, ending_signals, open_joints, open_skin
 from edge.errors import printable
 from edge.events import Decided, Onset
 from edge.model.model import Model
@@ -104,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
     dof = None if model is None else model.info.dof
     with (
         open_skin(arguments, paced=sys.stdout.isatty(), arm=chain) as opened,
-        stop_on(signal.SIGINT, signal.SIGTERM) as stop,
+        stop_on(*ending_signals()) as stop,
     ):
         if model is not None:
             check_joints(model, arguments, opened)

@@ -3,9 +3,18 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from edge import recording
-from edge.commands.calibrate import RESTLESS, RESTLESS_COUNTS, mean_and_deviation, restless
+from edge.commands import calibrate
+from edge.commands.calibrate import (
+    RESTLESS,
+    RESTLESS_COUNTS,
+    mean_and_deviation,
+    measure,
+    restless,
+    unusable,
+)
 from edge.skin import file as skinfile
 
 
@@ -20,7 +29,7 @@ def test_a_taxel_is_restless_beyond_the_limit_and_not_at_it():
 def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin, quiet):
     before = skin.read_text()
     status, (event,), _ = edge("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
-    assert (status, event["frames"], event["unread"]) == (0, 50, 0)
+    assert (status, event["frames"], event["kept"]) == (0, 50, 0)
     assert Path(event["backup"]).read_text() == before
     file = skinfile.load(skin)
     assert (file.calibration.baseline == 20946).all()
@@ -38,6 +47,51 @@ def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
     assert "taxels that vary while they should be at rest: " in err
     assert skin.read_text() == before
     assert edge("calibrate", "--skin", skin, "--fake", touched, "--frames", 100, "--force")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "share", "said"),
+    [
+        (20946, 0.4, "the first at [0, 2], which was valid in 20 of 50 frames and rests at 20946"),
+        (0, 1.0, "was valid in 50 of 50 frames and rests at 0"),
+        (65535, 1.0, "rests at 65535; check the chips"),
+    ],
+)
+def test_taxels_that_are_not_read_or_saturated_are_refused_or_keep_their_former_values(
+    edge, skin, quiet, monkeypatch, value, share, said
+):
+    def measured(*arguments):
+        calibration, valid, seen = measure(*arguments)
+        calibration.baseline[0, 2] = value
+        valid[0, 2] = share * seen
+        return calibration, valid, seen
+
+    monkeypatch.setattr(calibrate, "measure", measured)
+    arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
+    for options in ((), ("--force",)):  # there is no former value
+        status, _, err = edge(*arguments, *options)
+        assert (status, skinfile.load(skin).calibration) == (2, None)
+        assert said in err
+    with monkeypatch.context() as patch:
+        patch.setattr(calibrate, "measure", measure)
+        assert edge(*arguments)[0] == 0
+    before = skin.read_text()
+    assert edge(*arguments)[0] == 2
+    assert skin.read_text() == before
+    status, (event,), err = edge(*arguments, "--force")
+    assert (status, event["kept"]) == (0, 1)
+    assert "their former values are kept" in err
+    assert skinfile.load(skin).calibration.baseline[0, 2] == 20946
+
+
+def test_only_the_values_of_a_block_may_rest_at_0():
+    shares = np.ones((8, 12))
+    pad = skinfile.load(skinfile.shipped("mpr121"))
+    assert unusable(pad, np.zeros((8, 12), np.uint16), shares).all()
+    assert unusable(pad, np.full((8, 12), 1023, np.uint16), shares).all()
+    matrix = skinfile.load(skinfile.shipped("matrix"))
+    shape = matrix.layout.shape
+    assert not unusable(matrix, np.zeros(shape, np.uint16), np.ones(shape)).any()
 
 
 def test_mean_and_deviation_are_exact_at_a_large_offset():

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from edge.commands.record import Recorder, Trials, recording, trial_path
+from edge.commands.source import ending_signals
 from edge.recording import Recording, load, save
 from edge.runtime.event_writer import Lines
 from edge.touch.frame import Frame
@@ -118,7 +119,7 @@ def test_record_keeps_the_names_of_a_recordings_joints(edge, recordings, tmp_pat
     assert load(event["file"]).joint_names == tuple(names)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
     edge, recordings, tmp_path, monkeypatch, number
 ):
@@ -137,6 +138,26 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
     # Onset is at frame 20.
     source = load(recordings / "soft_1.npz").frames
     np.testing.assert_array_equal(load(event["file"]).frames, source[10:61])
+
+
+def test_a_hangup_is_ignored_where_it_was_ignored_at_the_start():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert signal.SIGHUP not in ending_signals()
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(
+    edge, recordings, tmp_path
+):
+    began = time.monotonic()
+    status, (event,), err = edge("record", "--fake", recordings / "soft_1.npz", "--label", "o=a",
+                                 "--out", tmp_path, "--joints", "udp:0", "--dof", 5,
+                                 "--seconds", 0.5)  # fmt: skip
+    assert (status, event["joints"]) == (1, False)
+    assert "--joints gave no angles at the times of the frames" in err
+    assert time.monotonic() - began > 0.4  # it plays in real time, as angles come in real time
 
 
 def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
