@@ -19,11 +19,11 @@ from edge.commands.options import add_skin, within
 from edge.commands.output import Output
 from edge.commands.source import open_skin
 from edge.errors import InputError
+from edge.i2c.chip import UNUSED
 from edge.skin.calibration import save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
-from edge.skin.wiring import UNUSED
 
 LOG = logging.getLogger(__name__)
 
@@ -118,7 +118,9 @@ def unusable(
     for chip in file.chips:
         taxels = [taxel for taxel in chip.taxels if taxel != UNUSED]
         served[taxels] = True
-        bad[taxels] |= (rest[taxels] >= chip.highest) | (chip.kind != "block") & (rest[taxels] == 0)
+        bad[taxels] |= (rest[taxels] >= chip.highest) | (chip.kind.name != "block") & (
+            rest[taxels] == 0
+        )
     unusable: NDArray[np.bool_] = (served & bad).reshape(baseline.shape) & file.layout.alive
     return unusable
 
