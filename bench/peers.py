@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
-from train.choosing import LEAVE_OUT, UNSEEN_SHRINKAGE
+from train.choose import LEAVE_OUT, UNSEEN_SHRINKAGE
 from train.dataset import load_trials, read
 from train.evaluate import SHRINKAGES, SearchGrid, evaluate, group_folds, stratified_folds
 from train.projection import Projection

@@ -30,7 +30,7 @@ from tqdm import tqdm
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
-from train.candidates import candidates
+from train.choose import candidates
 from train.dataset import DataSet, load_trials
 from train.fitting import fit
 from train.simulate import scene as scenes

@@ -42,11 +42,11 @@ def main(folder: Path) -> None:
         meta = {key: short.meta[key] for key in META if key in short.meta}
         save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
     info = model.info
-    known = load_trials([folder / "known"], tracking=info.tracking, features=info.features)
+    known = load_trials([folder / "known"], features=info.features)
     golden.write(
         CHECKOUT / "tests" / "golden" / "demo.npz",
         model,
-        load_trials([demo], tracking=info.tracking, features=info.features),
+        load_trials([demo], features=info.features),
         known.features(info.window_s, info.samples),
     )
 

@@ -15,7 +15,7 @@ from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import measure, report, save
 from train import operating_points
-from train.choosing import LEAVE_OUT, TRIAL
+from train.choose import LEAVE_OUT, TRIAL
 from train.crossval import jobs_here
 from train.fitting import MOST_TRIALS, fit
 from train.projection import KINDS

@@ -22,8 +22,7 @@ from edge.touch import measures
 from edge.touch.features import feature_vector
 from export import golden
 from export.graph import to_onnx
-from train.candidates import Candidate
-from train.choosing import TRIAL, Chosen
+from train.choose import TRIAL, Candidate, Chosen
 from train.dataset import NO_CONTACT, DataSet
 from train.evaluate import Result
 from train.fitting import Fitted

@@ -1,6 +1,6 @@
 """The workstation: recordings to a fitted model.
 
-`train.fit` is what `make export` does, from Python; `export.save` writes what it gives.
+`train.fit` does from Python what `make export` does; `export.save` writes the result.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A Dask cluster as joblib's own backend: what runs on this machine's cores runs there as well."""
+"""A Dask cluster as joblib's backend, so that the same work runs there as on local cores."""
 
 from __future__ import annotations
 

@@ -1,14 +1,15 @@
-"""Exact leave-one-out over all numbers of components and of neighbours at once.
+"""Exact leave-one-out accuracies for all numbers of components and of neighbours at once.
 
-For each trial left out, scaler and components are fitted on the others. One decomposition a
-fold serves all component counts, squared distances are accumulated over components, one sort a
-component count serves all k, and votes are accumulated over k.
+For each trial left out, scaling and components are fitted on the others. One decomposition serves
+all numbers of components, as squared distances are accumulated over components. One sort for each
+number of components serves all k, as votes are accumulated over k.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -22,8 +23,6 @@ from train.scaling import centred_and_scaled
 
 MAX_COMPONENTS = 20
 MAX_K = 20
-ARGSORT_UP_TO = 400
-"""Rows up to which sorting them all is quicker than picking the nearest first."""
 
 
 def split_neighbours(
@@ -37,8 +36,8 @@ def split_neighbours(
 ) -> NDArray[np.int64]:
     """Neighbours of some trials among others, for each number of components.
 
-    Coordinates and distances are those of a `Projection` and of the exported graph, to the bit:
-    equal trials are equally far, and at 0 from each other.
+    Coordinates and distances have the same bits as those of a `Projection` and of the exported
+    graph. Equal trials are equally far from any other, and at distance 0 from each other.
 
     Args:
         X: (n, features * samples).
@@ -51,7 +50,7 @@ def split_neighbours(
 
     Returns:
         (t, max_components, max_k) rows of X, nearest first, equal distances in the order of the
-        rows. Beyond the numerical rank a further component adds nothing, so its row repeats.
+        rows. Components beyond the numerical rank add nothing, so the neighbours repeat.
     """
     mean, gain, known = centred_and_scaled(X[train], scaling, features)
     axes = Spectrum(known).leading(max_components)
@@ -71,30 +70,7 @@ def split_neighbours(
 
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
     """(components, k) places of the k smallest of each row, by value and then by place."""
-    m = squares.shape[1]
-    if m <= max(4 * k, ARGSORT_UP_TO):
-        return np.argsort(squares, axis=1, kind="stable")[:, :k]
-    limits = np.partition(squares, k - 1, axis=1)[:, k - 1 : k]
-    order = np.empty((len(squares), k), dtype=np.int64)
-    for out, row, near in zip(order, squares, squares <= limits, strict=True):
-        among = np.flatnonzero(near)
-        out[:] = among[np.argsort(row[among], kind="stable")[:k]]
-    return order
-
-
-def fold_neighbours(
-    X: NDArray[np.float64],
-    test: int,
-    scaling: str,
-    max_components: int,
-    max_k: int,
-    features: Sequence[str] = FEATURES,
-) -> NDArray[np.int64]:
-    """(max_components, max_k) `split_neighbours` of one trial among all others."""
-    train = np.delete(np.arange(len(X)), test)
-    form = scaling, max_components, max_k, features
-    found: NDArray[np.int64] = split_neighbours(X, train, np.array([test]), *form)[0]
-    return found
+    return np.argsort(squares, axis=1, kind="stable")[:, :k]
 
 
 def votes_right(
@@ -111,15 +87,12 @@ def votes_right(
         (..., k), entry j for k = j + 1. A tie goes to the nearest neighbour among the tied.
     """
     classes = labels[neighbours]
-    k = classes.shape[-1]
-    # before[..., i, j]: votes that neighbour i's class has among the first j + 1.
+    # votes[..., i, j]: how many of the first j + 1 neighbours are of neighbour i's class; 0 where
+    # neighbour i is not one of them.
     same = classes[..., :, None] == classes[..., None, :]
-    votes = np.cumsum(same, axis=-1, dtype=np.int32)
-    asked = np.arange(k)
-    votes = np.where(asked[:, None] <= asked, votes, 0)  # neighbour i takes part from k = i + 1
-    winner = votes.argmax(axis=-2)
-    said = np.take_along_axis(classes, winner, axis=-1)
-    return np.asarray(said == np.asarray(truth)[..., None])
+    votes = np.triu(np.cumsum(same, axis=-1, dtype=np.int32))
+    answers = np.take_along_axis(classes, votes.argmax(axis=-2), axis=-1)
+    return np.asarray(answers == np.asarray(truth)[..., None])
 
 
 def neighbours(
@@ -146,24 +119,17 @@ def neighbours(
         )
     k = min(max_k, n - 1)
     chunks = np.array_split(np.arange(n), min(n, max(jobs, 1) * 8))
-    work = (
-        delayed(_chunk)(X, tests, scaling, max_components, k, tuple(features)) for tests in chunks
-    )
+    form = scaling, max_components, k, tuple(features)
+    work = (delayed(_chunk)(X, tests, *form) for tests in chunks)
     return np.concatenate(Parallel(n_jobs=jobs)(work))
 
 
-def _chunk(
-    X: NDArray[np.float64],
-    tests: NDArray[np.int64],
-    scaling: str,
-    components: int,
-    k: int,
-    features: Sequence[str],
-) -> NDArray[np.int64]:
-    # Matrices this small only lose by several threads; processes share the work instead.
+def _chunk(X: NDArray[np.float64], tests: NDArray[np.int64], *form: Any) -> NDArray[np.int64]:
+    rows = np.arange(len(X))
+    # On matrices this small several threads are slower than one; the processes share the work.
     with threadpool_limits(1):
-        return np.stack(
-            [fold_neighbours(X, int(i), scaling, components, k, features) for i in tests]
+        return np.concatenate(
+            [split_neighbours(X, np.delete(rows, i), rows[i : i + 1], *form) for i in tests]
         )
 
 
@@ -184,7 +150,7 @@ def leave_one_out(
     features: Sequence[str] = FEATURES,
     jobs: int = 1,
 ) -> NDArray[np.float64]:
-    """Leave-one-out accuracies (components, k), entry [c - 1, k - 1]; exact, see the module.
+    """Leave-one-out accuracies (components, k), entry [c - 1, k - 1]; exact under the tie rule.
 
     Args:
         X: (n, features * samples) feature vectors.

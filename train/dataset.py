@@ -1,4 +1,4 @@
-"""Recordings to feature vectors, by the edge's own path."""
+"""Recordings to feature vectors, with the code that runs on the board."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Recordings:
 
 @dataclass(frozen=True)
 class Trial:
-    """One contact of a recording: the first, or each where the recording labels each."""
+    """One contact of a recording: its first, or each of them where the recording says so."""
 
     path: Path
     recording: Recording
@@ -66,17 +66,17 @@ class DataSet:
 
     Attributes:
         trials: in the order of the files' names.
-        layout: the skin, with the thresholds that all trials were followed with.
+        layout: the skin, with the thresholds used for all trials.
         tracking: how contacts were followed.
-        chain: the arm, where the trials have joint angles and a feature calls for them; motion
-            is then in the world's frame.
+        chain: the arm, where the trials have joint angles and a feature needs them; motion is then
+            in the world's frame.
         untouched: recordings in which no contact was found, with their labels.
         digest: SHA-256 over the recordings' bytes.
         names: the features that were measured, by default the paper's three.
-        joints: joint angles of a frame, where a feature is made of them; else 0.
+        joints: number of joint angles, where a feature is made of them; else 0.
         tasks: keys of the labels, sorted; every trial has them all.
-        left_out: {what they lack: recordings that were left out for it}.
-        unused: recordings with contacts beyond those that were used.
+        left_out: {missing label or joint angles: recordings left out for lack of it}.
+        unused: recordings with more contacts than were used.
     """
 
     trials: tuple[Trial, ...]
@@ -96,9 +96,9 @@ class DataSet:
         return [labels[task] for _, labels in self.untouched if task in labels]
 
     def groups(self, key: str) -> NDArray[np.str_] | None:
-        """(n,) what each trial's labels or metadata say under a key; None where one lacks it."""
-        found = [trial.labels.get(key, trial.recording.meta.get(key)) for trial in self.trials]
-        return None if None in found else np.array([str(value) for value in found])
+        """(n,) each trial's value of a key in its labels or metadata; None where one lacks it."""
+        values = [trial.labels.get(key, trial.recording.meta.get(key)) for trial in self.trials]
+        return None if None in values else np.array([str(value) for value in values])
 
     def widths(self, samples: int = SAMPLES) -> tuple[int, ...]:
         """Columns of each feature in `features`."""
@@ -210,7 +210,6 @@ def load_trials(
     *,
     threshold: int | None = None,
     onset: int | None = None,
-    tracking: TrackSettings | None = None,
     horizon_s: float = 2.0,
     features: Sequence[str] = FEATURES,
     arm: Chain | None = None,
@@ -219,19 +218,18 @@ def load_trials(
     """Follow the contacts of recordings.
 
     A recording's first contact is a trial, with the recording's labels. Where `meta.contacts` is
-    "alike", each of its contacts is; where it is a list of labels, the contacts have these in
-    their order. What most recordings have and a few lack (a task's label; joint angles, where a
-    feature calls for them) is not taken from the others: the few are left out, by name.
+    "alike", each of its contacts is a trial with these labels. Where it is a list of labels, they
+    belong to the contacts in their order. Recordings that lack a label, or joint angles that a
+    feature needs, are left out and named in `left_out`, if most recordings have it.
 
     Args:
         data: recordings, or `.npz` files and folders of them.
         threshold: counts above which a taxel is in contact; the first recording's where None.
-            One for all, as the board cannot know which object it touches.
+            All share it, as the board does not know which object it touches.
         onset: counts above which a contact begins; scaled with the threshold where None.
-        tracking: how contacts begin and end.
         horizon_s: seconds from onset that are kept of each contact.
-        features: what is measured on each contact (see `edge.touch.measures`).
-        arm: of recordings with joint angles that name none.
+        features: names of the features measured (see `edge.touch.measures`).
+        arm: for recordings with joint angles that name no arm.
         progress: show progress bars on stderr.
 
     Raises:
@@ -247,18 +245,18 @@ def load_trials(
     kept = [(r, p) for r, p in zip(raw.recordings, raw.paths, strict=True) if p not in out]
     arms = [arm_of(recording, str(path), arm) for recording, path in kept]
     kept = [
-        (recording if of is None else recording.for_joints(of.names), path)
-        for (recording, path), of in zip(kept, arms, strict=True)
+        (recording if own is None else recording.for_joints(own.names), path)
+        for (recording, path), own in zip(kept, arms, strict=True)
     ]
     moving = any(feature.moves for feature in types) and None not in arms
     chain = arms[0] if moving else None
     if chain is not None:
-        for other, (_, path) in zip(arms, kept, strict=True):
-            if other is not None and other.to_dict() != chain.to_dict():
+        for own, (_, path) in zip(arms, kept, strict=True):
+            if own is not None and own.to_dict() != chain.to_dict():
                 raise InputError(f"{path}: its arm is not that of {kept[0][1]}; train on one arm")
     joints = _joint_angles(kept) if needed else 0
     names = tuple(feature.name for feature in types)
-    settings = tracking or TrackSettings()
+    settings = TrackSettings()
     trials: list[Trial] = []
     untouched: list[tuple[Path, dict[str, str]]] = []
     unused: list[Path] = []
@@ -272,16 +270,16 @@ def load_trials(
                 features=names,
                 joints=joints,
             )
-            found = contacts(recording, tracker)
-            labels = labels_of(recording, len(found))
+            touches = contacts(recording, tracker)
+            labels = labels_of(recording, len(touches))
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
-        if not found:
+        if not touches:
             untouched.append((path, recording.labels))
-        if len(found) > len(labels):
+        if len(touches) > len(labels):
             unused.append(path)
         trials += [
-            Trial(path, recording, own, *one) for own, one in zip(labels, found, strict=False)
+            Trial(path, recording, own, *touch) for own, touch in zip(labels, touches, strict=False)
         ]
     if not trials:
         raise InputError(
@@ -305,36 +303,36 @@ def load_trials(
 
 def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> list[tuple[float, FeatureSeries]]:
     """Onset in seconds and series of every contact of a recording, in their order."""
-    found: dict[int, Contact] = {}
+    followed: dict[int, Contact] = {}
     for frame in frames:
-        found |= {id(contact): contact for contact in tracker.push(frame)}
-    return [(contact.onset_s, contact.series()) for contact in found.values()]
+        followed |= {id(contact): contact for contact in tracker.push(frame)}
+    return [(contact.onset_s, contact.series()) for contact in followed.values()]
 
 
 def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
-    """The labels of a recording's contacts, of which it has `count`: those that are trials."""
+    """The labels of those of a recording's `count` contacts that are trials."""
     each = recording.meta.get("contacts")
     if each is None:
         return [recording.labels]
     if each == ALIKE:
         return [recording.labels] * count
-    if not isinstance(each, list) or not all(isinstance(one, dict) for one in each):
+    if not isinstance(each, list) or not all(isinstance(labels, dict) for labels in each):
         raise InputError(f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact')
     if len(each) != count:
         raise InputError(
-            f"meta.contacts labels {len(each)} contacts, {count} are found; mend the labels or "
+            f"meta.contacts labels {len(each)} contacts, {count} are found; correct the labels or "
             "the threshold"
         )
-    return [{**recording.labels, **{str(k): str(v) for k, v in one.items()}} for one in each]
+    return [{**recording.labels, **{str(k): str(v) for k, v in own.items()}} for own in each]
 
 
 def _each(recording: Recording) -> list[dict[str, str]]:
     each = recording.meta.get("contacts")
-    return [one for one in each if isinstance(one, dict)] if isinstance(each, list) else []
+    return [own for own in each if isinstance(own, dict)] if isinstance(each, list) else []
 
 
 def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None) -> SkinLayout:
-    """The skin with other thresholds, where they are given."""
+    """The skin with these thresholds; one that is None stays, or scales with the other."""
     if threshold is not None:
         ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1
         begin = round(threshold * ratio) if onset is None else onset
@@ -343,7 +341,7 @@ def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None
 
 
 def _lacking(raw: Recordings, joints: bool) -> tuple[tuple[str, ...], dict[str, tuple[Path, ...]]]:
-    """The tasks that most recordings have a label for, and what a few lack."""
+    """The tasks that most recordings have a label for, and the recordings that lack one."""
     labels = [set(r.labels).union(*_each(r)) for r in raw.recordings]
     keys = sorted(set().union(*labels))
     tasks = tuple(
@@ -353,18 +351,21 @@ def _lacking(raw: Recordings, joints: bool) -> tuple[tuple[str, ...], dict[str, 
         raise InputError(
             "the recordings share no label; give every one the same keys under meta.labels"
         )
-    both = list(zip(raw.paths, raw.recordings, labels, strict=True))
     lacking = {
-        f"a label for {task}": tuple(path for path, _, own in both if task not in own)
+        f"a label for {task}": tuple(
+            path for path, own in zip(raw.paths, labels, strict=True) if task not in own
+        )
         for task in tasks
     }
     if joints and raw.joints:
-        lacking["joint angles"] = tuple(path for path, r, _ in both if r.joints is None)
-    return tasks, {what: paths for what, paths in lacking.items() if paths}
+        lacking["joint angles"] = tuple(
+            path for path, r in zip(raw.paths, raw.recordings, strict=True) if r.joints is None
+        )
+    return tasks, {need: paths for need, paths in lacking.items() if paths}
 
 
 def _joint_angles(kept: Sequence[tuple[Recording, Path]]) -> int:
-    """How many every recording has."""
+    """The number of joint angles, the same for every recording."""
     counts = [0 if r.joints is None else r.joints.shape[1] for r, _ in kept]
     for count, (_, path) in zip(counts, kept, strict=True):
         if count == 0:

@@ -1,19 +1,20 @@
-"""The accuracy of a choice, by trials that took no part in it.
+"""Nested cross-validation: the accuracy of a choice, on trials that took no part in it.
 
-The trials are parted into folds. For each two folds every candidate is fitted on all others and
-tested on both, and for each fold on all others and tested on it. Seen from fold i, the tests on
-the other folds by fits without fold i are a whole cross-validation among those others: what it
-chooses was chosen without fold i, and the fit without fold i alone then decides fold i. Scaling,
-projection and neighbours are fitted on a fit's own trials each time, so a trial that is decided
-took no part in them, nor in the choice of the features, the projection, the shrinkage, the
-components and k: that is the nested accuracy. A fit without folds i and j serves both i and j, so
-ten folds take 55 fits, not 110.
+The trials are divided into folds. Every candidate is fitted without each fold and tested on it, and
+fitted without each two folds and tested on both. The tests of the fits without folds i and j, for
+one i and every j, are a cross-validation among the trials outside fold i. The candidate that is
+best there was chosen without fold i, and its fit without fold i answers fold i. Scaling,
+projection and neighbours are fitted on a fit's own trials. So no trial takes part in the fit that
+answers it, nor in the choice of features, projection, shrinkage, components and k: the share of
+right answers is the nested accuracy. A fit without folds i and j serves both i and j, so ten folds
+take 55 fits, not 110.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -21,8 +22,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from edge.commands.summary import wilson
 from edge.errors import InputError
+from edge.statistics import wilson
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of
@@ -31,7 +32,7 @@ from train.scaling import centred_and_scaled, widths_of
 
 FOLDS = 10
 SEED = 2012
-"""Of the folds: the same for the same labels."""
+"""Of the folds, so that they are the same for the same labels."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
@@ -47,10 +48,10 @@ class Result:
     Attributes:
         right: trials answered right.
         total: trials.
-        components: of the best cell of the grid, or of the cell most often chosen; 0 where no
-            grid was searched.
+        components: of the best settings, or of those most often chosen; 0 where there was no
+            choice.
         k: likewise.
-        said: (n,) what was said of each trial, or None.
+        said: (n,) the label answered for each trial, or None.
     """
 
     right: int
@@ -77,12 +78,12 @@ class SearchGrid:
     Attributes:
         scaling: one of `train.scaling.SCALINGS`.
         projection: one of `train.projection.KINDS`.
-        features: names of those taken; all where empty.
-        components: numbers of components, rising; `lda` takes all directions there are.
+        features: names of the features taken; all where empty.
+        components: numbers of components, rising; `lda` takes all its directions.
         shrinkages: of `lda`, the largest first.
         neighbours: values of k, rising.
         targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
-        tasks: those it is a candidate for; all where empty.
+        tasks: the tasks it is a candidate for; all where empty.
     """
 
     scaling: str = "none"
@@ -121,28 +122,29 @@ def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int6
 
 
 def group_folds(groups: NDArray[np.str_], count: int = 20) -> NDArray[np.int64]:
-    """(n,) folds that keep groups whole: a group each, or several where there are over `count`."""
+    """(n,) folds of entire groups: one group each, or several where there are over `count`."""
     names, members = np.unique(groups, return_inverse=True)
     order = np.random.default_rng(SEED).permutation(len(names))
     return np.asarray((order % count)[members], dtype=np.int64)
 
 
 def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(..., m, k) columns of the smallest of (..., m, n), nearest first, equal ones in their order.
+    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order.
 
     Which of several equal ones is the last of the k is left open.
     """
-    among = np.sort(np.argpartition(squares, k - 1, axis=-1)[..., :k], axis=-1)
-    order = np.argsort(np.take_along_axis(squares, among, axis=-1), axis=-1, kind="stable")
-    return np.take_along_axis(among, order, axis=-1)
+    places = np.sort(np.argpartition(squares, k - 1, axis=1)[:, :k], axis=1)
+    order = np.argsort(np.take_along_axis(squares, places, axis=1), axis=1, kind="stable")
+    return np.take_along_axis(places, order, axis=1)
 
 
-def _integers(
+def _rounded(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coordinates (n, c) and (m, c) in steps so coarse that `_squares` are exact.
+    """Coordinates (n, c) and (m, c) in whole steps, so coarse that `_squares` are exact.
 
-    The steps are 2^-22 of the largest coordinate, or finer: trials that are equal are equal still.
+    A step is 2^-22 of the largest coordinate, or a little more where c is above 128. Equal trials
+    stay equal, though a matrix product may round their coordinates differently.
     """
     columns = max(a.shape[1], 1)
     bits = (51 - (columns - 1).bit_length()) // 2
@@ -151,9 +153,12 @@ def _integers(
 
 
 def _squares(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, n) squared distances of rows a (m, c) to rows b (n, c) of `_integers`."""
-    lengths = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1)
-    return np.asarray(lengths - 2.0 * (a @ b.T))
+    """(m, n) squared distances of rows a (m, c) to rows b (n, c) of `_rounded`."""
+    products = a @ b.T
+    products *= -2.0
+    products += (a * a).sum(axis=1)[:, None]
+    products += (b * b).sum(axis=1)
+    return products
 
 
 def _neighbours(
@@ -168,25 +173,23 @@ def _neighbours(
 
     Args:
         new: (test, p) rows.
-        labels: (targets, n) of the trials of the spectrum; None of principal components.
+        labels: (targets, n) of the trials of the spectrum; None for principal components.
     """
     k = min(grid.neighbours[-1], len(spectrum.scores))
-    squares = []
-    if labels is None:
-        axes = spectrum.leading(grid.components[-1]).T
-        near, far = _integers(spectrum.rows @ axes, new @ axes)
-        so_far, done = np.zeros((len(far), len(near))), 0
-        for count in grid.components:
-            so_far = so_far + _squares(far[:, done:count], near[:, done:count])
-            done = count
-            squares.append(so_far)
-    else:
-        scores = spectrum.scores_of(new)
+    if labels is not None:
+        scores, places = spectrum.scores_of(new), []
         for shrinkage in grid.shrinkages:
-            directions = np.hstack([spectrum.directions(one, shrinkage) for one in labels])
-            near, far = _integers(spectrum.scores @ directions, scores @ directions)
-            squares.append(_squares(far, near))
-    return _nearest(np.stack(squares), k)
+            directions = np.hstack([spectrum.directions(target, shrinkage) for target in labels])
+            known, tested = _rounded(spectrum.scores @ directions, scores @ directions)
+            places.append(_nearest(_squares(tested, known), k))
+        return np.stack(places)
+    axes = spectrum.leading(grid.components[-1]).T
+    known, tested = _rounded(spectrum.rows @ axes, new @ axes)
+    squares, places = np.zeros((len(tested), len(known))), []
+    for first, last in pairwise((0, *grid.components)):
+        squares += _squares(tested[:, first:last], known[:, first:last])
+        places.append(_nearest(squares, k))
+    return np.stack(places)
 
 
 def _answers(
@@ -198,13 +201,13 @@ def _answers(
     features: Sequence[str],
     widths: Sequence[int],
 ) -> dict[str, NDArray[np.bool_]]:
-    """{task: (candidates, test)} whether each candidate, fitted on `train`, tells the tests."""
-    found: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
-    spectra: dict[tuple[str, tuple[str, ...]], tuple[Spectrum, NDArray[np.float64]]] = {}
+    """{task: (candidates, test)} whether each candidate, fitted on `train`, is right."""
+    answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
+    fitted_for = None
     with threadpool_limits(1):
         for grid in grids:
-            key = grid.scaling, grid.features
-            if key not in spectra:
+            if fitted_for != (grid.scaling, grid.features):
+                fitted_for = grid.scaling, grid.features
                 part = X[:, columns_of(grid.features, features, widths)]
                 taken = [i for i, f in enumerate(features) if f in (grid.features or features)]
                 mean, gain, known = centred_and_scaled(
@@ -213,8 +216,7 @@ def _answers(
                     [features[i] for i in taken],
                     [widths[i] for i in taken],
                 )
-                spectra = {key: (Spectrum(known), (part[test] - mean) * gain)}
-            spectrum, new = spectra[key]
+                spectrum, new = Spectrum(known), (part[test] - mean) * gain
             shared = _neighbours(spectrum, new, None, grid) if grid.projection == "pca" else None
             for task, labels in classes.items():
                 if grid.tasks and task not in grid.tasks:
@@ -224,10 +226,10 @@ def _answers(
                     targets = np.stack([classes[t][train] for t in grid.targets or (task,)])
                     near = _neighbours(spectrum, new, targets, grid)
                 right = votes_right(near, labels[train], labels[test])
-                pick = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
-                # A row a candidate: of each projection, each k.
-                found[task].append(right[..., pick].transpose(0, 2, 1).reshape(-1, len(test)))
-    return {task: np.concatenate(right) for task, right in found.items()}
+                places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
+                # One row for each candidate: for each projection, each k.
+                answers[task].append(right[..., places].transpose(0, 2, 1).reshape(-1, len(test)))
+    return {task: np.concatenate(right) for task, right in answers.items()}
 
 
 def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]) -> int:
@@ -236,13 +238,15 @@ def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]
 
 @dataclass(frozen=True)
 class AnswerTable:
-    """Every candidate's answers to every trial, by fits that had not seen it.
+    """Every candidate's answers to every trial, by fits without that trial.
+
+    `cost`, `allowed` and `margin` of its methods are those of `choose`.
 
     Attributes:
         folds: (n,) the fold of each trial.
         choices: {task: the candidates}.
         right: {task: (folds, candidates, n)} whether the fit without a fold, and without the
-            trial's own, tells the trial.
+            trial's own fold, answers the trial rightly.
     """
 
     folds: NDArray[np.int64]
@@ -258,65 +262,64 @@ class AnswerTable:
         self,
         task: str,
         cost: NDArray[np.int64] | None = None,
-        among: NDArray[np.int64] | None = None,
+        allowed: NDArray[np.int64] | None = None,
         margin: float = 0.0,
     ) -> int:
-        """The candidate chosen by all trials; see `choose`."""
-        return choose(self.held_out(task), cost, among, margin)
+        """The candidate chosen by all trials."""
+        return choose(self.held_out(task), cost, allowed, margin)
 
     def without(
         self,
         task: str,
         fold: int,
         cost: NDArray[np.int64] | None = None,
-        among: NDArray[np.int64] | None = None,
+        allowed: NDArray[np.int64] | None = None,
         margin: float = 0.0,
     ) -> int:
         """The candidate chosen without the trials of a fold."""
-        return choose(self.right[task][fold][:, self.folds != fold], cost, among, margin)
+        return choose(self.right[task][fold][:, self.folds != fold], cost, allowed, margin)
 
     def nested(
         self,
         task: str,
         cost: NDArray[np.int64] | None = None,
-        among: NDArray[np.int64] | None = None,
+        allowed: NDArray[np.int64] | None = None,
         margin: float = 0.0,
     ) -> Result:
-        """The accuracy of the choice itself; see `choose`."""
+        """The accuracy of the choice itself, with the numbers that it most often takes."""
         right, picked = 0, []
         for fold in range(int(self.folds.max()) + 1):
-            cell = self.without(task, fold, cost, among, margin)
-            right += int(self.right[task][fold][cell, self.folds == fold].sum())
-            picked.append(cell)
-        cell = int(np.bincount(picked).argmax())
-        choice = self.choices[task][cell]
-        return Result(right, len(self.folds), choice.components, choice.k)
+            candidate = self.without(task, fold, cost, allowed, margin)
+            right += int(self.right[task][fold][candidate, self.folds == fold].sum())
+            picked.append(candidate)
+        usual = self.choices[task][int(np.bincount(picked).argmax())]
+        return Result(right, len(self.folds), usual.components, usual.k)
 
 
 def choose(
     right: NDArray[np.bool_],
     cost: NDArray[np.int64] | None = None,
-    among: NDArray[np.int64] | None = None,
+    allowed: NDArray[np.int64] | None = None,
     margin: float = 0.0,
 ) -> int:
-    """The best candidate; or the best of the cheapest that are not worse by a standard error.
+    """The cheapest candidate within one standard error of the best in cross-validation.
 
-    The error is that of the difference to the best one on the same trials: two candidates that
-    err on the same trials are told apart more finely than by their accuracies' own errors.
+    The error is that of the difference to the best one on the same trials, which is smaller than
+    the errors of the two accuracies, as candidates often err on the same trials.
 
     Args:
         right: (candidates, n) answers of each.
-        cost: (candidates,) of each; of those of equal cost the best counts, of equally good ones
-            the first. Without it the best of all is taken.
-        among: the candidates to choose from; all where None.
-        margin: accuracy that is given up for less cost in any case.
+        cost: (candidates,) of each. At equal cost the most accurate counts, then the first.
+            Without costs the most accurate of all is taken.
+        allowed: the candidates to choose from; all where None.
+        margin: loss of accuracy that is accepted for less cost, whatever the standard error.
     """
-    candidates = np.arange(len(right)) if among is None else among
+    candidates = np.arange(len(right)) if allowed is None else allowed
     means = right[candidates].mean(axis=1)
     if cost is None:
         return int(candidates[means.argmax()])
-    costs = np.unique(cost[candidates])  # rising
-    best = np.array([np.where(cost[candidates] == one, means, -1.0).argmax() for one in costs])
+    prices = cost[candidates]
+    best = np.array([np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)])
     answers = right[candidates[best]].astype(np.int64)
     worse = answers[means[best].argmax()] - answers
     error = worse.std(axis=1) / np.sqrt(right.shape[1])
@@ -346,9 +349,9 @@ def evaluate(
         features: names of the types, in the order of X.
         widths: columns of each; equal where None.
         jobs: processes.
-        progress: what a bar on stderr is called; none without it.
-        nested: without it only the fits without each fold are made: `AnswerTable.held_out` is all
-            there is, by a fifth of the work.
+        progress: title of a progress bar on stderr; no bar where None.
+        nested: False makes the fits without each fold only, a fifth of the work. Of the table,
+            `AnswerTable.held_out` alone is then valid.
 
     Raises:
         InputError: there are fewer than three folds, or X is not finite.
@@ -386,8 +389,8 @@ def evaluate(
     right = {task: np.zeros((count, len(choices[task]), len(X)), dtype=bool) for task in classes}
     for (i, j), test, part in zip(pairs, tests, bar, strict=True):
         for task, answers in part.items():
-            # Seen from fold i these are answers to fold j, and the other way round.
-            for one, other in {(i, j), (j, i)}:
-                own = folds[test] == other
-                right[task][one][:, test[own]] = answers[:, own]
+            # For fold i these are answers to fold j, and the other way round.
+            for without, tested in {(i, j), (j, i)}:
+                own = folds[test] == tested
+                right[task][without][:, test[own]] = answers[:, own]
     return AnswerTable(folds, choices, right)

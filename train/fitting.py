@@ -1,4 +1,4 @@
-"""Recordings to a fitted model: the choice of what it is made of, and its honest accuracy."""
+"""Recordings to a fitted model: its settings are chosen, and their accuracy is measured."""
 
 from __future__ import annotations
 
@@ -15,45 +15,45 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
-from train.candidates import Candidate, candidates
-from train.choosing import LEAVE_OUT, Choosing, Chosen, without_folds
+from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, without_folds
 from train.crossval import jobs_here
 from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
 STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
-"""Between decision points: the shortest with which the weights stay below `LARGEST_BYTES`. 0.1 s
-decides 30 to 40 ms sooner than 0.2 s at the same error (cody18, household)."""
+"""Steps between decision points. The first one that keeps the weights below `LARGEST_BYTES` is
+taken. With 0.1 s decisions come 30 to 40 ms sooner than with 0.2 s, at the same error (cody18,
+household)."""
 FIRST_S = 0.2
 """The first decision point."""
 MOST_TRIALS = 2000
-"""Trials beyond which calibration takes minutes, and must be asked for."""
+"""With more trials calibration takes minutes, so decision points must be asked for."""
 LARGEST_BYTES = 950_000
-"""Most weights of a model below 1 MB with decision points that nobody asked for."""
+"""Bytes of weights with which a model stays below 1 MB."""
 LEAK = 0.5
-"""Share of the trials that do not have the most frequent label: where more of them are recognised
-before any contact, the data leak."""
+"""The data leak where the first frame recognises more than this share of the trials that do not
+have the most frequent label."""
 FEWEST_TRIALS = 3
 LONG_TOUCHES = 3.0
-"""Windows that half of the touches go on for, from which on longer ones are tried."""
+"""Longer windows are tried where half of the touches last so many windows."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A fitted model, with all that its file says of it.
+    """A fitted model, with everything that its file says about it.
 
     Attributes:
         dataset: the trials it was fitted on, with the features that it takes.
-        measured: the same with those of every candidate.
+        measured: the same trials with the features of every candidate.
         window_s: of the full decision.
         samples: values of a feature.
         X: (n, p) feature vectors at the full window.
-        chosen: {task: what it is fitted with}.
-        candidates: what was chosen among.
+        chosen: {task: its settings}.
+        candidates: the candidates that they were chosen among.
         classifier: at the full window.
         sequential: at all decision points, where it was calibrated.
-        notes: sentences on what a user should know.
+        notes: sentences that a user should read.
     """
 
     dataset: DataSet
@@ -90,9 +90,9 @@ def fit(
 ) -> Fitted:
     """Choose and fit every task of some recordings.
 
-    What is None is chosen per task among `train.candidates`: the features and projection of the
-    fewest weights that are not worse than the best by more than a standard error, on trials that
-    their fits had not seen, with the scaling, shrinkage, components and k that are best there.
+    Arguments you pass are held fixed. The others are chosen for each task among the candidates of
+    `train.choose`: the features and projection of the smallest model within one standard error of
+    the best in cross-validation, with the scaling, shrinkage, components and k that are best there.
 
     Args:
         data: recordings, folders of them, or a data set that was loaded for the features.
@@ -101,18 +101,18 @@ def fit(
         scaling: one of `train.scaling.SCALINGS`.
         components: principal components.
         k: neighbours.
-        window_s: seconds from onset; where None `WINDOW_S`, or two, four or eight times that where
-            touches last for long and it tells so much more (`Choosing.window`).
+        window_s: seconds from onset. Where None it is `WINDOW_S`, or two, four or eight times that
+            where touches last so long and accuracy rises enough (`Choosing.window`).
         samples: values of a feature.
         tasks: keys of the labels; all that the recordings share where None.
-        leave_out: label of which whole groups are left out to choose and to score a task, where
-            each of its classes has several of them; `trial` for none.
+        leave_out: label whose groups are left out to choose the settings of a task and to measure
+            its accuracy, where each of its classes has several groups; `trial` for single trials.
         decision_points_s: windows at which decisions are calibrated, rising, the last of them
-            `window_s`; empty for none; every 0.1 s, or 0.2 s, where None and the number of trials
-            and the size of the model allow it.
+            `window_s`; empty for none. Where None there is one every 0.1 s, or less often, if the
+            number of trials and the size of the model allow it.
         threshold: counts above which a taxel is in contact.
         onset: counts above which a contact begins.
-        arm: of recordings with joint angles that name none.
+        arm: for recordings with joint angles that name no arm.
         quick: fewer candidates and folds.
         jobs: processes; all cores where None.
         progress: show progress bars on stderr.
@@ -142,18 +142,17 @@ def fit(
             threshold=threshold,
             onset=onset,
             horizon_s=windows[-1],
-            features=expand([name for one in every for name in one.sets]),
+            features=expand([name for candidate in every for name in candidate.sets]),
             arm=arm,
             progress=progress,
         )
     y = {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
-    if len(dataset.trials) < FEWEST_TRIALS:
-        raise InputError(f"{len(dataset.trials)} trials are too few to fit; record more")
-    if k is not None and not 1 <= k <= len(dataset.trials) - 1:
-        raise InputError(
-            f"k must be 1 to {len(dataset.trials) - 1} with {len(dataset.trials)} trials, not {k}"
-        )
-    found = candidates(
+    n = len(dataset.trials)
+    if n < FEWEST_TRIALS:
+        raise InputError(f"{n} trials are too few to fit; record more")
+    if k is not None and not 1 <= k <= n - 1:
+        raise InputError(f"k must be 1 to {n - 1} with {n} trials, not {k}")
+    tried = candidates(
         y,
         joints=dataset.joints > 0,
         features=features,
@@ -163,17 +162,15 @@ def fit(
         k=k,
         quick=quick,
     )
-    choosing = Choosing(dataset, y, found, samples, leave_out, quick, jobs, progress)
-    lasting = [float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials]
-    windows = windows if len(windows) == 1 else _windows(lasting)
+    choosing = Choosing(dataset, y, tried, samples, leave_out, quick, jobs, progress)
+    if len(windows) > 1:
+        windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
     window_s, notes = choosing.window(windows)
     chosen, trials = choosing.choose(window_s)
+    choices = {task: settings.choice for task, settings in chosen.items()}
     measured = dataset
-    dataset = dataset.of([name for one in chosen.values() for name in one.choice.features])
-    names = dataset.names
+    dataset = measured.of([name for choice in choices.values() for name in choice.features])
     X = dataset.features(window_s, samples)
-    widths = dataset.widths(samples)
-    choices = {task: one.choice for task, one in chosen.items()}
     notes += _leaks(measured, y)
     points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes)
     sequential = None
@@ -187,18 +184,18 @@ def fit(
         ).fit(at_points, y, trials.folds, without)
         classifier = sequential.decision_points_[-1]
     else:
-        classifier = ContactClassifier(choices, names, widths).fit(X, y)
+        classifier = ContactClassifier(choices, dataset.names, dataset.widths(samples)).fit(X, y)
     return Fitted(
-        dataset,
-        measured,
-        window_s,
-        samples,
-        X,
-        chosen,
-        tuple(found),
-        classifier,
-        sequential,
-        tuple(notes),
+        dataset=dataset,
+        measured=measured,
+        window_s=window_s,
+        samples=samples,
+        X=X,
+        chosen=chosen,
+        candidates=tuple(tried),
+        classifier=classifier,
+        sequential=sequential,
+        notes=tuple(notes),
     )
 
 
@@ -214,7 +211,7 @@ def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
-    """The windows to try for touches that last for so many seconds each."""
+    """The windows to try for touches that last so many seconds each."""
     median = float(np.median(seconds))
     if median < LONG_TOUCHES * WINDOW_S:
         return (WINDOW_S,)
@@ -222,19 +219,26 @@ def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
 
 
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
-    """Sentences on what tells labels before anything is touched: then the recording tells them."""
-    first = [trial.recording.frames[0].reshape(-1) for trial in dataset.trials]
-    X = np.stack(first).astype(np.float64)
+    """Warnings where the first frame tells labels, or where most recordings begin in contact."""
+    untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
+    if 2 * untouched.sum() < len(untouched):
+        return [
+            f"warning: {(~untouched).mean():.0%} of the touches begin with their recording, so "
+            "their onset is not known; record from before the touch, or raise the threshold "
+            "(`python -m train thresholds` proposes one)"
+        ]
+    X = np.stack([t.recording.frames[0].reshape(-1) for t in dataset.trials])[untouched]
     squares = cdist(X, X, "sqeuclidean")
     np.fill_diagonal(squares, np.inf)
     notes = []
-    for task, labels in y.items():
+    for task, every in y.items():
+        labels = every[untouched]
         share = float((labels[squares.argmin(axis=1)] == labels).mean())
         usual = float(np.unique(labels, return_counts=True)[1].max() / len(labels))
         if share > usual + LEAK * (1.0 - usual):
             notes.append(
                 f"warning: the first frame alone tells {task} in {share:.0%} of the trials, before "
-                "anything is felt: the accuracy holds only where the same is so; "
+                "anything is touched. The accuracy holds only where this is so in use too; "
                 "`python -m train import --zero` subtracts the first frames"
             )
     return notes
@@ -266,7 +270,7 @@ def _decision_points(
         each += c * (4 * columns + 8 * n)
     points: list[float] = []
     for every in STEPS_S:
-        # As many of a long window as of the usual one.
+        # A long window has as many decision points as the usual one.
         step = every * max(window_s / WINDOW_S, 1.0)
         rising = (round(max(FIRST_S, step) + i * step, 6) for i in itertools.count())
         points = [*itertools.takewhile(lambda s: s < window_s, rising), window_s]

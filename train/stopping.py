@@ -1,37 +1,38 @@
 """Deciding as soon as it is sure: calibrated confidence, and rules certified by learn-then-test.
 
-A model is asked at several decision points, each with a window, a projection and training rows of
-its own. Three things are made here from trials that the models asked about them had not seen: the
-trials are parted into folds, and each fold is decided by a model that was fitted, and whose
-features, projection and neighbours were chosen, without it.
+A model decides at several decision points, each with a window, a projection and training rows of
+its own. Confidence, rules and novelty limits are made from trials that the deciding model did not
+see: the trials are divided into folds, and each fold is decided by a model that was fitted, and
+whose settings were chosen, without it.
 
-**Confidence.** How much nearer the training trials of the label that is named lie than those of any
-other (`edge.model.stopping.margin`) is turned into the probability that it is right by logistic
-regression at each decision point (Platt, Probabilistic outputs for support vector machines, 1999).
-A label's distance is that of its nearest twentieth (`train.pipeline.label_distances`), so that it
-is the same for the folds' models, which have fewer trials, as for the exported one.
+**Confidence.** The margin says how much nearer the training trials of the named label lie than
+those of any other (`edge.model.stopping.margin`). Logistic regression at each decision point turns
+it into the probability that the label is right (Platt, Probabilistic outputs for support vector
+machines, 1999). A label's distance is that of its nearest twentieth
+(`train.pipeline.label_distances`). So it is the same for the folds' models, which have fewer
+trials, as for the exported one.
 
 **Rules.** A rule decides at the first decision point whose confidence reaches a threshold, or
 always at one window. Its error rate is bounded by learn-then-test (Angelopoulos, Bates, Candès,
-Jordan and Lei, 2021): the hypothesis that a rule errs more often than `error` is rejected by the
+Jordan and Lei, 2021). The hypothesis that a rule errs more often than `error` is rejected by the
 exact binomial test on the calibration trials, at a level of `TEST_SHARE` times `RISK`. The first
-hypothesis is that of the full window. Where it is rejected its level passes in equal parts to the
-two families, and each family is walked from the most careful rule to the boldest until a test fails
-(fixed-sequence testing within a graph: Bretz, Maurer, Brannath and Posch, 2009). As each family's
-tests are monotone in `error`, a rule's certified error is the largest upper confidence limit met on
-the way to it, and one table of rules serves every `error`. The confidences that a fold's rules are
-tested with come from a logistic regression on the other folds.
+hypothesis is that of the full window. If it is rejected, its level passes in equal parts to the two
+families of rules. Each family is walked from the most careful rule to the boldest until a test
+fails (fixed-sequence testing within a graph: Bretz, Maurer, Brannath and Posch, 2009). The tests
+are monotone in `error`. So a rule's certified error is the largest upper confidence limit met on
+the way to it, and one table of rules serves every `error`. The confidences for the tests of a
+fold's trials come from a logistic regression on the other folds.
 
-Errors are wrong labels; of the task with most labels, which names nothing where a touch is unlike
-all that was trained on, also each `unknown` for what was trained, at `NOVELTY_RATE`. The limits
-that a fold's distances are held against are those of the other folds.
+An error is a wrong label. For the task with most labels, which names nothing when a touch is
+unlike the training data, an `unknown` for a trained object at `NOVELTY_RATE` is an error too. The
+limits for a fold's distances are those of the other folds.
 
-The tests are exact for the average of the folds' models. The exported one is fitted on all trials,
-of which these lack a tenth (or a fifth), with a choice of its own: it errs a little less often on
-average, but now more and now less. On 200 data sets of 140 trials the two differ by a quarter to a
-third more than the binomial distribution alone explains, which is why the tests take half of the
-risk: at the whole of it the smallest error that is certified was exceeded in 14 to 22 sets of a
-hundred, not in ten. `make risk` counts it.
+The tests are exact for the average of the folds' models. The exported model is fitted on all
+trials, a tenth (or a fifth) more, with its own choice of settings. On average it errs a little less
+often, in a single case more or less often. On 200 data sets of 140 trials the two differ by a
+quarter to a third more than the binomial distribution explains. With the full risk for the tests,
+the smallest certified error was exceeded in 14 to 22 of 100 sets instead of ten, so they take half
+of it. `make risk` counts it.
 """
 
 from __future__ import annotations
@@ -55,29 +56,29 @@ from train.scaling import widths_of
 FOLDS = 10
 FEWER_FOLDS = 5
 MANY_TRIALS = 400
-"""From so many trials on `FEWER_FOLDS` are enough: four fifths of them are plenty to fit."""
+"""With so many trials `FEWER_FOLDS` are enough, as four fifths of the trials fit a good model."""
 FEWEST = 20
-"""Trials below which there is nothing to calibrate with."""
+"""Trials that calibration needs."""
 RISK = 0.1
-"""Probability with which a certificate may be wrong."""
+"""Probability that a certificate is wrong."""
 THRESHOLDS = np.round(expit(np.arange(8.0, -1.05, -0.1)), 4)
-"""Confidences that rules stop at, evenly in the logarithm of their odds."""
+"""Confidences at which rules stop, evenly spaced in the logarithm of their odds."""
 NEVER = 2.0
-"""A confidence that is not reached."""
+"""A confidence that is never reached."""
 PULL = 0.5
-"""Weight of the prior that pulls a logistic regression towards 1 a standard deviation."""
+"""Weight of the prior of a logistic regression, a slope of 1 a standard deviation."""
 LEAST_SLOPE = 1e-3
-"""A standard deviation: a larger margin never speaks against a label."""
+"""Smallest slope a standard deviation: a larger margin never makes a label less likely."""
 NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """One task's answers to trials that the answering models had not seen.
+    """One task's answers to trials by models fitted without them.
 
     Attributes:
-        right: (decision points, n) whether the labels named are right.
-        margins: (decision points, n) evidence for them.
+        right: (decision points, n) whether the named labels are right.
+        margins: (decision points, n) their margins.
         distances: (decision points, n) to the nearest training trial.
     """
 
@@ -96,9 +97,9 @@ def answers(
         rows = np.argsort(squares, axis=1, kind="stable")[:, : model.choices[task].k]
         classes = len(model.classes_[task])
         named, _ = vote(model.labels_[task][rows], classes)
-        apart = label_distances(squares, model.labels_[task], classes)
+        to_labels = label_distances(squares, model.labels_[task], classes).tolist()
         labels.append(model.classes_[task][named])
-        margins.append([margin(d, int(c)) for d, c in zip(apart.tolist(), named, strict=True)])
+        margins.append([margin(d, int(c)) for d, c in zip(to_labels, named, strict=True)])
         distances.append(np.sqrt(squares.min(axis=1)))
     return np.array(labels), np.array(margins), np.array(distances)
 
@@ -108,24 +109,24 @@ def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[fl
     middle, spread = float(margins.mean()), float(margins.std()) or 1.0
     columns = np.stack([(margins - middle) / spread, np.ones_like(margins)], axis=1)
     prior = np.array([1.0, 0.0])
-    found = prior.copy()
+    solution = prior.copy()
     for _ in range(50):
-        p = expit(columns @ found)
-        gradient = columns.T @ (p - right) + PULL * (found - prior)
+        p = expit(columns @ solution)
+        gradient = columns.T @ (p - right) + PULL * (solution - prior)
         hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + PULL * np.eye(2)
         step = np.linalg.solve(hessian, gradient)
         step *= min(1.0, 2.0 / np.abs(step).max(initial=2.0))
-        found -= step
+        solution -= step
         if np.abs(step).max() < 1e-10:
             break
-    slope = max(float(found[0]), LEAST_SLOPE) / spread
-    return slope, float(found[1]) - slope * middle
+    slope = max(float(solution[0]), LEAST_SLOPE) / spread
+    return slope, float(solution[1]) - slope * middle
 
 
 def confidences(
     slopes: Sequence[float], intercepts: Sequence[float], margins: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(points, m) probabilities that what has these margins (points, m) is right."""
+    """(points, m) probabilities that labels with these margins (points, m) are right."""
     return np.asarray(expit(np.array(slopes)[:, None] * margins + np.array(intercepts)[:, None]))
 
 
@@ -155,7 +156,7 @@ def certify(
     seconds: NDArray[np.float64],
     level: float = TEST_SHARE * RISK,
 ) -> list[StoppingRule]:
-    """The rules that no other beats in certified error and mean time both, the safest first.
+    """The rules that no other rule beats in both certified error and mean time, the safest first.
 
     Args:
         confidence: (points, n) that the labels are right.
@@ -164,23 +165,21 @@ def certify(
         level: of the tests; see the module.
     """
     n = wrong.shape[1]
-    every = np.arange(n)
 
-    def tested(rule: StoppingRule, level: float, least: float) -> StoppingRule:
+    def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:
         at = stops(confidence, rule)
-        limit = upper_limit(int(wrong[at, every].sum()), n, level)
+        limit = upper_limit(int(wrong[at, np.arange(n)].sum()), n, level)
         mean = float(seconds[at].mean())
-        return StoppingRule(max(limit, least), mean, rule.confidence, rule.last)
+        return StoppingRule(max(limit, before), mean, rule.confidence, rule.last)
 
     full, families = candidates(len(seconds))
     passed = [tested(full, level, 0.0)]
     for family in families:
-        least = passed[0].error
+        before = passed[0].error
         for rule in family:
-            found = tested(rule, level / len(families), least)
-            least = found.error
-            passed.append(found)
-    # Of equal ones the fixed window, which needs no confidence, comes first.
+            passed.append(tested(rule, level / len(families), before))
+            before = passed[-1].error
+    # Among equal rules the fixed window comes first, as it needs no confidence.
     passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))
     kept: list[StoppingRule] = []
     for rule in passed:
@@ -196,22 +195,22 @@ def novelty(task: str, distances: NDArray[np.float64]) -> Novelty:
 
 
 def withheld(novelty: Novelty, task: str, distances: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where a task names nothing: `unknown`, for its own nearest distances (points, n)."""
-    found = [
+    """(points, n) whether a task names nothing (`unknown`), from its nearest distances."""
+    unknown = [
         [novelty.withholds(task, novelty.rate(point, distance)) for distance in row]
         for point, row in enumerate(distances.tolist())
     ]
-    return np.array(found, dtype=bool)
+    return np.array(unknown, dtype=bool)
 
 
-def folds_of(n: int, seed: int) -> NDArray[np.int64]:
-    """(n,) the calibration fold of each trial, at random."""
-    stream = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0x666F6C64,)))
+def folds_of(n: int) -> NDArray[np.int64]:
+    """(n,) the calibration fold of each trial, at random; the same for the same n."""
+    stream = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0x666F6C64,)))
     return np.asarray(stream.permutation(n) % (FOLDS if n < MANY_TRIALS else FEWER_FOLDS))
 
 
 def finest(y: Mapping[str, NDArray[np.str_]]) -> str:
-    """The task with most labels, of equal ones the first by name."""
+    """The task with most labels, or the first of several by name."""
     return max(sorted(y), key=lambda task: len(set(y[task].tolist())))
 
 
@@ -221,9 +220,8 @@ class SequentialClassifier:
     Args:
         choices: {task: Choice}, the same at every decision point.
         decision_points_s: windows in seconds, increasing; the last is the full window.
-        features: names of the feature types, in the order of the vectors; those that no task takes
-            are there for the folds to choose.
-        seed: of the folds, where none are given.
+        features: names of the feature types, in the order of the vectors; features that `choices`
+            do not take are there for the choices of the folds.
         jobs: processes.
         widths: columns of each feature type; equal where None.
 
@@ -240,14 +238,12 @@ class SequentialClassifier:
         choices: Mapping[str, Choice],
         decision_points_s: Sequence[float],
         features: Sequence[str] = FEATURES,
-        seed: int = 0,
         jobs: int = 1,
         widths: Sequence[int] | None = None,
     ) -> None:
         self.choices = choices
         self.decision_points_s = tuple(decision_points_s)
         self.features = features
-        self.seed = seed
         self.jobs = jobs
         self.widths = widths
 
@@ -264,8 +260,8 @@ class SequentialClassifier:
             X: (decision points, n, p).
             y: {task: (n,) labels}.
             folds: (n,) from 0; `folds_of` where None.
-            fold_choices: [fold]{task: Choice}, chosen without the fold's trials; without them
-                `choices` serves every fold, which is exact where nothing was chosen by the trials.
+            fold_choices: [fold]{task: Choice}, chosen without the fold's trials. Where None,
+                `choices` serve every fold; this is exact if they were not chosen by these trials.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
@@ -277,7 +273,7 @@ class SequentialClassifier:
                 "without decision points"
             )
         if folds is None:
-            folds = folds_of(n, self.seed)
+            folds = folds_of(n)
         count = int(folds.max()) + 1
         chosen = [self.choices] * count if fold_choices is None else fold_choices
         kept = _taken(self.choices.values(), self.features)
@@ -330,9 +326,9 @@ class SequentialClassifier:
 
 
 def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
-    """The features that some task takes, in their order."""
-    each = [set(choice.features or features) for choice in choices]
-    return [name for name in features if any(name in own for own in each)]
+    """The features that some choice takes, in their order."""
+    taken = set().union(*(choice.features or features for choice in choices))
+    return [name for name in features if name in taken]
 
 
 def _models(
@@ -342,7 +338,7 @@ def _models(
     features: Sequence[str],
     widths: Sequence[int] | None,
 ) -> list[ContactClassifier]:
-    # Decompositions this small are slower on several threads, and far slower where those wait.
+    # Decompositions this small are slower on several threads than on one.
     with threadpool_limits(1):
         return [ContactClassifier(choices, features, widths).fit(x, y) for x in X]
 

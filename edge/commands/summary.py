@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from edge.classifier import AS_TRAINED
 from edge.errors import printable
 from edge.model.info import Task
+from edge.statistics import wilson
 
 UNDECIDED = "(none)"
 """The column of trials without a decision."""
@@ -77,14 +77,3 @@ def _matrix(pairs: Counter[tuple[str, str]]) -> str:
         + "".join(f"  {cell:>{max(len(h), 3)}}" for cell, h in zip(cells, heads, strict=True))
         for name, cells in zip(["", *names], [heads, *rows], strict=True)
     )
-
-
-def wilson(right: int, total: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Wilson's score interval of a proportion (95 % by default).
-
-    Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212.
-    """
-    p, zz = right / total, z * z / total
-    centre = (p + zz / 2) / (1 + zz)
-    half = z / (1 + zz) * math.sqrt(p * (1 - p) / total + zz / (4 * total))
-    return max(0.0, centre - half), min(1.0, centre + half)

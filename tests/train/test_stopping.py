@@ -146,7 +146,7 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
     X, labels = touches(60)
-    folds = folds_of(60, 0)
+    folds = folds_of(60)
     # A projection of no component that tells: the fold it serves is guessed.
     worse = X.copy()
     worse[:, :, 0] = 0.0
@@ -199,7 +199,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     """The folds may choose what the model does not: its own vectors are the narrower ones."""
     X, labels = touches(60)
     names = ("max_force", "contact_area")
-    folds = folds_of(60, 0)
+    folds = folds_of(60)
     count = int(folds.max()) + 1
     blind = {"t": Choice("none", 3, 3, features=names[1:])}
     seeing = {"t": Choice("none", 3, 3, features=names[:1])}

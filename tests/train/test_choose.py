@@ -1,0 +1,109 @@
+"""The candidates, their order of cost, and the choice of the window."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import train
+from edge.recording import save
+from edge.touch.feature_sets import expand
+from train.choose import PLAIN, WITH_JOINTS, candidates, costs, groupable, products
+from train.pipeline import Choice
+
+TASKS = {
+    "category": np.array(["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]),
+    "mobility": np.array(["fixed", "movable", "fixed", "movable"]),
+    "object": np.array(["wall", "box", "pillow", "ball"]),
+    "softness": np.array(["rigid", "rigid", "soft", "soft"]),
+}
+
+
+def test_a_task_is_the_product_of_two_others_where_their_labels_say_so():
+    assert products(TASKS)["category"] == ("mobility", "softness")
+    assert "mobility" not in products(TASKS)
+    assert products({task: TASKS[task] for task in ("category", "mobility")}) == {}
+
+
+def test_features_of_joints_are_candidates_where_recordings_have_them():
+    assert {one.sets for one in candidates(TASKS)} == set(PLAIN)
+    assert {one.sets for one in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
+    assert len(candidates(TASKS, joints=True, quick=True)) == 3
+
+
+def test_arguments_you_pass_are_held_fixed():
+    (candidate,) = candidates(
+        TASKS, features=["paper"], projection="pca", scaling="V", components=3, k=2
+    )
+    (grid,) = candidate.grids
+    settings = candidate.name, grid.scaling, grid.components, grid.neighbours
+    assert settings == ("paper", "V", (3,), (2,))
+    assert grid.features == expand(["paper"])
+
+
+def test_whole_objects_can_be_left_out_where_each_class_has_several():
+    objects = np.array(list("aabbccddeeff"))
+    assert groupable(np.repeat(["x", "y"], 6), objects)
+    assert not groupable(np.repeat(["x", "y"], [8, 4]), objects)
+    assert not groupable(np.full(12, "x"), objects)
+
+
+def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
+    choices = [
+        Choice("IV", 3, 1, "lda", 0.1, ("a", "b")),
+        Choice("IV", 3, 5, "lda", 1.0, ("a", "b")),
+        Choice("IV", 3, 1, "lda", 0.1, ("a",)),
+        Choice("I", 2, 1, "pca", 0.1, ("a",)),
+        Choice("IV", 20, 1, "pca", 0.1, ("a",)),
+    ]
+    assert costs(choices, {"a": 10, "b": 11}).tolist() == [1, 1, 0, 2, 2]
+
+
+def test_of_equally_many_weights_those_listed_first_are_cheaper():
+    choices = [Choice("IV", 1, 1, "lda", features=(name,)) for name in ("b", "a", "c")]
+    assert costs(choices, {"a": 5, "b": 5, "c": 4}).tolist() == [1, 2, 0]
+
+
+FEW = {"features": ["max_force"], "projection": "pca", "scaling": "none", "k": 1, "jobs": 1}
+
+
+def touches(make_touch, folder, seconds, late_s):
+    """Touches of two kinds that differ from `late_s` after onset on."""
+    for seed in range(20):
+        one = make_touch(seed=seed, seconds=seconds, arm=False, rate=25.0)
+        frames = np.minimum(one.frames, 700)
+        frames[one.t > 0.2 + late_s] //= 1 + seed % 2
+        meta = {**one.meta, "labels": {"kind": "ab"[seed % 2]}}
+        save(folder / f"{seed}.npz", replace(one, frames=frames, meta=meta))
+    return str(folder)
+
+
+def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(make_touch, tmp_path):
+    late = touches(make_touch, tmp_path / "late", 6.0, 1.8)
+    fitted = train.fit(late, **FEW)
+    assert fitted.window_s == 2.4
+    assert fitted.chosen["kind"].accuracy.accuracy == 1.0
+    (note,) = [note for note in fitted.notes if "the window is" in note]
+    assert "the window is 2.4 s" in note
+    assert "100% at 2.4 s, 100% at 4.8 s" in note
+    early = train.fit(touches(make_touch, tmp_path / "early", 6.0, 0.4), **FEW)
+    assert early.window_s == 1.2
+
+
+@pytest.mark.parametrize("given", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}])
+def test_a_window_that_is_given_is_kept(given, make_touch, tmp_path):
+    fitted = train.fit(touches(make_touch, tmp_path, 4.0, 1.8), **FEW, **given)
+    assert fitted.window_s == 1.2
+    assert not any("the window is" in note for note in fitted.notes)
+
+
+def test_touches_that_last_little_longer_than_the_window_are_told_in_it(make_touch, tmp_path):
+    assert train.fit(touches(make_touch, tmp_path, 3.0, 1.8), **FEW).window_s == 1.2
+
+
+def test_decision_points_of_a_long_window_are_as_many_as_of_the_usual_one(make_touch, tmp_path):
+    fitted = train.fit(touches(make_touch, tmp_path, 6.0, 1.8), **FEW)
+    assert fitted.sequential is not None
+    points = fitted.sequential.decision_points_s
+    assert points[-1] == 2.4
+    assert len(points) <= 12
