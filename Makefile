@@ -202,6 +202,9 @@ wheel: $(READY)
 wheel-test: wheel
 	$(BIN)/python -m pytest board/test_wheel.py
 
+kernel-test: $(READY)
+	$(BIN)/python -m pytest board/test_kernel.py -rs --capture=tee-sys
+
 board-test: wheel
 	$(BIN)/python -m pytest board/test_aarch64.py -rs --capture=tee-sys
 

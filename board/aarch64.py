@@ -11,13 +11,13 @@ proves wheels and numbers; of time it proves nothing.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable, Sequence
 from pathlib import Path
+
+from debian import Unavailable, once, output, run, unpack
 
 HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parent
@@ -44,19 +44,6 @@ Model\t\t: Raspberry Pi 4 Model B Rev 1.4
 """
 """ONNX Runtime reads /proc/cpuinfo, and crashes on that of another architecture."""
 
-APT = """\
-APT::Architecture "{architecture}";
-APT::Architectures {{ "{architecture}"; }};
-APT::Sandbox::User "";
-APT::Install-Recommends "false";
-Acquire::Languages "none";
-Debug::NoLocking "true";
-Dir::State "{folder}";
-Dir::State::status "{folder}/status";
-Dir::Cache "{folder}";
-"""
-"""An apt of its own: another architecture, nothing installed, no lock, no root."""
-
 WRAPPER = """\
 #!/bin/sh
 # QEMU_COUNT names a file: instructions executed are then counted into it (see count.c).
@@ -66,10 +53,6 @@ exec '{loader}' --library-path '{libraries}' '{emulator}' \\
   -E PYTHONPATH="{folder}/wheel:{folder}/site${{PYTHONPATH:+:$PYTHONPATH}}" -E PYTHONNOUSERSITE=1 \\
   -E PYTHONDONTWRITEBYTECODE=1 '{python}' "$@"
 """
-
-
-class Unavailable(Exception):
-    """What this machine lacks to build the root, as a sentence."""
 
 
 def build(wheel: Path, folder: Path = FOLDER) -> Path:
@@ -83,9 +66,9 @@ def build(wheel: Path, folder: Path = FOLDER) -> Path:
             raise Unavailable(f"{tool} is not on this machine; use a Debian or Ubuntu one")
     folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    native = _output(["dpkg", "--print-architecture"])
-    _once(folder / "qemu", "\n".join(EMULATOR), lambda at: _debian(at, native, EMULATOR))
-    _once(folder / "root", "\n".join(SYSTEM) + CPUINFO, _root)
+    native = output(["dpkg", "--print-architecture"])
+    once(folder / "qemu", "\n".join(EMULATOR), lambda at: unpack(at, native, EMULATOR))
+    once(folder / "root", "\n".join(SYSTEM) + CPUINFO, _root)
     python = max(
         (folder / "root" / "usr" / "bin").glob("python3.[0-9]*"),
         key=lambda path: int(path.name.removeprefix("python3.")),
@@ -93,52 +76,17 @@ def build(wheel: Path, folder: Path = FOLDER) -> Path:
     version = python.name.removeprefix("python")
     constraints = CHECKOUT / "constraints.txt"
     wanted = "\n".join([version, *BOARD, *TESTING, constraints.read_text()])
-    _once(folder / "site", wanted, lambda at: _site(at, version, constraints))
+    once(folder / "site", wanted, lambda at: _site(at, version, constraints))
     shutil.rmtree(folder / "wheel", ignore_errors=True)
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "wheel")
     source = HERE / "count.c"
-    _run(["cc", "-O2", "-Wall", "-shared", "-fPIC", "-o", str(folder / "count.so"), str(source)])
+    run(["cc", "-O2", "-Wall", "-shared", "-fPIC", "-o", str(folder / "count.so"), str(source)])
     return _wrapper(folder, python)
 
 
-def _once(target: Path, wanted: str, make: Callable[[Path], None]) -> None:
-    """Make a folder unless what is there was made from the same; half-made ones do not stay."""
-    stamp = target / ".made-from"
-    digest = hashlib.sha256(wanted.encode()).hexdigest()
-    if stamp.is_file() and stamp.read_text() == digest:
-        return
-    fresh = target.with_name(target.name + ".new")
-    for old in (fresh, target):
-        shutil.rmtree(old, ignore_errors=True)
-    make(fresh)
-    (fresh / ".made-from").write_text(digest)
-    fresh.rename(target)
-
-
-def _debian(target: Path, architecture: str, packages: Sequence[str]) -> None:
-    """Unpack packages and all that they need, without their installation scripts."""
-    apt = target.with_name(target.name + ".apt")
-    shutil.rmtree(apt, ignore_errors=True)
-    for part in ("lists/partial", "archives/partial"):
-        (apt / part).mkdir(parents=True)
-    (apt / "status").touch()
-    config = apt / "apt.conf"
-    config.write_text(APT.format(architecture=architecture, folder=apt))
-    hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
-    for command in (["update"], ["install", "--download-only", "--yes", *packages]):
-        _run(["env", f"APT_CONFIG={config}", "apt-get", "--quiet", *command], hint)
-    archives = sorted((apt / "archives").glob("*.deb"))
-    if not archives:
-        raise Unavailable(f"{hint}: nothing came")
-    target.mkdir(parents=True)
-    for archive in archives:
-        _run(["dpkg", "--extract", str(archive), str(target)])
-    shutil.rmtree(apt)
-
-
 def _root(target: Path) -> None:
-    _debian(target, "arm64", SYSTEM)
+    unpack(target, "arm64", SYSTEM)
     (target / "proc").mkdir(exist_ok=True)
     (target / "proc" / "cpuinfo").write_text(CPUINFO)
 
@@ -148,7 +96,7 @@ def _site(target: Path, version: str, constraints: Path) -> None:
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     into = ["--target", str(target), "--only-binary=:all:", "--implementation=cp"]
     into += [*tags, "--python-version", version, "-c", str(constraints)]
-    _run([*pip, *into, *BOARD, *TESTING], "pip cannot fetch the aarch64 wheels")
+    run([*pip, *into, *BOARD, *TESTING], "pip cannot fetch the aarch64 wheels")
 
 
 def _wrapper(folder: Path, python: Path) -> Path:
@@ -172,23 +120,12 @@ def _wrapper(folder: Path, python: Path) -> Path:
     )
     wrapper.chmod(0o755)
     try:
-        machine = _output([str(wrapper), "-c", "import os; print(os.uname().machine)"])
+        machine = output([str(wrapper), "-c", "import os; print(os.uname().machine)"])
     except (OSError, subprocess.CalledProcessError) as error:
         raise Unavailable(f"qemu does not run here: {error}") from None
     if machine != "aarch64":
         raise Unavailable(f"qemu runs a machine of {machine}, not aarch64")
     return wrapper
-
-
-def _output(command: Sequence[str]) -> str:
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-
-
-def _run(command: Sequence[str], hint: str = "") -> None:
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
-    if done.returncode:
-        last = "; ".join((done.stderr.strip() or done.stdout.strip()).splitlines()[-2:])
-        raise Unavailable(f"{hint or command[0]}: {last}")
 
 
 def main() -> int:

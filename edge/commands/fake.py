@@ -3,19 +3,28 @@
 Maps the simulated touches that come with the program onto the geometry of a skin, and writes them
 as labelled recordings, with one more in which nothing touches the skin. Play them with --fake to
 rehearse calibrate, record, export and run. A model that is fitted to them knows nothing about the
-real skin.
+real skin. With --plug the skin's chips appear on this machine's own /dev/i2c-N instead, where every
+program can read them, until Ctrl-C.
 """
 
 from __future__ import annotations
 
 import argparse
+import signal
+from contextlib import ExitStack
 from pathlib import Path
 
 from edge.commands.options import within
 from edge.commands.output import Output
+from edge.errors import InputError
+from edge.fake.clock import PacedClock
+from edge.fake.player import fake_buses, playback
 from edge.fake.touches import still, touches
+from edge.fake.usb_adapter import UsbAdapter, plugged
+from edge.recording import load as load_recording
 from edge.recording import save
-from edge.skin.file import load
+from edge.skin.file import SkinFile, load
+from edge.skin.loop import stop_on
 
 TRIALS = 8
 STILL_S = 5.0
@@ -26,8 +35,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--skin", required=True, metavar="skin.toml", help="the file that describes the skin"
     )
-    parser.add_argument(
-        "--out", required=True, type=Path, metavar="DIR", help="the folder to write to"
+    goal = parser.add_mutually_exclusive_group(required=True)
+    goal.add_argument("--out", type=Path, metavar="DIR", help="the folder to write to")
+    goal.add_argument(
+        "--plug",
+        nargs="?",
+        const="",
+        metavar="REC.npz",
+        help="plug a USB adapter with the skin's chips into this machine (Linux, as root); they "
+        "feel this recording over and over, or nothing",
     )
     parser.add_argument(
         "--trials",
@@ -40,8 +56,36 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def plug(file: SkinFile, recording: str, output: Output) -> int:
+    """Keep the skin's chips on this machine's buses until a signal comes.
+
+    Args:
+        file: the skin.
+        recording: the path of what the chips feel, over and over; nothing where it is empty.
+        output: where to print the device of each bus.
+    """
+    for spec in file.buses:
+        if spec.serial:
+            raise InputError(f"{spec.device} is a serial port; --plug carries I2C buses alone")
+    felt = load_recording(recording) if recording else still(file, STILL_S)
+    scene = playback(file, felt, loop=True)
+    clock = PacedClock()
+    with stop_on(signal.SIGINT, signal.SIGTERM) as stop, ExitStack() as adapters:
+        for bus in fake_buses(file, scene, clock):
+            device = adapters.enter_context(plugged(UsbAdapter(bus)))
+            output.event(
+                {"event": "plugged", "bus": bus.name, "device": device},
+                f"{bus.name} of the skin file is plugged in as {device}; Ctrl-C unplugs it",
+            )
+        while not stop.asked:
+            clock.sleep_until(clock.now() + 1.0 / file.reading.rate_hz)
+    return 0
+
+
 def run(arguments: argparse.Namespace) -> int:
-    """Write the recordings, and print the commands to rehearse with."""
+    """Write the recordings and print the commands to rehearse with, or plug the skin in."""
+    if arguments.plug is not None:
+        return plug(load(arguments.skin), arguments.plug, Output.of(arguments))
     file = load(arguments.skin)
     folder, rest = arguments.out / "touches", arguments.out / "still.npz"
     save(rest, still(file, STILL_S))

@@ -235,6 +235,21 @@ def still(file: SkinFile) -> Skin:
     return fake_skin(file, lambda t: silence)
 
 
+def playback(file: SkinFile, recording: Recording, *, loop: bool = False) -> Playback:
+    """A recording as a scene for a skin.
+
+    Raises:
+        InputError: the recording's shape is not the skin's.
+    """
+    if recording.frames.shape[1:] != file.layout.shape:
+        rows, cols = recording.frames.shape[1:]
+        raise InputError(
+            f"the recording has {rows} x {cols} taxels, the skin {file.name!r} "
+            f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
+        )
+    return Playback(recording, loop=loop)
+
+
 def play(
     file: SkinFile,
     recording: Recording,
@@ -248,16 +263,10 @@ def play(
     Raises:
         InputError: the recording's shape is not the skin's.
     """
-    if recording.frames.shape[1:] != file.layout.shape:
-        rows, cols = recording.frames.shape[1:]
-        raise InputError(
-            f"the recording has {rows} x {cols} taxels, the skin {file.name!r} "
-            f"{file.layout.rows} x {file.layout.cols}; name its own skin file"
-        )
-    playback = Playback(recording, loop=loop)
-    skin = fake_skin(file, playback, clock=clock, touch_counts=touch_counts)
-    playback.start = skin.clock.now()
-    return skin, playback
+    scene = playback(file, recording, loop=loop)
+    skin = fake_skin(file, scene, clock=clock, touch_counts=touch_counts)
+    scene.start = skin.clock.now()
+    return skin, scene
 
 
 def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:

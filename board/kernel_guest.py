@@ -1,0 +1,258 @@
+"""What `test_kernel.py` checks in the guest: commands and drivers on the kernel's /dev/i2c-N.
+
+Behind the kernel stand the chips of `edge.fake`. A frame of a recording lasts until every chip has
+been read once, so that the slow guest sees every frame, as the fake bus in virtual time does.
+"""
+
+import errno
+import json
+import os
+import re
+import shutil
+import signal
+import threading
+import time
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from smbus2 import SMBus
+
+from edge.cli import main
+from edge.fake.clock import VirtualClock
+from edge.fake.faults import Fault
+from edge.fake.player import Playback, calibrated, fake_buses
+from edge.fake.usb_adapter import UsbAdapter, plugged
+from edge.i2c.bus import BusDenied, BusFault, BusNack, LinuxBus, fetch
+from edge.recording import Recording, load, save
+from edge.skin import file as skinfile
+from edge.skin.calibration import save_calibration
+
+SKINS = Path(os.environ["SKINS"])
+PERIOD_S = 0.1
+CHIP_BYTES = 24
+"""Both kinds of chip serve their 12 taxels in so many bytes."""
+PAD_CHIPS = [0x5A, 0x5B]
+ABSENT = 0x5C
+
+
+class Adapter(UsbAdapter):
+    """The adapter, with time that follows the readings, and transfers that can be cut short."""
+
+    def __init__(self, file):
+        self._playback = None
+        (bus,) = fake_buses(file, lambda t: self._playback(t), VirtualClock())
+        super().__init__(bus)
+        self._chips, self._readings = len(file.chips), 0
+        self.short = False
+
+    def feel(self, recording, loop=False):
+        """Let the chips feel a recording from its first frame on."""
+        self.bus.sleep(1.0)
+        self._playback = Playback(recording, loop=loop)
+        self._playback.start = self.bus.now()
+
+    def control(self, setup, data=b""):
+        """Answer a request; the last chip's reading of a frame is followed by the next frame."""
+        answer = super().control(setup, data)
+        if len(answer) == CHIP_BYTES:
+            self._readings += 1
+            if self._readings % self._chips == 0:
+                self.bus.sleep(PERIOD_S)
+        return answer[:-1] if self.short else answer
+
+
+class Rig:
+    """A skin behind the kernel, and the same skin's file and recordings for the fake bus."""
+
+    def __init__(self, name, folder):
+        self.model = SKINS / f"{name}.onnx"
+        self.path = folder / "skin.toml"
+        shutil.copy(SKINS / f"{name}.toml", self.path)
+        self.file = skinfile.load(self.path)
+        self.folder = folder
+        self.adapter = Adapter(self.file)
+        rows, cols = self.file.layout.shape
+        self.patch = np.zeros((rows, cols), np.uint16)
+        self.patch[1:4, cols - 4 : cols - 1] = 5 * self.file.layout.onset
+
+    @contextmanager
+    def plugged(self):
+        """Plug the adapter in and write its device into the skin file."""
+        with plugged(self.adapter) as device:
+            text = self.path.read_text()
+            self.path.write_text(text.replace("device = 0", f'device = "{device}"'))
+            yield device
+
+    def calibrate(self):
+        """Write the values at which the fake chips rest into the skin file."""
+        save_calibration(self.path, calibrated(self.file).calibration)
+
+    def recording(self, name, *frames):
+        """Save frames as a recording, and let the adapter's chips feel it."""
+        t = np.arange(len(frames)) * PERIOD_S
+        meta = {"labels": {}, "skin": self.file.layout.to_dict(), "source": "", "trial": name}
+        path = self.folder / f"{name}.npz"
+        save(path, Recording(t, np.array(frames, np.uint16), meta=meta))
+        return path
+
+
+@pytest.fixture(params=["pad", "cody"])
+def rig(request, tmp_path):
+    made = Rig(request.param, tmp_path)
+    with made.plugged():
+        yield made
+
+
+@pytest.fixture
+def pad(tmp_path):
+    return Rig("pad", tmp_path)
+
+
+@pytest.fixture
+def edge(capsys):
+    """Runs a command, which must succeed; returns what it printed."""
+
+    def edge(*arguments, text=False):
+        capsys.readouterr()
+        status = main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        assert status == 0, err
+        return out if text else [json.loads(line) for line in out.splitlines()]
+
+    return edge
+
+
+def test_scan_finds_every_chip(rig, edge):
+    rig.adapter.feel(load(rig.recording("still", 0 * rig.patch)))
+    chips = edge("scan", "--skin", rig.path)
+    assert {chip["state"] for chip in chips} == {"running"}
+    assert len(chips) == len(rig.file.chips)
+
+
+def test_calibrate_writes_the_values_of_the_fake_bus(rig, edge):
+    random = np.random.default_rng(5)
+    still = rig.recording("still", *random.integers(0, 4, (20, *rig.patch.shape)))
+    rig.adapter.feel(load(still), loop=True)
+    text, written = rig.path.read_text(), []
+    for fake in ([], ["--fake", still, "--loop"]):
+        rig.path.write_text(text)
+        edge("calibrate", "--skin", rig.path, "--frames", 20, *fake)
+        written.append(skinfile.load(rig.path).calibration)
+    assert (written[0].baseline == written[1].baseline).all()
+    assert (written[0].noise == written[1].noise).all()
+    assert written[0].noise.max() > 0.5
+
+
+def test_record_saves_the_frames_of_the_fake_bus(rig, edge):
+    rig.calibrate()
+    nothing = [0 * rig.patch] * 6
+    frames = [rig.patch + np.uint16(i) * (rig.patch > 0) for i in range(12)]
+    touch = rig.recording("touch", *nothing, *frames, *nothing)
+    rig.adapter.feel(load(touch))
+    trials = []
+    for out, fake in (("kernel", []), ("fake", ["--fake", touch])):
+        more = ["--label", "object=box", "--out", rig.folder / out, "--trials", 1, *fake]
+        (saved,) = edge("record", "--skin", rig.path, *more, "--length", 60)
+        assert saved["complete"]
+        trials.append(load(saved["file"]))
+    assert trials[0].frames.max() == frames[-1].max()
+    assert (trials[0].frames == trials[1].frames).all()
+    assert (trials[0].valid is None) == (trials[1].valid is None)
+
+
+def test_run_decides_as_over_the_fake_bus(rig, edge):
+    rig.calibrate()
+    touch = rig.recording("touch", *[0 * rig.patch] * 4, *[rig.patch] * 18, *[0 * rig.patch] * 3)
+    rig.adapter.feel(load(touch))
+    said = []
+    for fake in ([], ["--fake", touch]):
+        more = ["--model", rig.model, "--without-joints", "skin", "--seconds", 6, *fake]
+        events = edge("run", "--skin", rig.path, *more)
+        said.append([(e["event"], e.get("task"), e.get("label")) for e in events])
+    assert said[0] == said[1]
+    assert [event for event, *_ in said[0]].count("decision") >= 3
+
+
+def test_view_draws_the_picture_of_the_fake_bus(rig, edge):
+    rig.calibrate()
+    touch = rig.recording("touch", *[rig.patch] * 3)
+    rig.adapter.feel(load(touch), loop=True)
+    pictures = []
+    for fake in ([], ["--fake", touch, "--loop"]):
+        text = edge("view", "--skin", rig.path, "--seconds", 1.5, *fake, text=True)
+        pictures.append(re.sub(r" *[0-9.]+ s ", "", text.split("\x1b[H")[-1]))
+    assert pictures[0] == pictures[1]
+    assert "9 taxels" in pictures[0]
+
+
+def test_other_programs_see_the_chips(pad):
+    with pad.plugged() as device, SMBus(device) as smbus:
+        for address in PAD_CHIPS:
+            smbus.write_quick(address)  # as i2cdetect asks
+            assert smbus.read_byte_data(address, 0x5D) == 0x24
+        with pytest.raises(OSError, match=f"Errno {errno.ENXIO}"):
+            smbus.write_quick(ABSENT)
+
+
+def test_an_absent_chip_is_a_nack(pad):
+    with (
+        pad.plugged() as device,
+        closing(LinuxBus(device)) as bus,
+        pytest.raises(BusNack) as caught,
+    ):
+        fetch(bus, ABSENT, b"\0", 1)
+    assert caught.value.errno == errno.ENXIO
+
+
+@pytest.mark.parametrize(
+    ("code", "lasts_s"), [(errno.EIO, (0.0, 1.0)), (errno.ETIMEDOUT, (2.0, 4.0))]
+)
+def test_a_stalled_and_a_hung_transfer_break_off_and_the_next_is_carried(pad, code, lasts_s):
+    with pad.plugged() as device, closing(LinuxBus(device)) as bus:
+        pad.adapter.bus.inject([Fault(code=code, at=[0])])
+        began = time.monotonic()
+        with pytest.raises(BusFault) as caught:
+            fetch(bus, PAD_CHIPS[0], b"\x5d", 1)
+        # The driver of this adapter has a timeout of its own, 2 s, and ignores I2C_TIMEOUT.
+        assert lasts_s[0] <= time.monotonic() - began < lasts_s[1]
+        assert caught.value.errno == errno.EIO
+        assert fetch(bus, PAD_CHIPS[0], b"\x5d", 1) == b"\x24"
+
+
+def test_a_shortened_transfer_gives_no_value(pad):
+    with pad.plugged() as device, closing(LinuxBus(device)) as bus:
+        pad.adapter.short = True
+        with pytest.raises(BusFault):
+            fetch(bus, PAD_CHIPS[0], b"\x04", 24)
+        pad.adapter.short = False
+        assert fetch(bus, PAD_CHIPS[0], b"\x5d", 1) == b"\x24"
+
+
+def test_a_user_without_permission_is_told_which_group_to_join(pad):
+    with pad.plugged() as device:
+        Path(device).chmod(0o600)
+        os.seteuid(65534)
+        try:
+            with pytest.raises(BusDenied, match="group i2c"):
+                LinuxBus(device)
+        finally:
+            os.seteuid(0)
+
+
+def test_plug_puts_a_skin_on_the_bus_until_ctrl_c(pad, edge):
+    seen = []
+
+    def look():
+        while not (devices := list(Path("/sys/class/i2c-dev").glob("i2c-*"))):
+            time.sleep(0.05)
+        with closing(LinuxBus(f"/dev/{devices[0].name}")) as bus:
+            seen.append(fetch(bus, PAD_CHIPS[1], b"\x5d", 1))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    (event,) = edge("fake", "--skin", pad.path, "--plug")
+    looking.join()
+    assert (event["event"], seen) == ("plugged", [b"\x24"])

@@ -1,0 +1,81 @@
+"""The commands and drivers under a real Linux kernel's /dev/i2c-N, over modelled chips.
+
+`make kernel-test` runs this: it boots a Debian kernel and runs `kernel_guest.py` there. Where the
+packages cannot be had (no apt, no network) it is skipped with the reason, but not in CI.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import kernel  # noqa: E402
+
+from edge.skin import file as skinfile  # noqa: E402
+
+PAD = """\
+[skin]
+name = "pad"
+rows = 4
+cols = 6
+threshold_counts = 8
+onset_counts = 16
+release_s = 0.001
+[read]
+rate_hz = 10.0
+[[bus]]
+device = 0
+kind = "mpr121"
+block = [4, 3]
+chips = [{ address = 0x5A, first = [0, 0] }, { address = 0x5B, first = [0, 3] }]
+"""
+SLOWED = {"rate_hz = 100.0": "rate_hz = 10.0", "release_s = 0.3 ": "release_s = 0.001 "}
+"""An emulated machine reads some ten chips in a tenth of a second; and a contact that ends with the
+first frame without it ends in the same frame at any rate."""
+
+
+@pytest.fixture(scope="session")
+def skins(tmp_path_factory):
+    """The skins, each with a model: an MPR121 pad, and the last bus of Cody."""
+    folder = kernel.FOLDER / "skins"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "pad.toml").write_text(PAD)
+    head, *_, bus = skinfile.shipped("cody").read_text().split("[[bus]]")
+    for old, new in SLOWED.items():
+        assert old in head
+        head = head.replace(old, new)
+    (folder / "cody.toml").write_text(head + "[[bus]]" + bus.replace('"/dev/i2c-3"', "0"))
+    touches = tmp_path_factory.mktemp("touches")
+    fake = ["-m", "edge.cli", "fake", "--skin", folder / "pad.toml", "--out", touches]
+    export = ["-m", "export", "--data", touches / "touches", "--out", touches]
+    export += ["--features", "paper", "--projection", "pca", "--decision-points", "none"]
+    for command in (fake, export):
+        subprocess.run(
+            [sys.executable, *command], cwd=kernel.CHECKOUT, check=True, capture_output=True
+        )
+    shutil.copy(touches / "model.onnx", folder / "pad.onnx")
+    shutil.copy(kernel.CHECKOUT / "edge" / "demo" / "model.onnx", folder / "cody.onnx")
+    return folder
+
+
+def test_the_skin_is_read_through_a_real_kernel(skins):
+    command = [sys.executable, "-m", "pytest", str(HERE / "kernel_guest.py"), "-vv", "-rA"]
+    command += ["--noconftest", "-p", "no:cacheprovider", "--basetemp=/run/pytest"]
+    command += ["--rootdir", str(kernel.CHECKOUT), "--durations=0"]
+    environment = ["PYTHONDONTWRITEBYTECODE=1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD=1"]
+    environment += [f"PYTHONPATH={kernel.CHECKOUT}", "OPENBLAS_NUM_THREADS=1", f"SKINS={skins}"]
+    try:
+        status, printed = kernel.run_in_guest([*environment, *command])
+    except kernel.Unavailable as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(f"no kernel here: {error}")
+    print(printed)
+    assert status == 0

@@ -1,0 +1,212 @@
+"""A USB adapter in user space: it puts a fake bus on this machine's own `/dev/i2c-N`.
+
+The adapter is an i2c-tiny-usb, for which Linux has a driver (drivers/i2c/busses/i2c-tiny-usb.c). It
+is attached over USB/IP (Documentation/usb/usbip_protocol.rst): the kernel's virtual host controller
+`vhci_hcd` takes one end of a socket pair, and this module answers requests at the other. Every
+program then reaches the bus through the kernel, as it reaches a real one.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from edge.errors import EdgeError, InputError
+from edge.i2c.bus import Bus, BusError, BusNack, BusTimeout, Message, bus_error, read, write
+
+VENDOR, PRODUCT = 0x0403, 0xC631
+"""The USB identity for which the kernel loads its driver."""
+DEVICE_DESCRIPTOR = struct.pack(
+    "<BBHBBBBHHHBBBB", 18, 1, 0x0110, 0xFF, 0, 0, 8, VENDOR, PRODUCT, 0x0100, 0, 0, 0, 1
+)
+CONFIGURATION_DESCRIPTOR = struct.pack(
+    "<BBHBBBBB BBBBBBBBB", 9, 2, 18, 1, 1, 0, 0x80, 50, 9, 4, 0, 0, 0, 0xFF, 0, 0, 0
+)
+"""A single configuration with a single interface; every request goes to endpoint 0."""
+
+STANDARD = 0x00
+"""The kind of a request that every USB device answers (bits 5 and 6 of its first byte)."""
+KIND = 0x60
+GET_STATUS, GET_DESCRIPTOR, SET_CONFIGURATION, SET_INTERFACE = 0, 6, 9, 11
+FUNCTIONS, DELAY, STATUS, TRANSFER = 1, 2, 3, 4
+"""Requests of the adapter; TRANSFER is the first of four, to which BEGIN and END are added."""
+END = 2
+I2C_M_RD = 1
+CARRIES = 0x0EFF0001
+"""Plain I2C, and SMBus made from it (I2C_FUNC_I2C | I2C_FUNC_SMBUS_EMUL)."""
+ACKNOWLEDGED, NOT_ACKNOWLEDGED = 1, 2
+
+SUBMIT, UNLINK, SUBMITTED, UNLINKED = 1, 2, 3, 4
+HEADER = 48
+TO_HOST = 1
+
+HUB = Path("/sys/devices/platform/vhci_hcd.0")
+DRIVERS = (HUB, Path("/sys/bus/usb/drivers/i2c-tiny-usb"), Path("/sys/class/i2c-dev"))
+FREE_PORT = "004"
+"""How the hub's `status` file marks a port that nothing is plugged into (VDEV_ST_NULL)."""
+LOW_SPEED = 1
+APPEARS_S = 10.0
+
+
+class UsbAdapter:
+    """An i2c-tiny-usb adapter on a bus: USB requests in, answers out.
+
+    Messages are collected up to the last of a call and then sent at once, so that the bus refuses
+    what it would refuse from any other caller. A chip that does not answer is not acknowledged (the
+    kernel then gives ENXIO), a bus that hangs leaves the request without an answer (EIO after the
+    driver's 2 s), and every other error stalls the request (EIO).
+
+    >>> from edge.fake.bus import FakeBus
+    >>> from edge.fake.chips import FakeTCA9548A
+    >>> adapter = UsbAdapter(FakeBus(chips={0x70: FakeTCA9548A()}))
+    >>> adapter.control(struct.pack("<BBHHH", 0xC1, FUNCTIONS, 0, 0, 4)).hex()
+    '0100ff0e'
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self._messages: list[Message] = []
+        self._status = 0
+
+    def reply(self, request: bytes) -> bytes:
+        """The answer to one USB/IP request with its data, or nothing where the bus hangs."""
+        command, number, _, direction, _ = struct.unpack_from(">5I", request)
+        if command == UNLINK:
+            # The kernel ignores this for a request that has been answered already.
+            return struct.pack(">5Ii24x", UNLINKED, number, 0, 0, 0, -errno.ECONNRESET)
+        status, answer = 0, b""
+        try:
+            answer = self.control(request[HEADER - 8 : HEADER], request[HEADER:])
+        except BusTimeout:
+            return b""
+        except BusError:
+            status = -errno.EPIPE
+        done = len(answer) if direction == TO_HOST else len(request) - HEADER
+        return struct.pack(">5Iiiiii8x", SUBMITTED, number, 0, 0, 0, status, done, 0, 0, 0) + answer
+
+    def control(self, setup: bytes, data: bytes = b"") -> bytes:
+        """The data that a control request asks for, empty for one that brings data.
+
+        Args:
+            setup: the request's 8 bytes: kind, request, value, index, length.
+            data: what it brings.
+
+        Raises:
+            BusError: the request is unknown, or the bus failed to carry a message.
+        """
+        kind, request, value, index, length = struct.unpack("<BBHHH", setup)
+        if kind & KIND == STANDARD:
+            return self._standard(request, value)[:length]
+        if request == FUNCTIONS:
+            return struct.pack("<I", CARRIES)
+        if request == STATUS:
+            return bytes([self._status])
+        if TRANSFER <= request < TRANSFER + 4:
+            reads = bool(value & I2C_M_RD)
+            message = read(index, length) if reads else write(index, data)
+            self._take(message, last=bool(request - TRANSFER & END))
+            return message.buffer.tobytes() if reads else b""
+        if request == DELAY:
+            return b""
+        raise bus_error(errno.EOPNOTSUPP, self.bus.name)
+
+    def _standard(self, request: int, value: int) -> bytes:
+        if request == GET_STATUS:
+            return bytes(2)
+        if request in (SET_CONFIGURATION, SET_INTERFACE):
+            return b""
+        descriptors = {1: DEVICE_DESCRIPTOR, 2: CONFIGURATION_DESCRIPTOR}
+        if request == GET_DESCRIPTOR and value >> 8 in descriptors:
+            return descriptors[value >> 8]
+        raise bus_error(errno.EOPNOTSUPP, self.bus.name)
+
+    def _take(self, message: Message, *, last: bool) -> None:
+        self._messages.append(message)
+        self._status = ACKNOWLEDGED
+        if not last and not message.read:
+            return
+        messages, self._messages = self._messages, []
+        if not last:
+            raise bus_error(errno.EOPNOTSUPP, self.bus.name, message.address)
+        try:
+            self.bus.transfer(self.bus.prepare(*messages))
+        except BusNack:
+            self._status = NOT_ACKNOWLEDGED
+
+
+def data_length(header: bytes) -> int:
+    """Bytes of data that follow the header of a USB/IP request."""
+    command, _, _, direction, _, _, length = struct.unpack_from(">6Ii", header)
+    return length if command == SUBMIT and direction != TO_HOST else 0
+
+
+def serve(adapter: UsbAdapter, connection: socket.socket) -> None:
+    """Answer requests until the kernel closes the connection."""
+    with connection, connection.makefile("rb") as requests:
+        while len(header := requests.read(HEADER)) == HEADER:
+            connection.sendall(adapter.reply(header + requests.read(data_length(header))))
+
+
+@contextmanager
+def plugged(adapter: UsbAdapter) -> Iterator[str]:
+    """Attach the adapter to this machine's kernel, and detach it at the end of the block.
+
+    Yields:
+        The path of its device, such as `/dev/i2c-7`.
+
+    Raises:
+        InputError: this is no Linux, its modules are not loaded, or the user is not root.
+        EdgeError: the kernel does not accept the adapter.
+    """
+    if sys.platform != "linux":
+        raise InputError("--plug needs Linux; elsewhere, play a recording with --fake")
+    if not all(driver.exists() for driver in DRIVERS):
+        raise InputError(
+            "--plug needs modules of the kernel; run "
+            "`sudo modprobe --all vhci-hcd i2c-tiny-usb i2c-dev`"
+        )
+    if os.geteuid() != 0:
+        raise InputError("--plug needs root; run it with sudo")
+    port = free_port((HUB / "status").read_text())
+    ours, kernels = socket.socketpair()
+    with kernels:
+        (HUB / "attach").write_text(f"{port} {kernels.fileno()} {port + 1} {LOW_SPEED}\n")
+    threading.Thread(target=serve, args=(adapter, ours), daemon=True).start()
+    try:
+        yield _device(port)
+    finally:
+        with suppress(OSError):  # it may have been detached by hand
+            (HUB / "detach").write_text(f"{port}\n")
+
+
+def free_port(status: str) -> int:
+    """The first free port for a slow device, from the text of the virtual hub's `status` file.
+
+    Raises:
+        EdgeError: all are taken.
+    """
+    for line in status.splitlines():
+        hub, number, state, *_ = line.split()
+        if hub == "hs" and state == FREE_PORT:
+            return int(number)
+    raise EdgeError("the kernel's virtual USB hub has no free port; end another --plug")
+
+
+def _device(port: int) -> str:
+    """Wait for the device of the adapter on a port."""
+    ends = time.monotonic() + APPEARS_S
+    while time.monotonic() < ends:
+        for adapter in HUB.glob(f"usb*/*-{port + 1}/*:1.0/i2c-*"):
+            device = Path("/dev", adapter.name)
+            if device.exists():
+                return str(device)
+        time.sleep(0.02)
+    raise EdgeError("the kernel does not accept the adapter; see the end of `dmesg`")

@@ -1,0 +1,158 @@
+"""The USB adapter: USB/IP requests in, replies out, as the kernel's driver sends them."""
+
+import errno
+import struct
+
+import pytest
+
+from edge.errors import EdgeError, InputError
+from edge.fake import usb_adapter
+from edge.fake.bus import FakeBus
+from edge.fake.chips import FakeTCA9548A
+from edge.fake.faults import Fault
+from edge.fake.usb_adapter import UsbAdapter, data_length, free_port, plugged
+
+MUX = 0x70
+READ = 1
+FIRST, LAST = 1, 2  # of a call's messages, added to request 4
+
+
+def adapter(*faults):
+    return UsbAdapter(FakeBus(chips={MUX: FakeTCA9548A()}, faults=faults))
+
+
+def submit(kind, request, value=0, index=0, length=0, data=b"", number=7):
+    """A USBIP_CMD_SUBMIT of a control request: header, set-up bytes, data."""
+    to_host = kind >> 7
+    setup = struct.pack("<BBHHH", kind, request, value, index, len(data) or length)
+    header = struct.pack(">5I", 1, number, 0x10002, to_host, 0)
+    return header + struct.pack(">Iiiii", 0, len(data) or length, 0, 0, 0) + setup + data
+
+
+def answer(adapter, *request, **more):
+    """Status, length done and data of the reply to a request."""
+    reply = adapter.reply(submit(*request, **more))
+    command, number, *_, status, done = struct.unpack_from(">5Iii", reply)
+    assert (command, number) == (3, 7)
+    return status, done, reply[48:]
+
+
+def message_out(adapter, data, place=FIRST | LAST, address=MUX):
+    return answer(adapter, 0x41, 4 + place, 0, address, data=data)
+
+
+def message_in(adapter, n, place=FIRST | LAST, address=MUX):
+    return answer(adapter, 0xC1, 4 + place, READ, address, n)
+
+
+def acknowledged(adapter):
+    status, _, data = answer(adapter, 0xC1, 3, length=1)
+    assert status == 0
+    return {1: True, 2: False}[data[0]]
+
+
+def test_the_descriptors_name_the_device_that_the_driver_looks_for():
+    status, done, device = answer(adapter(), 0x80, 6, 0x0100, length=18)
+    assert (status, done, device[8:12]) == (0, 18, bytes.fromhex("030431c6"))
+    assert answer(adapter(), 0x80, 6, 0x0200, length=9)[2][:4] == bytes([9, 2, 18, 0])
+    assert len(answer(adapter(), 0x80, 6, 0x0200, length=18)[2]) == 18
+
+
+def test_it_carries_plain_i2c_and_smbus():
+    functions = int.from_bytes(answer(adapter(), 0xC1, 1, length=4)[2], "little")
+    assert functions & 0x1  # I2C_FUNC_I2C
+    assert functions & 0x10000  # I2C_FUNC_SMBUS_QUICK, with which i2cdetect looks
+
+
+def test_a_written_byte_is_read_back_through_the_wire():
+    usb = adapter()
+    assert message_out(usb, b"\x04") == (0, 1, b"")
+    assert acknowledged(usb)
+    assert message_in(usb, 1) == (0, 1, b"\x04")
+    assert acknowledged(usb)
+
+
+def test_the_messages_of_a_call_reach_the_bus_as_a_single_transaction():
+    usb = adapter()
+    assert message_out(usb, b"\x04", FIRST) == (0, 1, b"")
+    assert usb.bus.transactions == 0
+    assert message_in(usb, 2, LAST) == (0, 2, b"\x04\x04")
+    assert usb.bus.transactions == 1
+
+
+def test_a_message_without_data_finds_a_chip():
+    usb = adapter()
+    assert message_out(usb, b"") == (0, 0, b"")
+    assert acknowledged(usb)
+
+
+def test_an_absent_chip_is_not_acknowledged():
+    usb = adapter()
+    assert message_in(usb, 2, address=0x33) == (0, 2, b"\0\0")
+    assert not acknowledged(usb)
+    message_in(usb, 1)
+    assert acknowledged(usb)
+
+
+@pytest.mark.parametrize("code", [errno.EIO, errno.EAGAIN])
+def test_a_broken_transfer_stalls_the_request(code):
+    usb = adapter(Fault(code=code, at=[0]))
+    assert message_out(usb, b"\x04") == (-errno.EPIPE, 1, b"")
+    assert message_out(usb, b"\x04") == (0, 1, b"")
+
+
+def test_a_read_before_other_messages_is_refused_as_real_adapters_refuse_it():
+    usb = adapter()
+    assert message_in(usb, 1, FIRST)[0] == -errno.EPIPE
+    assert message_in(usb, 1) == (0, 1, b"\0")
+
+
+def test_a_hung_bus_leaves_a_request_without_an_answer_until_the_kernel_gives_it_up():
+    usb = adapter(Fault(code=errno.ETIMEDOUT, at=[0]))
+    assert usb.reply(submit(0x41, 7, 0, MUX, data=b"\x04")) == b""
+    unlink = struct.pack(">6I", 2, 8, 0x10002, 0, 0, 7).ljust(48, b"\0")
+    assert struct.unpack_from(">5Ii", usb.reply(unlink)) == (4, 8, 0, 0, 0, -errno.ECONNRESET)
+
+
+@pytest.mark.parametrize("request_", [(0x80, 6, 0x0300), (0x41, 99), (0x00, 3)])
+def test_an_unknown_request_is_stalled(request_):
+    assert answer(adapter(), *request_)[0] == -errno.EPIPE
+
+
+def test_data_follow_a_request_that_brings_some_and_no_other():
+    assert data_length(submit(0x41, 7, data=b"abc")) == 3
+    assert data_length(submit(0xC1, 7, length=3)) == 0
+    assert data_length(struct.pack(">6I", 2, 8, 0, 0, 0, 7).ljust(48, b"\0")) == 0
+
+
+STATUS = """\
+hub port sta spd dev      sockfd local_busid
+hs  0000 006 001 00010002 000003 1-1
+hs  0001 004 000 00000000 000000 0-0
+ss  0008 004 000 00000000 000000 0-0
+"""
+
+
+def test_the_first_free_port_for_a_slow_device_is_taken():
+    assert free_port(STATUS) == 1
+    with pytest.raises(EdgeError, match="no free port"):
+        free_port(STATUS.replace("hs  0001 004", "hs  0001 006"))
+
+
+@pytest.mark.parametrize(
+    ("platform", "drivers", "user", "sentence"),
+    [
+        ("darwin", True, 0, "--plug needs Linux"),
+        ("linux", False, 0, "sudo modprobe --all vhci-hcd i2c-tiny-usb i2c-dev"),
+        ("linux", True, 1000, "run it with sudo"),
+    ],
+)
+def test_a_machine_that_cannot_do_it_is_named_in_a_sentence(
+    platform, drivers, user, sentence, tmp_path, monkeypatch
+):
+    hub = tmp_path if drivers else tmp_path / "absent"
+    monkeypatch.setattr(usb_adapter, "DRIVERS", (hub,))
+    monkeypatch.setattr(usb_adapter.sys, "platform", platform)
+    monkeypatch.setattr(usb_adapter.os, "geteuid", lambda: user)
+    with pytest.raises(InputError, match=sentence), plugged(adapter()):
+        pass
