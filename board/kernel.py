@@ -71,7 +71,7 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
         *(":".join(map(str, libraries)), str(system / "usr" / "bin" / "qemu-system-x86_64")),
         *("-L", str(system / "usr" / "share" / "qemu")),
         *("-L", str(system / "usr" / "share" / "seabios")),
-        *("-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "2", "-m", "1024"),
+        *("-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "2", "-m", "2048"),
         *("-nodefaults", "-no-user-config", "-no-reboot", "-display", "none", "-serial", "stdio"),
         *("-fsdev", "local,id=root,path=/,security_model=none,readonly=on,multidevs=remap"),
         *("-device", "virtio-9p-pci,fsdev=root,mount_tag=host"),

@@ -6,6 +6,7 @@ been read once, so that the slow guest sees every frame, as the fake bus in virt
 
 import errno
 import json
+import math
 import os
 import re
 import shutil
@@ -45,13 +46,15 @@ class Adapter(UsbAdapter):
         (bus,) = fake_buses(file, lambda t: self._playback(t), VirtualClock())
         super().__init__(bus)
         self._chips, self._readings = len(file.chips), 0
+        self._interrupt_s = math.inf
         self.short = False
 
-    def feel(self, recording, loop=False):
-        """Let the chips feel a recording from its first frame on."""
+    def feel(self, recording, *, loop=False, interrupt=False):
+        """Let the chips feel a recording from its first frame on; press Ctrl-C at its end."""
         self.bus.sleep(1.0)
         self._playback = Playback(recording, loop=loop)
         self._playback.start = self.bus.now()
+        self._interrupt_s = self.bus.now() + self._playback.ends if interrupt else math.inf
 
     def control(self, setup, data=b""):
         """Answer a request; the last chip's reading of a frame is followed by the next frame."""
@@ -60,6 +63,9 @@ class Adapter(UsbAdapter):
             self._readings += 1
             if self._readings % self._chips == 0:
                 self.bus.sleep(PERIOD_S)
+                if self.bus.now() > self._interrupt_s - 0.5 * PERIOD_S:
+                    self._interrupt_s = math.inf
+                    os.kill(os.getpid(), signal.SIGINT)
         return answer[:-1] if self.short else answer
 
 
@@ -165,10 +171,10 @@ def test_record_saves_the_frames_of_the_fake_bus(rig, edge):
 def test_run_decides_as_over_the_fake_bus(rig, edge):
     rig.calibrate()
     touch = rig.recording("touch", *[0 * rig.patch] * 4, *[rig.patch] * 18, *[0 * rig.patch] * 3)
-    rig.adapter.feel(load(touch))
+    rig.adapter.feel(load(touch), interrupt=True)
     said = []
     for fake in ([], ["--fake", touch]):
-        more = ["--model", rig.model, "--without-joints", "skin", "--seconds", 6, *fake]
+        more = ["--model", rig.model, "--without-joints", "skin", *fake]
         events = edge("run", "--skin", rig.path, *more)
         said.append([(e["event"], e.get("task"), e.get("label")) for e in events])
     assert said[0] == said[1]
@@ -177,11 +183,11 @@ def test_run_decides_as_over_the_fake_bus(rig, edge):
 
 def test_view_draws_the_picture_of_the_fake_bus(rig, edge):
     rig.calibrate()
-    touch = rig.recording("touch", *[rig.patch] * 3)
-    rig.adapter.feel(load(touch), loop=True)
+    touch = rig.recording("touch", *[rig.patch] * 4)
+    rig.adapter.feel(load(touch), interrupt=True)
     pictures = []
-    for fake in ([], ["--fake", touch, "--loop"]):
-        text = edge("view", "--skin", rig.path, "--seconds", 1.5, *fake, text=True)
+    for fake in ([], ["--fake", touch]):
+        text = edge("view", "--skin", rig.path, *fake, text=True)
         pictures.append(re.sub(r" *[0-9.]+ s ", "", text.split("\x1b[H")[-1]))
     assert pictures[0] == pictures[1]
     assert "9 taxels" in pictures[0]
