@@ -65,7 +65,7 @@ class UsbAdapter:
     driver's 2 s), and every other error stalls the request (EIO).
 
     >>> from edge.fake.bus import FakeBus
-    >>> from edge.fake.chips import FakeTCA9548A
+    >>> from edge.i2c.tca9548a import FakeTCA9548A
     >>> adapter = UsbAdapter(FakeBus(chips={0x70: FakeTCA9548A()}))
     >>> adapter.control(struct.pack("<BBHHH", 0xC1, FUNCTIONS, 0, 0, 4)).hex()
     '0100ff0e'

@@ -8,9 +8,9 @@ import pytest
 from edge.errors import EdgeError, InputError
 from edge.fake import usb_adapter
 from edge.fake.bus import FakeBus
-from edge.fake.chips import FakeTCA9548A
 from edge.fake.faults import Fault
 from edge.fake.usb_adapter import UsbAdapter, data_length, free_port, plugged
+from edge.i2c.tca9548a import FakeTCA9548A
 
 MUX = 0x70
 READ = 1
