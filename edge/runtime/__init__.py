@@ -1,1 +1,1 @@
-"""What runs around the classifier on the board: the loop, joint angles, event output, systemd."""
+"""Beside the classifier on the board: joint angles, event output, the map of touch, systemd."""

@@ -1,11 +1,12 @@
-"""Events to other programs: each a line of JSON, to stdout, to a file and by UDP.
+"""Events to other programs: each is a line of JSON, to stdout, to a file, or by UDP.
 
-Nothing that reads them can stop the decisions: a pipe that nobody empties, a full disk or a
-network that is down costs lines, which are counted.
+A slow reader never delays a decision. A pipe that nobody empties, a full disk or a network that is
+down costs lines, and those are counted.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import queue
 import socket
@@ -20,12 +21,10 @@ from edge.events import json_line
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
-STEP_S, CLOSE_STEPS, STUCK_STEPS = 0.01, 100, 3
-"""The lines that still wait at the end are given so many steps to leave, and each of them so many.
-Steps, not seconds: while the machine is busy or the program is paused, nothing is written either.
-"""
+CLOSE_S = 1.0
+"""Time for the waiting lines to leave at the end."""
 PATIENCE_S = 0.05
-"""How often someone who waits for a reader asks whether to go on waiting."""
+"""A patient writer asks this often whether to go on waiting."""
 UNREAD = "nobody reads them"
 Patience = Callable[[], bool]
 """Says whether to wait for a slow reader."""
@@ -37,84 +36,79 @@ def impatient() -> bool:
 
 
 class LineWriter:
-    """Writes lines in a thread of its own, so that whoever has them to write never waits.
+    """A bounded queue of lines, and a thread that writes them.
 
     Attributes:
-        lost: lines that could not be written.
-        problem: why not.
-        gone: no more can be written; what comes is lost.
+        name: of the destination, for messages.
+        lost: number of lines that could not be written.
+        problem: the reason.
+        gone: the reader has gone, as `head` does once it has enough; all further lines are lost.
     """
 
     def __init__(self, name: str, write: Callable[[bytes], None]) -> None:
         """Start the thread.
 
         Args:
-            name: what messages call it.
-            write: writes a line, and may wait; an OSError costs the line.
+            name: of the destination.
+            write: writes a line, and may wait; an OSError loses the line.
         """
         self.name = name
         self.lost, self.problem, self.gone = 0, "", False
-        self.unwanted = False
-        """Its reader has gone, as `head` does once it has enough."""
         self._write = write
-        self._lines: queue.Queue[bytes | None] = queue.Queue(MOST_LINES)
+        self._queue: queue.Queue[bytes | None] = queue.Queue(MOST_LINES)
         self._closed = False
-        self._taken, self._done = 0, 0
-        """Lines that came to wait, and of them those that were written or lost since."""
         self._thread = threading.Thread(target=self._work, name=f"lines to {name}", daemon=True)
         self._thread.start()
 
     def put(self, line: str, patient: Patience = impatient) -> None:
-        """Let a line be written; where too many wait, it is lost once `patient` says no."""
+        """Queue a line; if the queue is full, the line is lost once `patient` says no."""
         data = line.encode(errors="backslashreplace") + b"\n"
         while not (self.gone or self._closed):
+            wait = patient()
             try:
-                self._lines.put(data, timeout=PATIENCE_S if patient() else 0.0)
-                self._taken += 1
+                self._queue.put(data, wait, PATIENCE_S)
                 return
             except queue.Full:
-                if not patient():
+                if not wait:
                     self.problem = self.problem or UNREAD
                     break
         self.lost += 1
 
     def _work(self) -> None:
-        while (line := self._lines.get()) is not None:
+        while (line := self._queue.get()) is not None:
             try:
-                if self.gone:
-                    raise BrokenPipeError
-                self._write(line)
-            except (OSError, ValueError) as error:  # ValueError: the file was closed
+                if not self.gone:
+                    self._write(line)
+                else:
+                    self.lost += 1
+            except (OSError, ValueError) as error:  # ValueError: the file is closed
                 self.lost += 1
-                self.unwanted = self.unwanted or isinstance(error, BrokenPipeError)
-                self.gone = self.gone or self.unwanted or isinstance(error, ValueError)
+                self.gone |= isinstance(error, BrokenPipeError | ValueError)
                 self.problem = self.problem or getattr(error, "strerror", "") or str(error)
-            self._done += 1
+            self._queue.task_done()
 
     def close(self, patient: Patience = impatient) -> None:
-        """Write what waits, as long as lines leave and for about a second at most, or as long as
-        `patient`; twice is fine."""
+        """Give the waiting lines a second to leave, or as long as `patient`; twice is fine."""
         if self._closed:
             return
         self._closed = True
-        steps, stuck, done = 0, 0, self._done
-        while self._thread.is_alive() and (
-            patient() or (steps < CLOSE_STEPS and stuck < STUCK_STEPS)
-        ):
-            with suppress(queue.Full):
-                self._lines.put_nowait(None)  # one is enough, but the queue may have been full
-            self._thread.join(STEP_S)
-            steps += 1
-            stuck = stuck + 1 if self._done == done else 0
-            done = self._done
+        ended = False
+        while self._thread.is_alive():
+            if not ended:
+                with suppress(queue.Full):
+                    self._queue.put_nowait(None)
+                    ended = True
+            self._thread.join(CLOSE_S)
+            if not patient():
+                break
         if self._thread.is_alive():
             self.gone = True
-            self.lost += self._taken - self._done
+            self.lost += self._queue.unfinished_tasks - ended
             self.problem = self.problem or UNREAD
 
 
 class Lines:
-    """Writes events to all who are to have them, each as a line.
+    """Events as lines to stdout or a file, to further writers, and by UDP.
 
     >>> import io
     >>> out = io.StringIO()
@@ -132,38 +126,38 @@ class Lines:
         form: Callable[[Mapping[str, Any]], str] = json_line,
         patient: Patience = impatient,
     ) -> None:
-        """Write to a file, and send.
+        """Open the destinations.
 
         Args:
-            out: stdout where None.
-            udp: `HOST:PORT`, to which each line goes as a datagram of its own, or None.
-            form: how an event is written to the file; by UDP it goes as JSON in any case.
+            out: a file; stdout where None.
+            udp: `HOST:PORT`, which receives each line as a datagram, or None.
+            form: makes the file's line of an event; UDP always carries JSON.
             patient: says whether to wait for a slow reader of the file rather than lose lines,
                 as where time is virtual.
 
         Raises:
-            InputError: the address makes no sense or its host is not known.
+            InputError: the address is not of that form, or its host is unknown.
         """
         self._socket = None if udp is None else _connected(udp)
         self._udp, self._udp_lost = udp, 0
         self._patient, self._form = patient, form
         self._out = LineWriter("stdout", _line_by_line(sys.stdout if out is None else out))
-        self._more: list[LineWriter] = []
+        self._writers = [self._out]
         self._closed = False
 
     def add(self, writer: LineWriter) -> None:
-        """Count what another writer loses too, and close it with the others."""
-        self._more.append(writer)
+        """Count the lines that another writer loses, and close it with the others."""
+        self._writers.append(writer)
 
     @property
     def unheard(self) -> bool:
         """Whether stdout's reader has gone and nothing else takes the events."""
-        return self._out.gone and self._socket is None and not self._more
+        return self._out.gone and self._socket is None and len(self._writers) == 1
 
     @property
     def lost(self) -> dict[str, int]:
-        """{where to: lines that could not be written}, without those that lost none."""
-        counts = {writer.name: writer.lost for writer in (self._out, *self._more)}
+        """{destination: number of lost lines}, without destinations that lost none."""
+        counts = {writer.name: writer.lost for writer in self._writers}
         if self._udp is not None:
             counts[self._udp] = self._udp_lost
         return {name: count for name, count in counts.items() if count}
@@ -180,22 +174,22 @@ class Lines:
                     self._udp_lost += 1
 
     def close(self) -> None:
-        """Write what waits and send no more; what was lost is said on stderr. Twice is fine."""
+        """Close all destinations, and report lost lines on stderr; twice is fine."""
         if self._closed:
             return
         self._closed = True
         self._out.close(self._patient)
-        for writer in self._more:
+        for writer in self._writers:
             writer.close()
         if self._socket is not None:
             self._socket.close()
-        problems = {writer.name: writer.problem for writer in (self._out, *self._more)}
+        problems = {writer.name: writer.problem for writer in self._writers}
         for name, count in self.lost.items():
-            if name == self._out.name and self._out.unwanted:
-                continue
-            reason = problems.get(name)
-            what = f"{count} lines could not be sent to {name}"
-            print(f"edge-classify: {what}{f': {reason}' if reason else ''}", file=sys.stderr)
+            if name == self._out.name and problems[name] == os.strerror(errno.EPIPE):
+                continue  # the reader had enough
+            reason = f": {problems[name]}" if problems.get(name) else ""
+            print(f"edge-classify: {count} lines could not be sent to {name}{reason}",
+                  file=sys.stderr)  # fmt: skip
 
     def __enter__(self) -> Lines:
         return self
@@ -205,10 +199,9 @@ class Lines:
 
 
 def _line_by_line(out: TextIO) -> Callable[[bytes], None]:
-    """Writes whole lines to a file.
+    """Write complete lines, past the file's buffer where it has a descriptor.
 
-    Past its buffer where it has a descriptor: a thread that waits inside a buffered file keeps
-    the interpreter from ending.
+    A thread that waits inside a buffered file keeps the interpreter from ending.
     """
     try:
         out.flush()

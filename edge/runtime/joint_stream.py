@@ -2,9 +2,9 @@
 
 A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock, and one angle per
 joint in radians. A line may name its joints, `"names": ["elbow", ...]`; its angles are then put in
-the arm's order, and those of other joints are ignored. The sender's clock need not be ours: the
-shortest delay seen lately gives the offset between the two, and a line that took longer than that
-is older by the difference.
+the arm's order, and those of other joints are ignored. The sender's clock need not be ours. The
+quickest tenth of the recent lines gives the offset between the two clocks, and a line that took
+longer is older by the difference.
 """
 
 from __future__ import annotations
@@ -28,27 +28,26 @@ OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
 LONGEST_LINE = 65536
 MOST_LINES, MOST_READS, MOST_BYTES = 64, 64, 65536
-"""Lines, datagrams and bytes that one frame takes in, so that a flood does not stop the loop. Of
-more lines the newest are taken: two senders at 1 kHz give 20 lines in a frame."""
-AHEAD_S = 0.02
-"""A line that seems to have come by so much faster than the quickest tenth of the last 64 says a
-time that is wrong; unless others do so too, when the sender's clock was set."""
+"""Lines, datagrams and bytes taken in a frame, so that a flood does not stop the loop. Of more
+lines the newest are taken: two senders at 1 kHz give 20 lines in a frame."""
 RECENT, LEAST_RECENT = 64, 8
+"""Lines that give the clocks' offset, and the least of them that can tell a wrong time."""
+AHEAD_S = 0.02
+"""A line whose time is further ahead of the others' than this is wrong. If others follow it, the
+sender's clock was set, and the offset follows too."""
 BACKWARD_LINES = 16
-"""Lines in a row whose time goes back before the sender is taken to have set its clock back."""
-SILENT_S = 1.0
-"""After so long without a line from the sender that was chosen, another one may take its place."""
-WINDOW_S = 10.0
-"""The shortest delay is that of the last 10 to 20 seconds, so that it follows a clock's drift."""
+"""Lines in a row whose time goes back, after which the sender's clock was set back."""
 RESTART_S = 1.0
-"""A sender whose clock goes back by more than this has started anew."""
+"""A sender whose time goes back by more than this has started anew."""
+SILENT_S = 1.0
+"""After so long without a line from the chosen sender, another one may take its place."""
 
 Source = Callable[[], bytes | None]
-"""Bytes that have come since the last call, b"" for none, None at the end of the input."""
+"""Gives the bytes that came since its last call, b"" for none, None at the end of the input."""
 
 
 class Joints:
-    """The arm's pose over time, as far as it is known.
+    """The arm's pose at any recent time, where known.
 
     >>> lines = iter([b'{"t": 5.0, "q": [0.0]}\\n{"t": 5.01, "q": [0.1]}\\n', None])
     >>> joints = Joints(lambda: next(lines), dof=1, now=lambda: 100.0)
@@ -66,16 +65,16 @@ class Joints:
         oldest_s: float = OLDEST_S,
         shared_clock: bool = False,
     ) -> None:
-        """Listen.
+        """Listen to a source.
 
         Args:
-            source: gives what has come; never waits.
-            dof: angles a line must have.
-            names: of the joints, in the order of the angles that `at` returns; None where they
-                are not known, and a line's own names are ignored.
+            source: gives the bytes that have come; never waits.
+            dof: angles that a line must have.
+            names: of the joints, in the order of the angles that `at` returns; a line's own names
+                are ignored where this is None.
             now: the loop's clock.
-            oldest_s: how old a pose may be.
-            shared_clock: the sender's `t` is on the loop's clock already (both on one machine,
+            oldest_s: greatest age of a pose.
+            shared_clock: the sender's `t` is on the loop's clock (both on one machine,
                 CLOCK_MONOTONIC).
         """
         self._source, self._dof, self._now = source, dof, now
@@ -83,47 +82,43 @@ class Joints:
         self._oldest, self._shared = oldest_s, shared_clock
         self._rest = b""
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
-        self._delay = [math.inf, math.inf]
-        """Shortest arrival minus t in the window that runs, and in the one before."""
         self._recent: deque[float] = deque(maxlen=RECENT)
-        """Arrival minus t of the last lines, those that were rejected too."""
+        """Arrival minus t of the last lines, rejected ones included."""
         self._backward = 0
-        self._window_ends = -math.inf
         self._ended = False
         self.malformed = 0
-        """Lines that were no pose."""
+        """Number of lines that were not used."""
         self.problem = ""
-        """What was wrong with the last of them."""
+        """The fault of the last of them."""
 
     def at(self, t: float) -> NDArray[np.float64] | None:
-        """Angles (dof,) at a time of the loop's clock, or None where they are not known.
+        """Angles (dof,) at a time of the loop's clock, or None where unknown.
 
-        Between two lines by linear interpolation; after the last one its angles hold for
-        `oldest_s`, no longer.
+        They are interpolated between two lines; after the last line its angles hold for
+        `oldest_s`.
         """
         self._take()
         if not self._poses:
             return None
-        offset = 0.0 if self._shared else min(self._delay)
-        theirs = t - offset
+        sent = t if self._shared else t - self._offset()
         after: tuple[float, NDArray[np.float64]] | None = None
         for pose in reversed(self._poses):
-            if pose[0] <= theirs:
+            if pose[0] <= sent:
                 if after is not None and after[0] - pose[0] <= 2.0 * self._oldest:
-                    part = (theirs - pose[0]) / (after[0] - pose[0])
-                    # A sender may wrap its angles at +-pi: no joint turns half round between two
-                    # lines, so it went the shorter way.
+                    share = (sent - pose[0]) / (after[0] - pose[0])
+                    # A sender may wrap its angles at +-pi. No joint turns half round between two
+                    # lines, so that the shorter way is the right one.
                     turned = after[1] - pose[1]
                     turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
-                    return pose[1] + part * turned
-                if theirs - pose[0] <= self._oldest:
+                    return pose[1] + share * turned
+                if sent - pose[0] <= self._oldest:
                     return pose[1]
                 break
             after = pose
         return None
 
     def _take(self) -> None:
-        """Take in what has come."""
+        """Parse the lines that have come."""
         arrived, taken = self._now(), 0
         lines: list[bytes] = []
         for _ in range(MOST_READS):
@@ -147,17 +142,9 @@ class Joints:
         self.malformed += lines
         self.problem = problem
 
-    def _ahead(self, delay: float) -> bool:
-        """Whether a line's time is so far ahead of the other lines' that it must be wrong."""
-        if self._shared:
-            return False  # lines may come all at once there, as those of a file do
-        self._recent.append(delay)
-        if len(self._recent) < LEAST_RECENT:
-            return False
-        quickest = sorted(self._recent)[len(self._recent) // 10]
-        # One of the first lines may have been such a line, before there were others to tell.
-        self._delay = [d if d >= quickest - AHEAD_S else quickest for d in self._delay]
-        return delay < quickest - AHEAD_S
+    def _offset(self) -> float:
+        """Arrival minus t of a line without delay."""
+        return sorted(self._recent)[len(self._recent) // 10]
 
     def _line(self, line: bytes, arrived: float) -> None:
         try:
@@ -181,7 +168,10 @@ class Joints:
             q = [q[column] for column in columns]
         if len(q) != self._dof:
             return self._bad(f"a line has {len(q)} angles, the arm has {self._dof}")
-        if self._ahead(arrived - t):
+        self._recent.append(arrived - t)
+        # The lines of a file, on a shared clock, may come all at once.
+        enough = len(self._recent) >= LEAST_RECENT and not self._shared
+        if enough and arrived - t < self._offset() - AHEAD_S:
             return self._bad("its time is ahead of the other lines'")
         if self._poses and t <= self._poses[-1][0]:
             self._backward += 1
@@ -189,17 +179,13 @@ class Joints:
                 return self._bad("time goes back")
             self._poses.clear()
             self._recent.clear()
-            self._delay = [math.inf, math.inf]
+            self._recent.append(arrived - t)
         self._backward = 0
-        if arrived > self._window_ends:
-            self._window_ends = arrived + WINDOW_S
-            self._delay = [math.inf, self._delay[0]]
-        self._delay[0] = min(self._delay[0], arrived - t)
         self._poses.append((float(t), np.array(q, dtype=np.float64)))
 
 
 def from_file(fd: int) -> Source:
-    """What a pipe or a terminal has to give, without waiting for it."""
+    """Read a pipe or a terminal without waiting."""
 
     def source() -> bytes | None:
         if not select.select([fd], [], [], 0.0)[0]:
@@ -210,12 +196,12 @@ def from_file(fd: int) -> Source:
 
 
 class Datagrams:
-    """What one sender has sent to a socket: the first that is heard, until it falls silent.
+    """The datagrams of one sender: the first that is heard, until it falls silent.
 
     The clocks of two senders differ, so that their lines must not be mixed.
 
     Attributes:
-        others: {sender: datagrams that were left out}.
+        others: {other sender: number of its datagrams, which are ignored}.
     """
 
     def __init__(self, listener: socket.socket) -> None:
@@ -244,7 +230,7 @@ def from_udp(address: str) -> tuple[Datagrams, socket.socket]:
     """Datagrams of one or more lines, on `PORT` of the loopback interface or on `HOST:PORT`.
 
     Raises:
-        InputError: the address makes no sense or cannot be bound.
+        InputError: the address is not of that form or cannot be bound.
     """
     host, _, port = address.rpartition(":")
     if not (port.isascii() and port.isdecimal() and int(port[:6]) <= 65535):

@@ -32,16 +32,16 @@ class Notifier:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
             self._socket.setblocking(False)
         self.period_s = _watchdog_s(environment) / 2.0
-        """Half of what the manager allows between two signs of life; infinity where it does not
-        watch."""
+        """Half of the time that the manager allows between two signs of life; infinity if it does
+        not watch."""
         self._due = now()
 
     def ready(self, status: str = "") -> None:
-        """The service does its work from now on."""
+        """Report that the service is working."""
         self._send("READY=1" + (f"\nSTATUS={status}" if status else ""))
 
     def alive(self) -> None:
-        """A sign of life; call it each round of the loop: it is sent as often as is needed."""
+        """Send a sign of life if one is due; call it in each round of the loop."""
         if self.period_s == NEVER:
             return
         now = self._now()
@@ -50,11 +50,11 @@ class Notifier:
             self._send("WATCHDOG=1")
 
     def stopping(self) -> None:
-        """The service was asked to end, and does."""
+        """Report that the service is ending."""
         self._send("STOPPING=1")
 
     def close(self) -> None:
-        """Close the socket; calling it twice is fine."""
+        """Close the socket; twice is fine."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
@@ -73,7 +73,7 @@ class Notifier:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float:
-    """Seconds between two signs of life that the manager allows this process."""
+    """Longest time in seconds between two signs of life that the manager allows."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return NEVER
     try:

@@ -10,7 +10,6 @@ import pytest
 
 from edge.errors import InputError
 from edge.runtime.joint_stream import (
-    AHEAD_S,
     BACKWARD_LINES,
     LONGEST_LINE,
     Joints,
@@ -323,16 +322,3 @@ def test_of_two_lines_of_one_time_the_first_counts(wire):
     wire.send(5.0, [3.0, 4.0])
     assert wire.at(0.0) == [1.0, 2.0]
     assert (wire.joints.malformed, wire.joints.problem) == (1, "time goes back")
-
-
-def test_a_first_line_as_far_ahead_as_any_may_be_still_sets_the_clock(wire):
-    """By the same limit as the lines after it."""
-    late = 1.0
-    wire.now = late - AHEAD_S
-    wire.send(0.0, [0.0, 0.0])
-    wire.joints.at(wire.now)
-    for i in range(1, 9):
-        wire.now = late + i
-        wire.send(float(i), [float(i), 0.0])
-        wire.joints.at(wire.now)
-    assert wire.at(late - AHEAD_S + 8.0) == [8.0, 0.0]

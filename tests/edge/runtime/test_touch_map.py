@@ -213,7 +213,7 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     ("text", "sentence"),
     [
         ("", "not a map"),
-        ("[1]\n", "line 1 is not of a map"),
+        ("[1]\n", "not a map"),
         ("hello\n", "not a map"),
         ('{"event": "decision"}\n', "line 1 is not of a map"),
         ('{"event": "map", "frame": "a", "unit": "metre"}\n', "line 1 is not of a map"),
