@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset, Release
 from edge.model.model import Decision, Model, require_joints
@@ -29,6 +31,9 @@ constant in training, or have no weight in the projection, may differ."""
 OUT_OF_RANGE = "out_of_range"
 """Flag of a decision on features that lie far outside those of the training trials. The model cuts
 them off before it compares them; features that it cannot scale at all get no label."""
+GAP_SHARE, GAP_S = 0.25, 0.1
+"""Between two frames, a step of more than this share of the window and of more than this time is a
+gap: the samples in it are interpolated from its ends."""
 
 
 @dataclass
@@ -66,7 +71,8 @@ class Classifier:
     is then "unknown") and `unsure` (the window ended before the confidence was reached).
 
     Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended inside
-    the window; the last values were held), `missing_taxels` (taxels could not be read),
+    the window; the last values were held), `gap` (frames are missing in much of the window, see
+    `GAP_SHARE`, or its times are not in seconds), `missing_taxels` (taxels could not be read),
     `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
     measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
     `out_of_range` (see `OUT_OF_RANGE`).
@@ -231,11 +237,13 @@ class Classifier:
         decision_point = last if short else waiting.decision_point
         waiting.decision_point = decision_point
         window_s = self.model.decision_points_s[decision_point]
-        contact = waiting.contact
+        contact, series = waiting.contact, waiting.contact.series()
+        longest_s = np.diff(np.minimum(series.t, window_s)).max(initial=0.0)
         flags = tuple(
             flag
             for flag, raised in (
                 ("short", short),
+                ("gap", longest_s > max(GAP_SHARE * window_s, GAP_S)),
                 ("missing_taxels", contact.missing_taxels),
                 ("missing_pose", contact.missing_pose),
                 ("skin_motion", contact.chain is None and info.chain is not None),
@@ -253,7 +261,7 @@ class Classifier:
             for task in waiting.tasks
         ]  # fmt: skip
         try:
-            vector = feature_vector(contact.series(), window_s, info.samples, info.features)
+            vector = feature_vector(series, window_s, info.samples, info.features)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
             answers = [replace(one, flags=(*flags, OUT_OF_RANGE)) for one in answers]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,9 @@ LARGEST_BYTES = 1 << 27
 """Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111 MB, two
 minutes of 64 x 62 taxels at 100 Hz take 95."""
 MAX_COUNTS = 65535
+SLOWEST_HZ, FASTEST_HZ = 2.0, 5000.0
+"""Frame rates outside these limits are probably times in another unit."""
+LOG = logging.getLogger(__name__)
 KEYS = ("t", "frames", "joints", "valid", "meta")
 
 
@@ -333,12 +337,21 @@ def save(
             all recordings of a data set the same.
         overwrite, lasting: see `write_whole`.
 
+    A warning names the likely unit of times that do not seem to be in seconds.
+
     Raises:
-        InputError: the recording is not as the contract says, `path` cannot be written, or
-            it exists and `overwrite` is False.
+        InputError: the recording breaks the contract, `path` cannot be written, or it exists and
+            `overwrite` is False.
     """
     name = os.fspath(path)
     recording = _checked(name, recording, scale)
+    steps = np.diff(recording.t)
+    rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
+    if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        units = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
+        likely = [u for u, factor in units.items() if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ]
+        guess = f", and these may be in {likely[0]}" if likely else ""
+        LOG.warning(f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}")
     arrays = {key: getattr(recording, key) for key in KEYS[:-1]}
     arrays = {key: array for key, array in arrays.items() if array is not None}
     save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)

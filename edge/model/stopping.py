@@ -123,7 +123,7 @@ class Stopping:
                 "more trials alone will not do"
             )
         # Chernoff: so many trials with the same share of errors are enough.
-        divergence = (1.0 - share) * math.log((1.0 - share) / (1.0 - error))
+        divergence = (1.0 - share) * (math.log1p(-share) - math.log1p(-error))
         if share > 0.0:
             divergence += share * math.log(share / error)
         level = TEST_SHARE * self.risk

@@ -157,6 +157,23 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(mo
     assert onsets == pytest.approx([0.2, 0.2, 1.2, 1.2])
 
 
+@pytest.mark.parametrize(
+    ("damage", "flagged"),
+    [
+        (lambda t: t, False),
+        (lambda t: 1e3 * t, True),  # milliseconds
+        (lambda t: np.where(t > 0.235, t + 5.0, t), True),
+        (lambda t: np.where(t > 0.5, t + 0.31, t), True),
+        (lambda t: np.where(t > 0.5, t + 0.28, t), False),
+    ],
+)
+def test_a_gap_in_the_window_flags_the_decision(model, make_touch, damage, flagged):
+    recording = make_touch()
+    events = Classifier(model).classify(replace(recording, t=damage(recording.t)))
+    decided = [event for event in events if isinstance(event, Decided)]
+    assert ["gap" in event.flags for event in decided] == [flagged] * 2
+
+
 def test_taxels_that_could_not_be_read_flag_the_decision(model, make_touch):
     whole = make_touch()
     valid = np.ones((16, 24), dtype=bool)

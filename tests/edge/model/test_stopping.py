@@ -7,6 +7,7 @@ import pytest
 from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.model.stopping import (
+    TEST_SHARE,
     Novelty,
     Stopping,
     StoppingRule,
@@ -78,6 +79,12 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
 def test_a_refusal_asks_for_more_trials_than_there_were():
     """However many there were: a rule may have failed that so many could have certified."""
     assert stopping(trials=10_000, wrong=0).refusal(0.09).endswith("0.09 needs about 10001 trials")
+
+
+def test_an_error_rate_below_the_resolution_of_1_still_has_a_number_of_trials():
+    task = stopping(wrong=0)
+    needed = float(task.refusal(1e-17).split()[-2])
+    assert needed == pytest.approx(-math.log(TEST_SHARE * task.risk) / 1e-17, rel=1e-6)
 
 
 def test_where_the_full_window_errs_more_often_trials_do_not_help():
