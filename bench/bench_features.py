@@ -14,33 +14,36 @@ FRAMES = 120
 
 
 @pytest.fixture(params=SETS)
-def one_set(request):
-    """Names of a set's features, and a recording of a contact."""
-    return SETS[request.param], load(FOLDER / "pillow-movable.npz")
+def features(request):
+    """Names of a set's features."""
+    return SETS[request.param]
 
 
-def tracker_of(names, recording):
+@pytest.fixture
+def recording():
+    return load(FOLDER / "pillow-movable.npz")
+
+
+def tracker_of(features, recording):
     joints = recording.joints.shape[1]
-    return ContactTracker(recording.layout, chain=Chain.cody(), features=names, joints=joints)
+    return ContactTracker(recording.layout, chain=Chain.cody(), features=features, joints=joints)
 
 
-def bench_following(against, note, one_set):
+def bench_following(against, note, features, recording):
     """A frame in contact."""
-    names, recording = one_set
-    onset_s, _ = first_contact(recording, tracker_of(names, recording))
+    onset_s, _ = first_contact(recording, tracker_of(features, recording))
     frames = [frame for frame in recording if frame.t >= onset_s][:FRAMES]
 
     def follow():
-        tracker = tracker_of(names, recording)
+        tracker = tracker_of(features, recording)
         for frame in frames:
             tracker.push(frame)
 
-    a_frame = against(follow, {}, calls=1) / len(frames)
-    note(f"a 10 ms frame, at {a_frame * 1e6:.0f} us", a_frame / FRAME_S, "at most 0.02")
+    seconds = against(follow, {}, calls=1) / len(frames)
+    note(f"a 10 ms frame, at {seconds * 1e6:.0f} us", seconds / FRAME_S, "at most 0.02")
 
 
-def bench_vector(against, note, one_set):
-    names, recording = one_set
-    _, series = first_contact(recording, tracker_of(names, recording))
-    vector = against(lambda: feature_vector(series, WINDOW_S, features=names), {})
+def bench_vector(against, note, features, recording):
+    _, series = first_contact(recording, tracker_of(features, recording))
+    vector = against(lambda: feature_vector(series, WINDOW_S, features=features), {})
     note("a millisecond", vector * 1e3, "below 1")

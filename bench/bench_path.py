@@ -61,13 +61,6 @@ def bench_decision_of_all_tasks(against, note, asked):
     note("a 10 ms frame", share, "at most 0.01")
 
 
-def bench_feature_vector(against, note, asked):
-    model, series = asked
-    window, samples = model.info.window_s, model.info.samples
-    share = against(lambda: feature_vector(series, window, samples), {}) / FRAME_S
-    note("a 10 ms frame", share, "-")
-
-
 SKLEARN = """
     import sys
     import numpy as np

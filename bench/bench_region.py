@@ -6,6 +6,7 @@ import pytest
 import scipy.ndimage
 
 from edge.touch.region import largest_region
+from tests.edge.touch.test_region import SHAPES
 
 
 def contact():
@@ -24,35 +25,8 @@ def large():
     return np.where(force > 50, force, 0).astype(np.uint16)
 
 
-def serpentine():
-    frame = np.zeros((16, 24), dtype=np.uint16)
-    frame[::2] = 900
-    frame[1::4, -1] = 900
-    frame[3::4, 0] = 900
-    return frame
-
-
-def spiral():
-    frame = np.zeros((16, 24), dtype=np.uint16)
-    top, left, bottom, right = 0, 0, 15, 23
-    while top <= bottom and left <= right:
-        frame[top, left : right + 1] = 900
-        frame[top : bottom + 1, right] = 900
-        frame[bottom, left : right + 1] = 900
-        frame[top + 2 : bottom + 1, left] = 900
-        frame[top + 2, left : left + 2] = 900
-        top, left, bottom, right = top + 2, left + 2, bottom - 2, right - 2
-    return frame
-
-
-FRAMES = {
-    "contact": contact(),
-    "soft contact": large(),
-    "full": np.full((16, 24), 900, dtype=np.uint16),
-    "checkerboard": (np.indices((16, 24)).sum(0) % 2 * 900).astype(np.uint16),
-    "serpentine": serpentine(),
-    "spiral": spiral(),
-    "empty": np.zeros((16, 24), dtype=np.uint16),
+FRAMES = {"contact": contact(), "soft contact": large()} | {
+    name: SHAPES[name] for name in ("full", "checkerboard", "serpentine", "spiral", "empty")
 }
 
 

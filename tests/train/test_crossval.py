@@ -115,11 +115,6 @@ def test_components_beyond_the_rank_add_nothing():
     assert (rows[:, 3:] == rows[:, 3:4]).all()  # four others span three components
 
 
-def test_processes_do_not_change_the_result():
-    X, _ = overlapping(20)
-    assert (neighbours(X, jobs=2) == neighbours(X, jobs=1)).all()
-
-
 def test_too_few_trials_and_values_that_are_not_finite_are_named():
     with pytest.raises(InputError, match="at least 2 trials"):
         leave_one_out(np.zeros((1, 120)), np.array(["a"]))
@@ -167,12 +162,6 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     assert len(ours) == min(side - 2, len(exact))
     assert subspace_gap(ours, exact[: len(ours)]) < 1e-7
     assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7
-
-
-def test_leading_axes_of_fewer_dimensions_than_asked_for():
-    X = np.outer(np.arange(9.0), np.ones(12))
-    assert len(Spectrum(X).leading(5)) == 1
-    assert Spectrum(np.ones((9, 12))).leading(5).shape == (0, 12)
 
 
 def test_a_group_left_out_is_fitted_without_any_of_its_trials():

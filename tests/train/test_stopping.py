@@ -82,15 +82,6 @@ def drawn(n, rng):
     return confidence, right
 
 
-def test_rules_rise_in_error_and_fall_in_time():
-    confidence, right = drawn(400, np.random.default_rng(0))
-    rules = certify(confidence, ~right, SECONDS)
-    errors, times = [r.error for r in rules], [r.mean_s for r in rules]
-    assert errors == sorted(errors)
-    assert times == sorted(times, reverse=True)
-    assert times[0] == pytest.approx(1.2)
-
-
 def test_the_first_rule_is_the_full_window_at_the_whole_level():
     confidence, right = drawn(140, np.random.default_rng(1))
     rules = certify(confidence, ~right, SECONDS)

@@ -137,12 +137,6 @@ def test_summaries_are_one_number_of_the_transformed_samples():
     assert seen == pytest.approx([mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15)
 
 
-def test_a_rate_is_that_of_the_transformed_samples():
-    rate = vector_of(touch(PEAKS), "relative_skin_force_rate")
-    force = np.array([p + p // 2 for p in PEAKS]) / 600.0
-    assert rate == pytest.approx(np.gradient(force, 0.25))
-
-
 @pytest.mark.parametrize("threshold", [0, 9, 60000])
 @pytest.mark.parametrize("scale", [None, 1e-6, 1e12])
 @pytest.mark.parametrize("pitch", [None, 1e-6, (1e3, 2.0)])
@@ -193,18 +187,12 @@ def test_pressure_is_force_over_area_and_stiffness_force_over_motion():
     assert stiffness[0] == pytest.approx(1.6 / 0.002)
 
 
-def test_taxels_stand_in_their_places_one_after_another():
-    seen = vector_of(touch(PEAKS), "taxel_force", samples=5).reshape(23, 5)
-    place = 6  # row 1, column 1: the sixth but for the dead one before it
-    assert seen[place].tolist() == [p / 100 for p in PEAKS]
-    assert seen[place + 1].tolist() == [p // 2 / 100 for p in PEAKS]
-    assert np.count_nonzero(seen.any(axis=1)) == 2
-
-
-def test_cells_have_one_largest_value():
+def test_cells_follow_in_their_places_and_have_one_largest_value():
     seen = vector_of(touch(PEAKS), "relative_taxel_force", samples=5).reshape(23, 5)
+    # Row 1, column 1 is cell 6, as the cell before it is dead.
     assert seen[6].tolist() == [0.25, 0.75, 0.5, 1.0, 1.0]
     assert seen[7].tolist() == [0.125, 0.375, 0.25, 0.5, 0.5]
+    assert np.count_nonzero(seen.any(axis=1)) == 2
 
 
 def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
@@ -274,12 +262,3 @@ def test_transforms_are_within_four_roundings_of_exact_arithmetic(peaks, transfo
     assert seen == pytest.approx(
         exact, rel=4 * 2.0**-53, abs=4 * 2.0**-53 if transform == "log" else 0
     )
-
-
-def test_the_pressure_of_one_taxel_is_its_force():
-    frames = touch(PEAKS)
-    for frame in frames:
-        frame.counts[1, 2] = 0
-    pressure, force = (vector_of(frames, f"contact_{name}") for name in ("pressure", "force"))
-    assert pressure.tolist() == force.tolist()
-    assert pressure.all()

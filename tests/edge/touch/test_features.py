@@ -89,22 +89,11 @@ def test_dropped_frames_and_jitter_do_not_shift_the_samples():
     assert np.abs(full - fewer).max() < 1e-16
 
 
-def test_a_stream_that_ends_inside_the_window_holds_its_last_values():
-    vector = feature_vector(series([0.0, 0.3], [10, 20], [3, 4], [0.0, 0.5]), 1.2)
-    assert vector[10:40].tolist() == [20.0] * 30
-    assert vector[50:80].tolist() == [4.0] * 30
-    assert vector[90:].tolist() == [0.5] * 30
-
-
 def test_a_pose_that_is_known_again_after_the_window_tells_nothing_of_it():
     motion = [0.0, 0.1, np.nan, np.nan, 0.9]
     given = series([0.0, 0.4, 0.8, 1.2, 1.6], [1] * 5, motion=motion)
     held = feature_vector(given, 1.2, samples=4)[8:]
     assert held == pytest.approx([0.0, 0.1, 0.1, 0.1])
-
-
-def test_one_frame_holds_for_the_whole_window():
-    assert feature_vector(series([0.0], [10]), 1.2)[:40].tolist() == [10.0] * 40
 
 
 def test_motion_is_interpolated_over_frames_without_a_pose():

@@ -36,10 +36,6 @@ def test_onset_is_the_first_frame_of_the_run_that_confirmed_it():
     assert follow([0, 0, 30, 40, 50]) == [(0.02, [30, 40, 50], False)]
 
 
-def test_onset_may_be_the_first_frame_of_the_stream():
-    assert follow([30, 40]) == [(0.0, [30, 40], False)]
-
-
 def test_one_frame_alone_begins_no_contact():
     assert follow([0, 30, 0, 30, 0]) == []
     assert follow([0, 30, 0], TrackSettings(debounce=1)) == [(0.01, [30, 0], False)]
@@ -75,17 +71,6 @@ def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(away_s, con
 def test_nothing_is_kept_beyond_the_horizon():
     found = follow([30] * 20, horizon_s=0.055)
     assert found == [(0.0, [30] * 7, False)]  # one frame past it, to interpolate up to it
-
-
-def test_of_two_readings_at_one_instant_the_later_counts():
-    tracker = ContactTracker(FLAT)
-    for t, peak in [(0.0, 30), (0.01, 31), (0.01, 32), (0.02, 33)]:
-        counts = np.zeros(FLAT.shape, dtype=np.uint16)
-        counts[0, 0] = peak
-        (contact,) = tracker.push(Frame(t, counts)) or [None]
-    series = contact.series()
-    assert series.t.tolist() == [0.0, 0.01, 0.02]
-    assert series.peak.tolist() == [30, 32, 33]
 
 
 def test_motion_counts_from_the_reading_that_counts():
@@ -239,18 +224,3 @@ def test_a_clock_too_large_for_its_steps_is_refused_and_says_so():
     for t in (1.7e12, 1.7e18, -1e15):
         with pytest.raises(InputError, match="give seconds"):
             ContactTracker(FLAT).push(Frame(t, counts))
-
-
-def test_a_region_s_time_loses_nothing_to_a_large_clock():
-    counts = np.zeros(FLAT.shape, dtype=np.uint16)
-    counts[1, 1:4] = 50
-    start = 1.7e9 + 0.25
-    times = np.full(FLAT.shape, start - 0.25)
-    (contact,) = ContactTracker(FLAT, TrackSettings(debounce=1)).push(
-        Frame(start, counts, times=times)
-    )
-    assert contact.onset_s == start - 0.25
-
-
-def test_the_last_frame_that_is_kept_is_the_first_at_the_horizon():
-    assert follow([30] * 6, dt=0.25, horizon_s=0.5) == [(0.0, [30, 30, 30], False)]

@@ -52,6 +52,7 @@ def test_what_a_file_leaves_out_is_urdf_s_default(joints):
         ("<robot", "<sdf", "not a URDF file"),
         ('link name="base"', 'link name="world"', "no link 'base'; it has world, upper"),
         ('<parent link="base"/>', '<parent link="lower"/>', "no chain of joints leads from"),
+        ('<parent link="base"/>', '<parent link="upper"/>', "no chain of joints leads from"),
         ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
         ("0.3 0 -1e-3", "0.3 0", "origin of joint 'elbow' must be 3 numbers, not '0.3 0'"),
         (
