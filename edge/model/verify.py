@@ -129,6 +129,8 @@ def _path(
     onsets = np.full(len(trials), np.nan)
     vectors = np.full((len(windows), len(trials), info.width), np.nan)
     starts, expected = arrays["series_start"], arrays["series_counts"]
+    if expected.ndim != 2 or len(expected) != starts[-1]:
+        raise ValueError(f"series_counts is {expected.shape}")
     lengths, counts = np.zeros(len(trials), dtype=np.int64), np.zeros_like(expected)
     for i, trial in enumerate(trials):
         require_joints(model, None if trial.joints is None else trial.joints.shape[1], f"trial {i}")
@@ -139,9 +141,10 @@ def _path(
         for j, window_s in enumerate(windows):
             vectors[j, i] = feature_vector(series, window_s, info.samples, info.features)
         lengths[i] = len(series.integers)
+        if series.integers.shape[1] != expected.shape[1]:
+            raise ValueError(f"series_counts has {expected.shape[1]} columns")
         rows = counts[starts[i] : starts[i + 1]]
-        if series.integers.shape[1:] == rows.shape[1:]:
-            rows[: lengths[i]] = series.integers[: len(rows)]
+        rows[: lengths[i]] = series.integers[: len(rows)]
     yield "series length", lengths, np.diff(starts), 0.0
     yield "series counts", counts, expected, 0.0
     yield "onset", onsets, arrays["onset_s"], bounds["time_s"]

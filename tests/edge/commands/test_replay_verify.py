@@ -141,6 +141,10 @@ def test_a_damaged_golden_file_is_one_sentence(verify, exported, tmp_path):
         status, _, err = verify(path)
         assert (status, err.count("\n")) == (2, 1), key
         assert str(path) in err
+    for shape in ((1, 1_000_000), (len(arrays["series_counts"]), 3), (7,)):
+        np.savez(path, **{**arrays, "series_counts": np.zeros(shape, np.int64)})
+        status, _, err = verify(path)
+        assert (status, "not a golden file (series_counts " in err) == (2, True)
     np.savez(path, **{**arrays, "vectors": arrays["vectors"][:, :50]})
     assert "50,) long" in verify(path)[2]
     shutil.copy(exported / "model.onnx", path)

@@ -1,5 +1,10 @@
 """`view`, as a user runs it over the fake: a picture at a bounded rate."""
 
+import os
+import pty
+import subprocess
+import sys
+
 from edge.commands import view
 
 
@@ -25,3 +30,18 @@ def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch
     monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ["."])
     assert edge("view", "--fake", recordings / "hard_0.npz", "--rate", 5, text=True)[0] == 0
     assert [round(t - drawn[0], 2) for t in drawn] == [round(0.2 * i, 2) for i in range(9)]
+
+
+def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
+    terminal, own_side = pty.openpty()
+    command = [sys.executable, "-m", "edge", "view", "--loop", "--fake", recordings / "hard_0.npz"]
+    process = subprocess.Popen(
+        command, stdin=own_side, stdout=own_side, stderr=subprocess.PIPE, text=True
+    )
+    os.close(own_side)
+    os.read(terminal, 100)
+    os.close(terminal)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert err.startswith("edge-classify: standard output cannot be written: Input/output error")
+    assert err.count("\n") == 1
