@@ -251,8 +251,9 @@ mutants: $(VENV)/.mutants
 constraints: $(READY)
 	$(BIN)/python -m board.requirements --check-constraints
 
+# FUZZ="-k scene": only the readers whose names contain this.
 fuzz: $(READY)
-	$(BIN)/python -m tests.fuzz --out $(OUT)/fuzz $(FUZZ)
+	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
 clean:
 	rm -rf build dist mutants

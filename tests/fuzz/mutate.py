@@ -1,4 +1,7 @@
-"""Valid files made hostile: bytes, words of a text, members of an archive, parts of a model."""
+"""Damage valid files: their bytes, words of a text, arrays of an archive, pieces of a model.
+
+Each function takes a valid file and a `Random` of hypothesis, which can so shrink the damage.
+"""
 
 from __future__ import annotations
 
@@ -25,183 +28,144 @@ WORDS = (
     *("../../etc/passwd", "/dev/zero", "%s%n", "a" * 70000, "=", ",", "\t", "1979-05-27", "#"),
     *('"\\u0000"', '"\\u001b[2J"', "<!DOCTYPE x>", "&a;", "<", "]]>", "2 0", "0 0 0 0"),
 )
-"""What has broken readers before, here and elsewhere."""
+"""Words that have broken readers before, here and elsewhere."""
 TOKENS = re.compile(r"[-+]?\d[\w.+-]*|\"(?:[^\"\\\n]|\\.)*\"|\w+|[\[\]{}()=,:<>/\n]")
 NUMBERS = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 62)
+TYPES = ("u1", "i2", ">u2", "f4", ">f8", "c16", "?", "U3", "S2", "M8[s]")
+FLOATS = (np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 1e18, -1.0)
 
 
 def of_bytes(data: bytes, draw: Random) -> bytes:
-    """Bits, bytes, words and spans changed, put in, taken out, cut off."""
+    """Spans of bytes replaced, removed, repeated, inserted or cut off."""
     out = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 4, 16))):
-        at = draw.randrange(len(out) + 1)
-        span = draw.choice((1, 2, 4, 16, 256))
-        match draw.randrange(7):
-            case 0 if at < len(out):
-                out[at] ^= 1 << draw.randrange(8)
-            case 1:
-                out[at : at + span] = draw.randbytes(min(span, 16))
-            case 2:
-                del out[at : at + span]
-            case 3:
-                out[at:at] = out[at : at + span]
-            case 4:
-                size = draw.choice((1, 2, 4, 8))
-                number = draw.choice(NUMBERS) & ((1 << 8 * size) - 1)
-                out[at : at + size] = number.to_bytes(size, draw.choice(("little", "big")))
-            case 5 if draw.random() < 0.3:
-                del out[at:]
-            case 6:
-                out[at:at] = draw.choice(WORDS[:60]).encode("utf-8", "surrogatepass")[:5000]
-    return bytes(out)
+        at, span = draw.randrange(len(out) + 1), draw.choice((1, 2, 4, 16, 256))
+        size = draw.choice((1, 2, 4, 8))
+        number = draw.choice(NUMBERS) % (1 << 8 * size)
+        new = (
+            bytes(byte ^ 1 << draw.randrange(8) for byte in out[at : at + 1]),
+            b"",
+            2 * bytes(out[at : at + span]),
+            draw.randbytes(min(span, 16)),
+            number.to_bytes(size, draw.choice(("little", "big"))),
+            draw.choice(WORDS).encode("utf-8", "surrogatepass")[:5000],
+        )
+        chosen = draw.choice(new)
+        out[at : at + draw.choice((0, len(chosen), span))] = chosen
+    return bytes(out[: draw.randrange(len(out) + 1)] if draw.randrange(10) == 9 else out)
 
 
 def of_text(data: bytes, draw: Random) -> bytes:
-    """Words replaced by others of the same text or by hostile ones; now and then bytes."""
-    if draw.random() < 0.15:
+    """Words replaced by hostile ones or by others of the text, removed or repeated."""
+    if draw.randrange(7) == 6:
         return of_bytes(data, draw)
     text = data.decode("utf-8", "surrogateescape")
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
-        places = [m.span() for m in TOKENS.finditer(text)]
+        places = [match.span() for match in TOKENS.finditer(text)]
         if not places:
             break
-        a, b = draw.choice(places)
-        c, d = draw.choice(places)
-        match draw.randrange(5):
-            case 0:
-                text = text[:a] + draw.choice(WORDS) + text[b:]
-            case 1:
-                text = text[:a] + text[c:d] + text[b:]
-            case 2:
-                text = text[:a] + text[b:]
-            case 3:
-                text = text[:a] + text[min(a, c) : max(b, d)][:2000] + text[a:]
-            case 4:
-                quoted = text[a:b].startswith('"')
-                word = draw.choice(WORDS)
-                text = text[:a] + (json.dumps(word) if quoted else word) + text[b:]
-    return text.encode("utf-8", "surrogatepass" if draw.random() < 0.5 else "replace")
+        (a, b), (c, d) = draw.choice(places), draw.choice(places)
+        word = draw.choice(WORDS)
+        if text[a] == '"':
+            word = draw.choice((word, json.dumps(word)))
+        repeated = text[min(a, c) : max(b, d)][:2000] + text[a:b]
+        text = text[:a] + draw.choice((word, word, text[c:d], "", repeated)) + text[b:]
+    return text.encode("utf-8", draw.choice(("surrogatepass", "replace")))
 
 
 def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
-    """Another type, shape or value; JSON text within is mutated as text."""
-    if array.dtype.kind == "U" and array.size == 1 and draw.random() < 0.8:
-        text = of_text(str(array.reshape(())[()]).encode(), draw).decode("utf-8", "surrogateescape")
-        return np.array(text)
-    match draw.randrange(8):
-        case 0:
-            kind = draw.choice(("u1", "i2", ">u2", "f4", ">f8", "c16", "?", "U3", "S2", "M8[s]"))
-            try:
-                return array.astype(kind)
-            except (TypeError, ValueError):
-                return array.astype("S2")
-        case 1:
-            return array[: draw.randrange(len(array) + 1)] if array.ndim else array.reshape(1)
-        case 2:
-            return array.reshape(-1)
-        case 3:
-            return array[None]
-        case 4:
-            return np.swapaxes(array, 0, -1) if array.ndim else array.reshape(1, 1)
-        case 5:
-            return array[..., :0] if array.ndim else np.zeros(0)
-        case 6:
-            return np.concatenate([array] * draw.choice((2, 20))) if array.ndim else array
-    if not array.size or array.dtype.kind not in "uif":
-        return np.zeros(3)
-    out = array.copy()
-    flat = out.reshape(-1)
-    where = [draw.randrange(flat.size) for _ in range(draw.choice((1, 3, 100)))]
+    """Another type, shape or value; a text is damaged as a text."""
+    if array.dtype.kind == "U" and array.size == 1 and draw.randrange(5):
+        text = of_text(str(array.item()).encode(), draw)
+        return np.array(text.decode("utf-8", "surrogateescape"))
+    rows = np.atleast_1d(array)
+    changed = rows.copy()
+    where = [draw.randrange(changed.size + 1) for _ in range(draw.choice((1, 3, 100)))]
+    inside = [i for i in where if i < changed.size]
     if array.dtype.kind == "f":
-        flat[where] = draw.choice((np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 1e18, -1.0))
-    else:
+        changed.reshape(-1)[inside] = draw.choice(FLOATS)
+    elif array.dtype.kind in "ui":
         limits = np.iinfo(array.dtype)
-        flat[where] = draw.choice((limits.min, limits.max, 0))
-    return out
+        changed.reshape(-1)[inside] = draw.choice((limits.min, limits.max, 0))
+    kind = draw.choice(TYPES) if array.dtype.kind in "buif" else "S2"
+    with np.errstate(all="ignore"):
+        shapes = (
+            *(changed, changed, np.zeros(3), rows.astype(kind), rows.reshape(-1), rows[None]),
+            *(rows[: draw.randrange(len(rows) + 1)], np.swapaxes(rows, 0, -1), rows[..., :0]),
+            np.concatenate([rows] * draw.choice((2, 20))),
+        )
+    return draw.choice(shapes)
 
 
 def npy(array: NDArray[Any], draw: Random) -> bytes:
-    """An array as a file of its own, its header damaged now and then."""
+    """The array as an .npy file, whose header is damaged at times."""
     file = io.BytesIO()
     np.lib.format.write_array(file, np.asarray(array), allow_pickle=False)
     data = file.getvalue()
-    if draw.random() < 0.2:
+    way = draw.randrange(20)
+    if way > 15:
         size = struct.unpack("<H", data[8:10])[0]
         header = of_text(data[10 : 10 + size], draw)[:65535]
-        data = data[:8] + struct.pack("<H", len(header)) + header + data[10 + size :]
-    elif draw.random() < 0.05:
-        data = of_bytes(data, draw)
-    return data
+        return data[:8] + struct.pack("<H", len(header)) + header + data[10 + size :]
+    return of_bytes(data, draw) if way == 15 else data
 
 
 @cache
 def bomb() -> bytes:
-    """64 MB of zeros, deflated to 64 kB, as an array of uint8."""
+    """64 MB of zeros as an .npy file."""
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("x.npy", npy(np.zeros(1 << 26, np.uint8), Random(0)))
+    np.save(file, np.zeros(1 << 26, np.uint8))
     return file.getvalue()
 
 
 def of_npz(data: bytes, draw: Random) -> bytes:
-    """Members changed, renamed, doubled, left out or put in; now and then the archive's bytes."""
-    if draw.random() < 0.2:
+    """An array of the archive changed, renamed, exchanged or left out; at times the bytes."""
+    if draw.randrange(5) == 4:
         return of_bytes(data, draw)
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
         arrays = {key: loaded[key] for key in loaded.files}
-    chosen = draw.choice(sorted(arrays))
     out = io.BytesIO()
-    kinds = [zipfile.ZIP_STORED] * 6 + [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA]
-    with zipfile.ZipFile(out, "w", draw.choice(kinds)) as archive:
-        for key, array in arrays.items():
-            name = f"{key}.npy"
-            if key == chosen:
-                match draw.randrange(8):
-                    case 0:
-                        continue
-                    case 1:
-                        name = draw.choice((key, f"{key}.txt", f"../{key}.npy", f"{key}\x1b.npy"))
-                    case 2:
-                        array = arrays[draw.choice(sorted(arrays))]
-                    case _:
-                        array = of_array(array, draw)
-            archive.writestr(name, npy(array, draw))
-    if draw.random() < 0.01:
-        # A member that nobody asked for, a thousand times the size of the file.
-        with zipfile.ZipFile(out, "a", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("more.npy", zipfile.ZipFile(io.BytesIO(bomb())).read("x.npy"))
+    # Stored, mostly; deflated, BZIP2, LZMA.
+    with zipfile.ZipFile(out, "w", draw.choice((0, 0, 0, 0, 0, 0, 8, 12, 14))) as archive:
+        if draw.randrange(100) == 99:
+            archive.writestr("more.npy", bomb(), zipfile.ZIP_DEFLATED)
+        key = draw.choice(sorted(arrays))
+        array, way = arrays.pop(key), draw.randrange(8)
+        names = (key, f"{key}.txt", f"../{key}.npy", f"{key}\x1b.npy")
+        if way == 6 and arrays:
+            array = arrays[draw.choice(sorted(arrays))]
+        if way != 7:
+            name = draw.choice(names) if way == 5 else f"{key}.npy"
+            archive.writestr(name, npy(of_array(array, draw) if way < 5 else array, draw))
+        for other, array in arrays.items():
+            archive.writestr(f"{other}.npy", npy(array, draw))
     return out.getvalue()
 
 
 def of_onnx(data: bytes, draw: Random) -> bytes:
-    """Metadata, operators, attributes, edges, constants; now and then bytes."""
-    if draw.random() < 0.3:
+    """Metadata, operators, attributes, edges or constants changed; at times the bytes."""
+    if draw.randrange(3) == 2:
         return of_bytes(data, draw)
     model = onnx.load_from_string(data)
     graph = model.graph
-    node = draw.choice(graph.node)
-    constant = draw.choice(graph.initializer)
-    match draw.randrange(10):
-        case 0 | 1 | 2 | 3:
-            prop = draw.choice(model.metadata_props)
-            prop.value = of_text(prop.value.encode(), draw).decode("utf-8", "replace")
-        case 4:
-            others = ["Loop", "Exp", "Identity", *(n.op_type for n in graph.node)]
-            node.op_type = draw.choice(others)
-        case 5:
-            if node.input:
-                names = [*(i.name for i in graph.initializer), "features", "", "nowhere"]
-                node.input[draw.randrange(len(node.input))] = draw.choice(names)
-        case 6:
-            if node.attribute:
-                attribute = draw.choice(node.attribute)
-                attribute.i = draw.choice((-1, 0, 1, 7, 1 << 40))
-        case 7:
-            constant.dims[:] = [draw.choice((0, 1, 3, 1 << 33)) for _ in constant.dims]
-        case 8:
-            array = of_array(numpy_helper.to_array(constant), draw)
-            if array.dtype.kind in "uif" and array.dtype.isnative:
-                constant.CopyFrom(numpy_helper.from_array(array, constant.name))
-        case 9:
-            model.opset_import[0].version = draw.choice((0, 1, 7, 17, 21, 999))
+    node, constant = draw.choice(graph.node), draw.choice(graph.initializer)
+    way = draw.randrange(10)
+    if way < 4:
+        prop = draw.choice(model.metadata_props)
+        prop.value = of_text(prop.value.encode(), draw).decode("utf-8", "replace")
+    elif way == 4:
+        node.op_type = draw.choice(["Loop", "Exp", "Identity", *(n.op_type for n in graph.node)])
+    elif way == 5 and node.input:
+        names = [*(i.name for i in graph.initializer), "features", "", "nowhere"]
+        node.input[draw.randrange(len(node.input))] = draw.choice(names)
+    elif way == 6 and node.attribute:
+        draw.choice(node.attribute).i = draw.choice((-1, 0, 1, 7, 1 << 40))
+    elif way == 7:
+        constant.dims[:] = [draw.choice((0, 1, 3, 1 << 33)) for _ in constant.dims]
+    elif way == 8:
+        array = of_array(numpy_helper.to_array(constant), draw)
+        if array.dtype.kind in "uif" and array.dtype.isnative:
+            constant.CopyFrom(numpy_helper.from_array(array, constant.name))
+    else:
+        model.opset_import[0].version = draw.choice((0, 1, 7, 17, 21, 999))
     return bytes(model.SerializeToString())
