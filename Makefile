@@ -135,8 +135,7 @@ transfer: SCENE := train/scenes/household.toml
 transfer: $(BENCHVENV)
 	$(BIN)/python -m train simulate $(SCENE) --out $(OUT)/transfer/simulated
 	$(BIN)/python -m export --data $(OUT)/transfer/simulated --out $(OUT)/transfer $(EXPORT)
-	$(BIN)/python -m bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer \
-	  --ours $(OUT)/transfer/simulated
+	$(BIN)/python -m bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer
 
 matched: $(BENCHVENV)
 	$(BIN)/python -m bench.matched

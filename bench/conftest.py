@@ -1,8 +1,8 @@
-"""Speed as ratios: ours and each rival in turn, round by round, in one run.
+"""Speed as a ratio: each round times the rivals and then ours.
 
-A benchmark calls `against(ours, {"rival": callable}, ...)`. Every round times the rivals and
-then ours, so that a machine whose speed drifts treats them alike; the ratio is the median over
-the rounds. The table at the end has each ratio beside its target.
+A benchmark calls `against(ours, {"rival": callable}, ...)`. Alternating rounds keep the ratio fair
+on a machine whose speed drifts; the ratio is the median over the rounds. The table at the end
+shows each ratio beside its target.
 """
 
 from __future__ import annotations
@@ -21,7 +21,18 @@ def pytest_configure(config):
 
 
 @pytest.fixture
-def against(benchmark, request):
+def note(request):
+    """Add a line to the table: the rival, the ratio, its bound, and seconds of ours and theirs."""
+
+    def add(rival, ratio, bound, ours=None, theirs=None):
+        name = request.node.name.removeprefix("bench_")
+        request.config.stash[ROWS].append((name, rival, ours, theirs, ratio, bound))
+
+    return add
+
+
+@pytest.fixture
+def against(benchmark, note):
     """Time ours beside its rivals; `most` is {rival: largest allowed ours / rival}."""
 
     def run(ours, rivals, *, most=None, least=None, calls=20, rounds=ROUNDS):
@@ -31,23 +42,23 @@ def against(benchmark, request):
         seen: dict[str, list[float]] = {name: [] for name in rivals}
         own: list[float] = []
 
-        def rivals_first():
-            for name, rival in rivals.items():
-                began = time.perf_counter()
-                for _ in range(calls):
-                    rival()
-                seen[name].append((time.perf_counter() - began) / calls)
-
-        def round_of_ours():
+        def timed(function):
             began = time.perf_counter()
             for _ in range(calls):
-                ours()
-            own.append((time.perf_counter() - began) / calls)
+                function()
+            return (time.perf_counter() - began) / calls
+
+        def rivals_first():
+            for name, rival in rivals.items():
+                seen[name].append(timed(rival))
+
+        def round_of_ours():
+            own.append(timed(ours))
 
         benchmark.pedantic(round_of_ours, setup=rivals_first, rounds=rounds, iterations=1)
         mine = statistics.median(own)
         for name, times in seen.items():
-            # pedantic calls once more than it counts where it warms up: pair from the end.
+            # A warm-up round comes first and is not counted, so pair from the end.
             pairs = list(zip(own[::-1], times[::-1], strict=False))
             ratio = statistics.median(a / b for a, b in pairs)
             bound = "-"
@@ -55,28 +66,12 @@ def against(benchmark, request):
                 bound = f"at most {most[name]:g}"
             elif least and name in least:
                 bound = f"at most {1 / least[name]:.3g} ({least[name]:g} times faster)"
-            rival = statistics.median(times)
-            request.config.stash[ROWS].append(
-                (request.node.name.removeprefix("bench_"), name, mine, rival, ratio, bound)
-            )
+            note(name, ratio, bound, mine, statistics.median(times))
         if not rivals:
-            request.config.stash[ROWS].append(
-                (request.node.name.removeprefix("bench_"), "-", mine, None, None, "-")
-            )
+            note("-", None, "-", mine)
         return mine
 
     return run
-
-
-@pytest.fixture
-def note(request):
-    """Add a line to the table: what, against what, ours, its bound."""
-
-    def add(against, ratio, bound):
-        name = request.node.name.removeprefix("bench_")
-        request.config.stash[ROWS].append((name, against, None, None, ratio, bound))
-
-    return add
 
 
 def _micro(seconds):

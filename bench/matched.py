@@ -1,12 +1,12 @@
-"""The same four touches in both engines, beside what theory says: `make matched`.
+"""`make matched`: the same four touches in MuJoCo and in our simulator, beside theory.
 
-A face parallel to the forearm, rigid or soft, fixed or movable, with skin friction: means from 0.9
-to 1.2 s after the touch, and how far the thing has moved by then. Theory is quasi-static: a fixed
-face bears the arm's stiffness times its advance, a sliding one mu m g; a soft one's contact is as
-wide as on an elastic layer under that load, and its pressure a half ellipse. By then what moves
-has let the forearm swing on by some 17 degrees: its force is still what friction says, less what
-the arm's slowing takes, but peak and area on an end that the forearm lies over askew are no longer
-a layer's, and theory is silent.
+The face is parallel to the forearm, rigid or soft, fixed or movable, with skin friction. The table
+has means from 0.9 to 1.2 s after the touch, and the motion of the thing by then. Theory is
+quasi-static. A fixed face bears the arm's stiffness times its advance; a sliding one bears mu m g.
+A soft face's contact is as wide as on an elastic layer under that load, and its pressure is a half
+ellipse. A movable thing lets the forearm swing on by some 17 degrees in that time. Its force is
+still the friction, less what slows the arm, but the forearm now lies askew over the face's end,
+where theory gives no peak and no area.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 
 UPRIGHT_DEG = (0.0, -4.0, 0.0, -3.9, 0.0)
-"""What lets the forearm hang straight as it touches: a standing face is then parallel to it."""
+"""With this start the forearm hangs straight as it touches, parallel to a standing face."""
 MIDDLE_M, PITCH_M, ROUND_M = 0.10332, 0.0108, 0.01205
-"""Of the skin's 16 rows, and from taxel to taxel along and around the forearm."""
+"""The middle of the skin's 16 rows; distances of taxels along and around the forearm."""
 BOX = Thing("box", floor=0.3, skin=0.4, height_m=0.3, below_m=0.15)
 FOAM = Thing("foam", floor=0.3, skin=0.4, height_m=14 * PITCH_M, breadth_m=0.15, modulus_pa=8e3)
-"""The box is taller than the skin and the foam ends between two rows: on an end a pad is a ball
-and our taxel a square, which is no question of physics."""
+"""The box is taller than the skin and the foam ends between two rows. On an end, MuJoCo's pad is a
+ball and our taxel a square, which says nothing about physics."""
 SCENES = {
     "rigid fixed": (BOX, True),
     "rigid movable": (BOX, False),
@@ -61,7 +61,7 @@ def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
-    """The same in ours."""
+    """Frames, force and motion in our simulator."""
     item = {
         "name": "thing",
         "family": "foam" if thing.soft else "rigid",
@@ -92,7 +92,7 @@ def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def theory(thing: Thing, fixed: bool) -> dict[str, float]:
-    """What is right where things are quasi-static; NaN where theory has no simple answer."""
+    """The quasi-static values; NaN where theory has no simple answer."""
     middle = 0.5 * (FROM_S + TO_S)
     hold = math.inf if fixed else thing.floor * thing.mass_kg * 9.81
     out = dict.fromkeys(ALLOWED, math.nan)
@@ -115,11 +115,10 @@ def theory(thing: Thing, fixed: bool) -> dict[str, float]:
             brentq(lambda a: min(load(a), hold) / ARM_N_M + pressed(a) - advance, 1e-6, 0.2)
         )
 
-    a = (
-        half_width(SPEED_M_S * middle)
-        if fixed
-        else float(brentq(lambda a: load(a) - hold, 1e-6, 0.2))
-    )
+    if fixed:
+        a = half_width(SPEED_M_S * middle)
+    else:
+        a = float(brentq(lambda a: load(a) - hold, 1e-6, 0.2))
     force = load(a)
     out["total force, N"] = force
     out["motion, mm"] = 0.0 if fixed else 1e3 * (SPEED_M_S * TO_S - hold / ARM_N_M - pressed(a))
@@ -148,10 +147,10 @@ def table() -> str:
     head = f"{'':16}{'':16}{'MuJoCo':>9}{'ours':>9}{'off':>7}{'allowed':>9}{'theory':>9}"
     lines = [head]
     for name, (thing, fixed) in SCENES.items():
-        one, two = measured(*theirs(thing, fixed)), measured(*ours(thing, fixed))
+        mujoco, own = measured(*theirs(thing, fixed)), measured(*ours(thing, fixed))
         right = theory(thing, fixed)
         for quantity, allowed in ALLOWED.items():
-            a, b = one[quantity], two[quantity]
+            a, b = mujoco[quantity], own[quantity]
             off = f"{100 * (b / a - 1):+.0f} %" if a > 1.0 or quantity != "motion, mm" else "-"
             law = "-" if math.isnan(right[quantity]) else f"{right[quantity]:.3g}"
             lines.append(f"{name:16}{quantity:16}{a:>9.3g}{b:>9.3g}{off:>7}{allowed:>7} %{law:>9}")

@@ -1,4 +1,4 @@
-"""An elastic layer for `mujoco_touch`: what is soft, but for plants."""
+"""The elastic layer of `mujoco_touch`: the face of every soft thing except a plant."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ABOVE_FLOOR_M = 0.30
-"""Of the middle of the contact."""
+"""Height of the middle of the contact."""
 NET_M, FACE_M, LAYER_KG_M2 = 0.0108, 0.008, 8.7
 """The pitch of the net, half the face's thickness, and the layer's mass."""
 SOLIMP, CONTACT = 0.95, "-1e5 -600"
@@ -17,7 +17,7 @@ SHEAR_N_M, SHEAR_NS_M = 1e4, 15.0
 
 
 def beneath_n_m(modulus_pa: float) -> float:
-    """What the layer gives beneath one taxel, finer than its net: 2 E times the net's pitch."""
+    """Stiffness of the layer beneath one taxel, finer than its net: 2 E times the net's pitch."""
     return 2.0 * modulus_pa * NET_M
 
 
@@ -27,10 +27,10 @@ def layer_xml(
     """An elastic layer: a net of sprung knots, the springs between neighbours (together a Pasternak
     foundation) and the face stretched over the net.
 
-    The face has to be smooth and its net as fine as the skin: flat blocks in its place, each
-    borne by the one pad that stands out most, tripled the highest load of a taxel. Beside an
-    elastic block by finite elements (8 kPa, 0.1 m thick, the arm upright or askew by 17 degrees)
-    the net's depth, area and highest load are within 15 %.
+    The face is smooth and its net as fine as the skin. Flat blocks would triple the highest load of
+    a taxel, because a single pad bears each block. Compared with finite elements of an elastic
+    block (8 kPa, 0.1 m thick, the arm upright or askew by 17 degrees), the net's depth, area and
+    highest load are within 15 %.
     """
     high, wide = min(height_m, 0.20), min(breadth_m, 0.15)
     rows, cols = round(high / NET_M), round(wide / NET_M)
@@ -43,7 +43,7 @@ def layer_xml(
         for c in range(cols + 1):
             part = (0.5 if r in (0, rows) else 1.0) * (0.5 if c in (0, cols) else 1.0)
             y, z = (c - cols / 2) * dy, ABOVE_FLOOR_M + (r - rows / 2) * dz
-            # What wears the face may have no joint that is damped: it is fixed to what has.
+            # A body with a face may have no damped joint, so the face hangs on a second body.
             xml += (
                 f'<body pos="{FACE_M} {y} {z}"><joint name="b{r}_{c}" type="slide" axis="1 0 0" '
                 f'stiffness="{k * part}" damping="{0.06 * k * part + 0.02}" '
@@ -76,11 +76,10 @@ def layer_xml(
 
 
 class Rub:
-    """Friction between skin and layer: Coulomb's, on the stretch of the skin along the forearm, to
-    which a soft face fits itself.
+    """Coulomb friction between skin and layer, on the stretch of the skin along the forearm.
 
-    Friction at each pad instead would jam: the knots under them yield in one direction alone, and
-    pads that lean against each other across a dent then bear loads that no net would give them.
+    Friction at each pad would jam instead. The knots under the pads yield in one direction only, so
+    pads on the two sides of a dent would lean against each other and bear loads of no real net.
     """
 
     def __init__(self, model: Any, friction: float) -> None:
@@ -113,9 +112,9 @@ class Rub:
             )
 
     def _speed(self, data: Any, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(3,) m/s of a body's point."""
+        """(3,) m/s of a point of a body."""
         import mujoco
 
-        found = np.zeros(6)
-        mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, body, found, 0)
-        return np.asarray(found[3:] + np.cross(found[:3], point - data.xpos[body]))
+        spatial = np.zeros(6)
+        mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, body, spatial, 0)
+        return np.asarray(spatial[3:] + np.cross(spatial[:3], point - data.xpos[body]))

@@ -1,9 +1,9 @@
-"""Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and what it meets.
+"""Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and a thing.
 
-The arm is Cody's chain with its masses on gravity-compensated links, driven as an impedance
-controller drives it. Each taxel that can meet anything is a pad on a spring along its normal, and
-reads what the spring bears. Things stand on a floor under gravity, or are clamped; what is soft is
-an elastic layer (`mujoco_layer`), and a plant is a set of hinged stems.
+The arm is Cody's chain with its masses on gravity-compensated links, driven by an impedance
+controller. Each taxel that can meet the thing is a pad on a spring along its normal, and reads
+the spring's force. The thing stands on a floor under gravity, or is clamped. A soft thing has an
+elastic layer (`mujoco_layer`); a plant is a set of hinged stems.
 """
 
 from __future__ import annotations
@@ -29,30 +29,30 @@ COUNTS_PER_NEWTON, THRESHOLD_COUNTS, ONSET_COUNTS = 1000.0, 40, 60
 RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
-"""Taxels whose normal lies farther from the push than this can't meet anything."""
+"""A taxel whose normal lies farther from the push than this cannot meet the thing."""
 PAD_M, PAD_FLAT_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.0035, 0.02, 0.0015
 """A pad's radius around the forearm and half its straight part along it (flat over a taxel's 9 mm,
-to 0.1 mm); its mass, and its loss as a part of its stiffness."""
+to 0.1 mm); its mass; its damping divided by its stiffness."""
 SOLIMP, RIGID = 0.95, "-1e6 -2e3"
-"""MuJoCo's constraint: its stiffness is SOLIMP / (1 - SOLIMP) times solref's and the mass in it."""
+"""MuJoCo's contact is SOLIMP / (1 - SOLIMP) times as stiff as solref times the mass."""
 ABOVE_FLOOR_M = 0.30
-"""Of the middle of the contact."""
+"""Height of the middle of the contact."""
 FOOT_M = 0.16
-"""Length of what a thing stands on, along the push."""
+"""Length of a thing's foot along the push."""
 
 
 @dataclass(frozen=True)
 class Thing:
-    """What is touched.
+    """The thing that is touched.
 
     Attributes:
         kind: box, drum, foam, cushion, bale or plant.
-        mass_kg, floor, skin: and its friction on the floor and on the skin.
+        mass_kg, floor, skin: its mass, and its friction on the floor and on the skin.
         height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
-        below_m: how far a rigid face goes on below the middle of the contact; to the floor.
-        modulus_pa, thick_m: of what is soft; `sideways` its shear foundation, as a part of
-            modulus times thickness.
-        stems, stem_n_m: of a plant, each at the height of the contact.
+        below_m: how far a rigid face reaches below the middle of the contact (default: the floor).
+        modulus_pa, thick_m: of a soft layer.
+        sideways: the layer's shear stiffness divided by modulus times thickness.
+        stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the contact.
         seed: of a plant's shape.
     """
 
@@ -78,15 +78,15 @@ class Thing:
 
 @dataclass(frozen=True)
 class Touch:
-    """How it is touched; what is not given is as it would be by a machine.
+    """How the thing is touched; the defaults are those of a perfect machine.
 
     Attributes:
-        start_rad: (dof,) what is added to the arm's first angles.
-        place_m: where along the forearm, from the wrist.
-        aside_m, yaw_rad: how far beside the push it stands, and turned.
-        slope_rad: of the table, along the push.
+        start_rad: (dof,) added to the arm's first angles.
+        place_m: place of the contact along the forearm, from the wrist.
+        aside_m, yaw_rad: the thing's distance beside the push, and its turn.
+        slope_rad: slope of the table along the push.
         taxel_n_m: stiffness of the pads.
-        noise: counts, and its stream.
+        noise: standard deviation in counts, and its stream.
     """
 
     thing: Thing
@@ -102,11 +102,11 @@ class Touch:
 
 @dataclass
 class Touched:
-    """What happened: the recording, and what no skin can see.
+    """The recording of a touch, and quantities that the skin cannot see.
 
     Attributes:
         force: (n,) newtons that the pads bear.
-        moved_m: (n,) how far the thing has moved at the height of the contact.
+        moved_m: (n,) motion of the thing at the height of the contact.
     """
 
     recording: Recording
@@ -115,12 +115,12 @@ class Touched:
 
 
 def is_layer(touch: Touch) -> bool:
-    """Whether what is touched is an elastic layer."""
+    """Whether the thing has an elastic layer."""
     return touch.thing.soft and touch.thing.kind != "plant"
 
 
 def pad_n_m(touch: Touch) -> float:
-    """Stiffness of a pad; where a layer is touched, with what that gives beneath it."""
+    """Stiffness of a pad, in series with the layer beneath it where there is a layer."""
     if not is_layer(touch):
         return touch.taxel_n_m
     return 1.0 / (1.0 / touch.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(touch.thing.modulus_pa))

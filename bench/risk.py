@@ -1,14 +1,14 @@
 """`make risk`: how often a certified error rate is exceeded, over many simulated data sets.
 
-One large set is simulated and measured. Data sets of the size asked for are drawn from it; each is
-fitted as an export would, the choice of features, projection and neighbours included, and the error
-of its decisions is counted on all trials that were not drawn. A certificate may fail in one set of
-ten (`train.stopping.RISK`): that is of all sets, those whose request was refused among them. Of the
-few that certify an error close to what the trials can reach, more than a tenth exceed it, as it is
-luck that brought them there.
+A large set is simulated and measured once. Data sets of the requested size are drawn from it. Each
+is fitted as an export would fit it, with the choice of features, projection and neighbours, and the
+error of its decisions is counted on all trials that were not drawn.
 
-The first rule of each set, the full window with the smallest error that the trials certify, is
-counted as well: its bound is exceeded where the model errs more often than the bound.
+A certificate may fail in one data set of ten (`train.stopping.RISK`), counted over all sets, also
+those whose request was refused. Of the few sets that certify an error close to the lowest that the
+trials can reach, more than a tenth exceed it, because only lucky sets certify it.
+
+The row "the smallest" counts the smallest error that each set certifies.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ POOL = 50
 
 @dataclass(frozen=True)
 class Drawn(DataSet):
-    """Some trials of a large set, whose vectors were measured once.
+    """Trials of a large set whose vectors were measured once.
 
     Attributes:
         vectors: {window: (all trials, p)}.
         columns: {feature: its columns}.
-        rows: which of all trials these are.
+        rows: indices of these trials among all.
     """
 
     vectors: Mapping[float, NDArray[np.float64]]
@@ -62,24 +62,24 @@ class Drawn(DataSet):
     def features(
         self, window_s: float = WINDOW_S, samples: int = SAMPLES, names: Sequence[str] | None = None
     ) -> NDArray[np.float64]:
-        """As of `DataSet`."""
+        """As `DataSet.features`."""
         names = self.names if names is None else names
         columns = np.concatenate([self.columns[name] for name in names])
         return np.asarray(self.vectors[window_s][self.rows[:, None], columns])
 
     def some(self, rows: NDArray[np.int64]) -> Drawn:
-        """Some of these trials."""
+        """The trials of these rows."""
         return replace(self, trials=tuple(self.trials[i] for i in rows), rows=self.rows[rows])
 
 
 def measured(dataset: DataSet) -> Drawn:
-    """All trials of a data set, measured at `POINTS_S`; only the ends of recordings are kept."""
+    """All trials of a data set, measured at `POINTS_S`; frames are dropped to save memory."""
     widths = dataset.widths(SAMPLES)
     parts = np.split(np.arange(sum(widths)), np.cumsum(widths)[:-1])
     trials = []
     for trial in dataset.trials:
-        whole, series = trial.recording, trial.series.thinned(len(trial.series.t))
-        ends = replace(whole, t=whole.t[[0, -1]], frames=whole.frames[[0, -1]], joints=None)
+        full, series = trial.recording, trial.series.thinned(len(trial.series.t))
+        ends = replace(full, t=full.t[[0, -1]], frames=full.frames[[0, -1]], joints=None)
         trials.append(replace(trial, recording=ends, series=series))
     return Drawn(
         **{**vars(dataset), "trials": tuple(trials)},
@@ -90,9 +90,9 @@ def measured(dataset: DataSet) -> Drawn:
 
 
 def realised(pool: Drawn, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(tasks, 1 + errors, 3): asked error, share wrong and mean seconds, NaN where refused.
+    """(tasks, 1 + errors, 3): requested error, share wrong, mean seconds; NaN where refused.
 
-    The first of a task is asked for the smallest error that is certified.
+    The first request of each task is the smallest error that is certified.
     """
     others = pool.some(np.setdiff1d(np.arange(len(pool.trials)), rows))
     fitted = fit(pool.some(rows), tasks=TASKS, decision_points_s=POINTS_S, quick=True, jobs=1)
@@ -100,8 +100,8 @@ def realised(pool: Drawn, rows: NDArray[np.int64]) -> NDArray[np.float64]:
     assert model is not None
     X = np.stack([others.features(s, SAMPLES, fitted.dataset.names) for s in POINTS_S])
     every, seconds = np.arange(X.shape[1]), np.array(POINTS_S)
-    found = np.full((len(TASKS), 1 + len(ERRORS), 3), np.nan)
-    for task, out in zip(TASKS, found, strict=True):
+    outcomes = np.full((len(TASKS), 1 + len(ERRORS), 3), np.nan)
+    for task, out in zip(TASKS, outcomes, strict=True):
         with threadpool_limits(1):
             named, margins, distances = answers(model.decision_points_, task, X)
         stopping = model.stopping_[task]
@@ -112,12 +112,14 @@ def realised(pool: Drawn, rows: NDArray[np.int64]) -> NDArray[np.float64]:
             if rule is not None:
                 at = stops(confidence, rule)
                 place[:] = error, wrong[at, every].mean(), seconds[at].mean()
-    return found
+    return outcomes
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, draw, count; 1 where a certificate fails more often than chance explains."""
-    features = [name for one in candidates({}, joints=True, quick=True) for name in one.sets]
+    features = [
+        name for candidate in candidates({}, joints=True, quick=True) for name in candidate.sets
+    ]
     with tempfile.TemporaryDirectory() as folder:
         scene = scenes.load(SCENE, count=POOL)
         with tqdm(total=total_trials(scene), desc="simulating", unit=" trials") as bar:
@@ -131,13 +133,13 @@ def run(arguments: argparse.Namespace) -> int:
     draws = [np.sort(rng.permutation(n)[: arguments.trials]) for _ in range(arguments.sets)]
     work = (delayed(realised)(pool, rows) for rows in draws)
     parts = Parallel(n_jobs=arguments.jobs, return_as="generator")(work)
-    found = np.array(list(tqdm(parts, total=len(draws), desc="data sets")))
+    outcomes = np.array(list(tqdm(parts, total=len(draws), desc="data sets")))
     allowed = int(binom.ppf(0.99, len(draws), RISK))
     failed = 0
     print("| task | asked | certified | of all sets, above | wrong on average | mean time, s |")
     print("|---|---|---|---|---|---|")
     names = ("the smallest", *(f"{error:g}" for error in ERRORS))
-    for task, of_task in zip(TASKS, found.swapaxes(0, 1), strict=True):
+    for task, of_task in zip(TASKS, outcomes.swapaxes(0, 1), strict=True):
         for asked, rows in zip(names, of_task.swapaxes(0, 1), strict=True):
             able = rows[~np.isnan(rows[:, 1])]
             above = int((able[:, 1] > able[:, 0]).sum())

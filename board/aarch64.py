@@ -1,16 +1,12 @@
 """An aarch64 Linux without a board: Debian's Python under qemu, in a folder, without root.
 
-    python board/aarch64.py build dist/edge_classify-*.whl
-    build/aarch64/python -m edge.cli --version
-
 `build` fetches qemu and an arm64 Python with the machine's own apt, and the aarch64 wheels with
-pip; nothing is installed on the machine. What is there from the last time is used again. It
-proves wheels and numbers; of time it proves nothing.
+pip. It installs nothing on the machine, and uses again what an earlier run has fetched. The result,
+`build/aarch64/python`, shows whether wheels load and numbers agree; it says nothing about time.
 """
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 import sys
@@ -23,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parent
 FOLDER = CHECKOUT / "build" / "aarch64"
 CPU = "cortex-a72"
-"""The Raspberry Pi 4's: what newer boards add must not be needed."""
+"""The Raspberry Pi 4's: nothing may need the instructions that newer boards add."""
 EMULATOR = ("qemu-user",)
 SYSTEM = ("python3-minimal", "libpython3-stdlib", "libstdc++6", "libgomp1")
 BOARD = ("numpy", "onnxruntime", "smbus2")
@@ -42,7 +38,7 @@ CPU revision\t: 3
 
 Model\t\t: Raspberry Pi 4 Model B Rev 1.4
 """
-"""ONNX Runtime reads /proc/cpuinfo, and crashes on that of another architecture."""
+"""ONNX Runtime reads /proc/cpuinfo, and crashes on one of another architecture."""
 
 WRAPPER = """\
 #!/bin/sh
@@ -56,10 +52,10 @@ exec '{loader}' --library-path '{libraries}' '{emulator}' \\
 
 
 def build(wheel: Path, folder: Path = FOLDER) -> Path:
-    """Make the root where it is not there yet, put the wheel in; returns its `python`.
+    """Make the root unless it exists, put the wheel in, and return its `python`.
 
     Raises:
-        Unavailable: apt, a compiler or a package registry cannot be had here.
+        Unavailable: apt, a compiler or a package registry is missing here.
     """
     for tool in ("apt-get", "dpkg", "cc"):
         if shutil.which(tool) is None:
@@ -100,9 +96,9 @@ def _site(target: Path, version: str, constraints: Path) -> None:
 
 
 def _wrapper(folder: Path, python: Path) -> Path:
-    """The program that runs the root's Python.
+    """Write the script that runs the root's Python.
 
-    To Python it is its own executable, so that a test that starts another Python gets the same.
+    Python takes the script for its own executable, so that a test that starts Python gets the same.
     """
     qemu = folder / "qemu"
     loaders = [p for at in ("lib64", "lib") for p in sorted(qemu.glob(f"{at}/ld-linux*"))]
@@ -126,22 +122,3 @@ def _wrapper(folder: Path, python: Path) -> Path:
     if machine != "aarch64":
         raise Unavailable(f"qemu runs a machine of {machine}, not aarch64")
     return wrapper
-
-
-def main() -> int:
-    """Build from the command line; 2 where that cannot be done here."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    commands = parser.add_subparsers(required=True)
-    command = commands.add_parser("build", help="make the root and put the wheel in")
-    command.add_argument("wheel", type=Path)
-    arguments = parser.parse_args()
-    try:
-        print(build(arguments.wheel))
-    except Unavailable as error:
-        print(f"aarch64: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

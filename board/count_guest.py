@@ -1,7 +1,7 @@
-"""What `count.c` counts: the board's path over a recording, a mark before and after each step.
+"""The program whose instructions `count.c` counts: a recording, with marks around each step.
 
-Run as `python count_guest.py MODEL RECORDING` under the plugin. Prints the names of the steps,
-a line for each pair of marks.
+Run as `python count_guest.py MODEL RECORDING` under the plugin. It prints the name of a step for
+each pair of marks.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ def main() -> None:
     mark = os.getppid
     names = []
     info = model.info
-    found = first_series(recording, model)
-    assert found is not None, "the recording has no contact"
-    series = found[1]
+    contact = first_series(recording, model)
+    assert contact is not None, "the recording has no contact"
+    series = contact[1]
     vector = feature_vector(series, info.window_s, info.samples, info.features)
     model.decide(vector)
     for _ in range(REPEATS):

@@ -1,8 +1,8 @@
-"""The demo that the wheel carries: a model and four unseen touches, with golden outputs.
+"""Write the demo that the wheel carries: a model, four touches new to it, and golden outputs.
 
     python board/demo_data.py build/demo-data
 
-takes `model.onnx`, `known/` and `unseen/` from that folder (see `make demo-data`) and replaces
+reads `model.onnx`, `known/` and `unseen/` from that folder (see `make demo-data`), and replaces
 `edge/demo/` and `tests/golden/demo.npz`.
 """
 
@@ -32,10 +32,10 @@ def main(folder: Path) -> None:
     model = Model(demo / "model.onnx")
     for touch in TOUCHES:
         recording = load(folder / "unseen" / f"{touch}-00.npz")
-        found = first_series(recording, model)
-        assert found is not None, f"{touch} touches nothing"
-        short = golden.trimmed(replace(recording, valid=None), found[0], model)
-        # Every other frame: half the bytes, and features are sampled in time.
+        contact = first_series(recording, model)
+        assert contact is not None, f"{touch} touches nothing"
+        short = golden.trimmed(replace(recording, valid=None), contact[0], model)
+        # Every other frame takes half the bytes; features are sampled in time.
         arrays = {"t": (short.t - short.t[0])[::2], "frames": short.frames[::2]}
         if short.joints is not None:
             arrays["joints"] = short.joints[::2]

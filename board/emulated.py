@@ -1,34 +1,12 @@
-"""A pytest plugin for tests under emulation: a tenth of the speed, so fewer random examples.
+"""A pytest plugin for tests under emulation, which runs at a tenth of the speed: fewer examples.
 
-Random inputs are searched on the machine itself; here it is asked whether the same code does the
-same on another architecture. What a test waits for another process gets as much longer.
+Random inputs are searched on the machine itself. Under emulation the question is only whether the
+same code gives the same results on another architecture.
 """
-
-import functools
-import subprocess
 
 from hypothesis import HealthCheck, is_hypothesis_test, settings
 
 EXAMPLES = 20
-SLOWER = 10
-"""How many times as long another process may take."""
-
-
-def pytest_configure():
-    """Wait longer for other processes."""
-    for name in ("communicate", "wait"):
-        setattr(subprocess.Popen, name, patient(getattr(subprocess.Popen, name)))
-
-
-def patient(wait):
-    """A method of `Popen` with its time limit stretched."""
-
-    @functools.wraps(wait)
-    def longer(self, *arguments, timeout=None, **named):
-        limit = None if timeout is None else SLOWER * timeout
-        return wait(self, *arguments, timeout=limit, **named)
-
-    return longer
 
 
 def pytest_collection_modifyitems(items):
