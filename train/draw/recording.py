@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import write_whole
@@ -122,6 +123,13 @@ def _frame(
     return image
 
 
+def paper_feature(series: FeatureSeries, name: str) -> NDArray[Any]:
+    """(n,) one of the paper's three features in each frame of a contact."""
+    if name == "max_force":
+        return np.asarray(series.peak / (series.counts_per_newton or 1.0))
+    return series.area if name == "contact_area" else series.motion
+
+
 def _feature(axis: Any, series: FeatureSeries | None, name: str, unit: str) -> None:
     axis.set_title(name)
     axis.set_xlabel("seconds from onset")
@@ -129,7 +137,7 @@ def _feature(axis: Any, series: FeatureSeries | None, name: str, unit: str) -> N
     if series is None:
         axis.text(0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes)
         return
-    axis.plot(series.t, getattr(series, name))
+    axis.plot(series.t, paper_feature(series, name))
     axis.axvspan(0.0, WINDOW_S, color="tab:green", alpha=0.08)
     axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
     axis.set_ylim(bottom=0.0)
