@@ -18,7 +18,7 @@ from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
 from edge.touch.track import ContactTracker, first_contact
 from train.dataset import arm_of
-from train.draw.recording import paper_feature
+from train.draw.recording import curves
 
 MOST = 6
 """More columns would not be readable at the width of a page."""
@@ -173,7 +173,7 @@ def _curve(
     horizon: float,
     decided: Decided | None,
 ) -> None:
-    axis.plot(series.t, paper_feature(series, feature), color="C0", linewidth=2.2)
+    axis.plot(series.t, curves(series)[feature], color="C0", linewidth=2.2)
     end = horizon if decided is None else decided.window_s
     axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
     if decided is not None:

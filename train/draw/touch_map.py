@@ -15,7 +15,7 @@ from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.info import ModelInfo
 from edge.runtime.touch_map import TouchMap
-from train.draw.recording import link_positions
+from train.draw.sketch import link_positions
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"

@@ -19,6 +19,7 @@ STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#3a7d44", "^", "-."),
     ("#7a5195", "D", ":"),
     ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1))),
+    ("#444444", "P", (0, (3, 1, 1, 3))),
 )
 """Colour, marker and dashes of each line, so that no line differs from another by hue alone."""
 COLOURS = tuple(colour for colour, _, _ in STROKES)

@@ -32,9 +32,13 @@ def section(context: Context, every: Sequence[Numbers]) -> Section:
         )
         never = "" if unseen is None else f", and one with an object never met {unseen:.0f} %"
         beside = "" if best_unseen is None else f" ({best_unseen:.0f} % for objects never met)"
+        better = (
+            f"The best of the methods below reaches {methods[best]:.0f} %{beside}: {best}."
+            if methods[best] > nested
+            else "No method below is better."
+        )
         text.append(
             f"{task}: with the paper's features, a new contact with a known object is classified "
-            f"correctly {nested:.0f} % of the time{never}. The best of the methods below reaches "
-            f"{methods[best]:.0f} %{beside}: {best}."
+            f"correctly {nested:.0f} % of the time{never}. {better}"
         )
     return Section("Findings", text, [Table("findings", "In short", rows, narrow=5)])

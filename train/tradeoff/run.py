@@ -21,6 +21,7 @@ from train.simulate import scene as scenes
 from train.stopping import finest
 from train.tradeoff import answer, arithmetic, early, prices, settings, stopping
 from train.tradeoff import board as boards
+from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.measured import Measured
 
 SECTIONS: tuple[Callable[[Measured], Section | None], ...] = (
@@ -93,7 +94,7 @@ def tradeoff(
         main=main,
         board=board,
         prices=sizes,
-        breakaways={} if scene is None else early.breakaway_times(scene),
+        breakaways={} if scene is None else breakaway_times(scene),
         comparisons=compared,
         choices=choices,
         novelty=early.novelty(X[-1], y[most], choices[most], names, columns),

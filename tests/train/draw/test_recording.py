@@ -1,75 +1,29 @@
-"""The sketch of a simulated touch: what leans, turns or bends does so in the picture."""
+"""A recording as a picture, with or without a contact and the sketch of its arm."""
 
-from __future__ import annotations
-
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from train.draw import recording
+from edge import demo
+from edge.errors import InputError
+from edge.recording import Recording, load, save
+from train.__main__ import main
+from train.draw.recording import draw
 
-FIRST = np.array([-0.1, 0.0, -0.4]), np.array([1.0, 0.0, 0.0])
-
-
-def sketch(effects, moved=0.1, since=0.0, **values):
-    axis = Figure().add_subplot()
-    drawn = {"effects": effects, "values": values}
-    now = FIRST[0] + [moved, 0.0, 0.0]
-    return axis, recording._thing(axis, drawn, FIRST, now, since, "blue")
+TOUCH = demo.recordings()[0]
 
 
-def outline(axis):
-    (patch,) = axis.patches
-    return patch.get_xy()[:-1]
+def test_the_sketch_is_drawn_below_the_curves(tmp_path):
+    for words in ([], ["--scene"]):
+        out = tmp_path / f"touch{len(words)}.png"
+        assert main(["show", str(TOUCH), *words, "--out", str(out)]) == 0
+    assert (tmp_path / "touch1.png").stat().st_size > (tmp_path / "touch0.png").stat().st_size
 
 
-def test_what_slides_stands_on_its_floor_where_it_was_pushed_to():
-    still, moved = sketch(["sliding"], 0.0)[0], sketch(["sliding"], 0.1)[0]
-    np.testing.assert_allclose(outline(moved) - outline(still), [[0.1, 0.0]] * len(outline(still)))
-    floor = still.lines[0].get_ydata()[0]
-    assert outline(still)[:, 1].min() == pytest.approx(floor)
-    # What is fixed has not moved, however the contact did.
-    np.testing.assert_array_equal(outline(sketch([], 0.1)[0]), outline(still))
-
-
-def test_what_tips_stands_on_its_edge_until_it_lies():
-    values = {"base_m": 0.1, "height_m": 0.25, "friction_static": 0.9}
-    leaning, says = sketch(["sliding", "tipping"], 0.05, **values)
-    assert says == ", leans by 11 degrees"
-    floor = leaning.lines[0].get_ydata()[0]
-    assert outline(leaning)[:, 1].min() == pytest.approx(floor)
-    lying, says = sketch(["sliding", "tipping"], 0.2, since=0.5, **values)
-    assert says == ", has fallen over"
-    assert outline(lying)[:, 1].min() == pytest.approx(floor)
-    assert np.ptp(outline(lying)[:, 1]) == pytest.approx(0.1)
-
-
-def test_what_turns_is_seen_from_above_turned_about_where_it_is_pushed():
-    values = {"aside_m": 0.05, "foot_m": 0.3}
-    axis, says = sketch(["sliding", "turning"], 0.1, **values)
-    angle = 0.1 * 0.05 / (0.1**2 + 0.05**2)
-    assert says == f", turns by {np.degrees(angle):.0f} degrees"
-    (corner,) = axis.child_axes
-    shown = outline(corner)
-    pushed = np.array([0.1, 0.0])
-    assert corner.lines[0].get_xdata()[0] == pytest.approx(pushed[0])
-    # Its face runs through the place where it is pushed; pushed on the left, it turns right.
-    along = shown[3] - shown[0]
-    assert np.arctan2(along[0], along[1]) == pytest.approx(angle)
-    off = pushed - shown[0]
-    assert along[0] * off[1] - along[1] * off[0] == pytest.approx(0.0, abs=1e-12)
-    assert np.linalg.norm(along) == pytest.approx(0.3)
-
-
-def test_a_plants_stems_bend_to_where_the_forearm_is():
-    values = {"stem_count": 5, "stem_spread_m": 0.08}
-    axis, _ = sketch(["stems"], 0.1, **values)
-    stems = axis.lines[1:]
-    assert len(stems) == 5
-    for stem in stems:
-        (foot, tip), (floor, top) = stem.get_xdata(), stem.get_ydata()
-        share = (FIRST[0][2] - floor) / (top - floor)
-        assert foot + share * (tip - foot) == pytest.approx(0.0)  # at the contact's height
-    pushed, _ = sketch(["stems", "sliding"], 0.1, **values)
-    for stem in pushed.lines[1:]:
-        assert np.ptp(stem.get_xdata()) == 0.0
+def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(make_touch, tmp_path):
+    touch = make_touch()
+    quiet = Recording(touch.t, 0 * touch.frames, meta=touch.meta)
+    save(tmp_path / "quiet.npz", quiet)
+    assert main(["show", str(tmp_path / "quiet.npz")]) == 0
+    assert (tmp_path / "quiet.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match="there is no arm to sketch"):
+        draw(load(tmp_path / "quiet.npz"), tmp_path / "no.png", scene=True)
+    assert not (tmp_path / "no.png").exists()

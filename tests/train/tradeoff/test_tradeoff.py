@@ -20,6 +20,7 @@ from train.evaluate import Result, SearchGrid
 from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
 from train.pipeline import Choice
 from train.tradeoff import answer, board, early
+from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.early import Chooser, NestedChoice
 from train.tradeoff.measured import MeasuredPoint
 from train.tradeoff.run import tradeoff
@@ -278,7 +279,7 @@ class TestEarly:
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
 
-        floors = early.breakaway_times(load(SCENE))
+        floors = breakaway_times(load(SCENE))
         # mu_s m g / (k v): equal arms, so the ratio of two objects is that of mu_s m.
         assert floors["plastic bin"] / floors["cardboard box"] == pytest.approx(0.28 / 0.6)
         # The chair tips: 0.4 / (2 * 0.7) instead of 0.6.

@@ -1,0 +1,170 @@
+"""Sketch a contact from the side: the arm, and the object that was simulated, as it moves."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from edge.recording import Recording
+from edge.touch.arm import Chain
+from edge.touch.features import WINDOW_S
+from edge.touch.layout import SkinLayout
+from edge.touch.region import largest_region
+
+DEPTH_M, STANDS_M = 0.12, 0.15
+"""Depth of an object, and its foot's distance below the contact, where the scene gives none."""
+STEMS = 30
+"""Most stems of a plant that are drawn."""
+LOST_S = 0.3
+"""Seconds without contact after which an object that tips has fallen."""
+
+Place = tuple[np.ndarray, np.ndarray]
+"""Position (3,) of a contact, and the skin's outward normal there (3,)."""
+
+
+def link_positions(chain: Chain, q: Any) -> np.ndarray:
+    """(links, 3) positions of the chain's joints and its tip, in metres."""
+    chains = [Chain(chain.joints[: i + 1]) for i in range(len(chain.joints))]
+    return np.vstack([np.zeros(3), *(part.pose(q[: part.dof])[:3, 3] for part in chains)])
+
+
+def draw_side(
+    axis: Any, recording: Recording, chain: Chain, layout: SkinLayout, onset: float
+) -> None:
+    """Draw the arm at onset and at the end of the window, in the x-z plane of its base.
+
+    A simulated object stands on its table, and slides, leans or turns there.
+    """
+    joints = recording.joints
+    assert joints is not None
+    simulated = recording.meta.get("simulation")
+    drawn = simulated if isinstance(simulated, dict) else {}
+    first: Place | None = None
+    motion = ""
+    for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
+        k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
+        points = link_positions(chain, joints[k])
+        axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
+        last = _last_contact(recording, chain, layout, k)
+        if last is None:
+            continue
+        since, place = last
+        first = first or place
+        if since == 0.0:
+            label = f"contact {text}"
+            axis.plot(place[0][0], place[0][2], "*", color=style, ms=13, ls="none", label=label)
+        if drawn:
+            motion = _thing(axis, drawn, first, place[0], since, style)
+    title = "seen from the side"
+    if drawn:
+        effects, mass = drawn.get("effects"), _size(drawn, "mass_kg")
+        title += f": {drawn.get('family', '')}" + (f", {mass:.2g} kg" if mass else "") + motion
+        title += "\n" + (", ".join(map(str, effects)) if isinstance(effects, list) else "")
+    axis.set_title(title, fontsize=9)
+    axis.set(xlabel=f"x in the frame of {chain.base}, metres", ylabel="z, metres")
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.legend(fontsize=8)
+
+
+def _last_contact(
+    recording: Recording, chain: Chain, layout: SkinLayout, k: int
+) -> tuple[float, Place] | None:
+    """Seconds from the last contact to frame k, and the place of that contact."""
+    joints = recording.joints
+    assert joints is not None
+    for i in range(k, -1, -1):
+        region = largest_region(recording.frames[i], layout.threshold_counts, wraps=layout.wraps)
+        if region is not None:
+            pose, position = chain.pose(joints[i]), layout.position(*region.centroid)
+            place = pose[:3, :3] @ position + pose[:3, 3]
+            return float(recording.t[k] - recording.t[i]), (place, pose[:3, :2] @ position[:2])
+    return None
+
+
+def _size(simulated: dict[str, Any], key: str) -> float | None:
+    """A number that the simulator drew; None where the recording has no plausible one."""
+    values = simulated.get("values")
+    size = values.get(key) if isinstance(values, dict) else None
+    if isinstance(size, bool) or not isinstance(size, int | float):
+        return None
+    return float(size) if 0 < abs(size) < 1e9 else None
+
+
+def _turned(outline: np.ndarray, angle: float) -> np.ndarray:
+    """Points (n, 2) turned clockwise about the origin."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.asarray(outline @ np.array([[c, -s], [s, c]]))
+
+
+def _fill(axis: Any, outline: np.ndarray, style: str) -> None:
+    axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
+
+
+def _thing(
+    axis: Any, drawn: dict[str, Any], first: Place, now: np.ndarray, since: float, style: str
+) -> str:
+    """Draw the object where it now stands; its motion in words, for the title.
+
+    Args:
+        first: the contact at onset.
+        now: (3,) position of the last contact, `since` seconds ago.
+    """
+    start = first[0][[0, 2]]
+    ahead = math.copysign(1.0, first[1][0] or 1.0)
+    height = _size(drawn, "height_m") or STANDS_M
+    width = _size(drawn, "width_m") or 0.1
+    top, floor = 0.5 * min(width, 1.0), -max(height, 0.5 * min(width, 0.6))
+    depth = _size(drawn, "base_m") or DEPTH_M
+    z = np.linspace(floor, top, 33)
+    face = np.minimum(z * z / (2.0 * (_size(drawn, "radius_m") or math.inf)), depth / 2.0)
+    outline = np.vstack([np.column_stack([face, z]), [[depth, top], [depth, floor]]])
+    table = start[0] + ahead * np.array([-0.1, depth + 0.25])
+    axis.plot(table, 2 * [start[1] + floor], color="sienna")
+    moved = max(ahead * float(now[0] - first[0][0]), 0.0)
+    given = drawn.get("effects")
+    effects = given if isinstance(given, list) else []
+    slid = moved if "sliding" in effects else 0.0
+    if "stems" in effects:
+        count = int(np.clip(_size(drawn, "stem_count") or 12, 1, STEMS))
+        for behind in np.linspace(0.0, _size(drawn, "stem_spread_m") or 0.06, count):
+            # A pot that slides takes its stems along; otherwise they bend as far as pressed.
+            bent = max(moved - slid - behind, 0.0) * (top - floor) / -floor
+            ends = slid + behind + np.array([0.0, bent])
+            axis.plot(
+                start[0] + ahead * ends, start[1] + [floor, top], color=style, alpha=0.5, lw=1
+            )
+        return ""
+    motion = ""
+    aside, foot = _size(drawn, "aside_m"), _size(drawn, "foot_m")
+    friction = _size(drawn, "friction_static") or 0.0
+    if slid and "tipping" in effects and friction > depth / (2.0 * height):
+        fallen = since > LOST_S
+        lean = 0.5 * math.pi if fallen else min(slid / height, 0.5 * math.pi)
+        edge = np.array([depth, floor])
+        outline = _turned(outline - edge, lean) + edge
+        motion = ", has fallen over" if fallen else f", leans by {math.degrees(lean):.0f} degrees"
+    else:
+        outline[:, 0] += slid
+        if "turning" in effects and aside is not None and foot is not None:
+            angle = slid * aside / ((foot / 3.0) ** 2 + aside**2)
+            _from_above(axis, foot, aside, slid, angle, style)
+            motion = f", turns by {math.degrees(angle):.0f} degrees" if slid else ""
+    _fill(axis, start + outline * [ahead, 1.0], style)
+    return motion
+
+
+def _from_above(
+    side: Any, foot: float, aside: float, moved: float, angle: float, style: str
+) -> None:
+    """Draw an object from above in a corner, pushed to the right and turned about the contact."""
+    if not side.child_axes:
+        corner = side.inset_axes([0.01, 0.6, 0.3, 0.38])
+        corner.set_xlabel("from above", fontsize=8, labelpad=2)
+        corner.set_aspect("equal", adjustable="datalim")
+        corner.set(xticks=[], yticks=[])
+    corner = side.child_axes[0]
+    corners = np.array([[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]]) * foot - [0.0, aside]
+    _fill(corner, _turned(corners, angle) + np.array([moved, 0.0]), style)
+    corner.plot(moved, 0.0, "*", color=style)
