@@ -264,16 +264,16 @@ class Classifier:
             vector = feature_vector(series, window_s, info.samples, info.features)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
-            answers = [replace(one, flags=(*flags, OUT_OF_RANGE)) for one in answers]
+            answers = [replace(answer, flags=(*flags, OUT_OF_RANGE)) for answer in answers]
         else:
             novel = self._novel(decision_point, decisions)
-            found = [self._answer(waiting, one, decisions[one.task], novel) for one in answers]
-            answers = [one for one in found if one is not None]
+            judged = [self._answer(waiting, a, decisions[a.task], novel) for a in answers]
+            answers = [answer for answer in judged if answer is not None]
         waiting.decision_point += 1
-        settled = [one.task for one in answers]
-        waiting.tasks = [task for task in waiting.tasks if task not in settled]
+        for answer in answers:
+            waiting.tasks.remove(answer.task)
         latency_ms = round((time.perf_counter() - began) * 1e3, 3)
-        return [replace(one, latency_ms=latency_ms) for one in answers]
+        return [replace(answer, latency_ms=latency_ms) for answer in answers]
 
     def _novel(self, decision_point: int, decisions: dict[str, Decision]) -> float:
         """The smallest novelty rate at which the contact counts as unknown."""
@@ -283,26 +283,28 @@ class Classifier:
         return novelty.rate(decision_point, float(decisions[novelty.task].distances[0]))
 
     def _answer(
-        self, waiting: _Waiting, none: Decided, decision: Decision, novel: float
+        self, waiting: _Waiting, blank: Decided, decision: Decision, novel: float
     ) -> Decided | None:
-        """A task's answer at a decision point; None where the task goes on waiting.
+        """A task's answer at a decision point; None if the task goes on waiting.
 
         Args:
             waiting: the contact.
-            none: an answer to the task that has no label yet.
-            decision: the model's.
+            blank: the task's answer, without a label yet.
+            decision: of the model.
             novel: from `_novel`.
         """
-        flags = (*none.flags, AS_TRAINED) if decision.distances[0] == 0.0 else none.flags
+        flags = (*blank.flags, AS_TRAINED) if decision.distances[0] == 0.0 else blank.flags
         flags = (*flags, OUT_OF_RANGE) if decision.out_of_range else flags
         label, confidence = decision.label, decision.confidence
         if self.error is None:
             flags = (*flags, "tie") if decision.tie else flags
-            return replace(none, label=label, confidence=confidence, flags=flags, decision=decision)
+            return replace(
+                blank, label=label, confidence=confidence, flags=flags, decision=decision
+            )
         assert decision.label_distances is not None
-        info, at, rule = self.model.info, waiting.decision_point, self._rules[none.task]
-        confidence = info.stopping[none.task].confidence(
-            at, decision.label_distances.tolist(), info.tasks[none.task].labels.index(label)
+        info, at, rule = self.model.info, waiting.decision_point, self._rules[blank.task]
+        confidence = info.stopping[blank.task].confidence(
+            at, decision.label_distances.tolist(), info.tasks[blank.task].labels.index(label)
         )
         sure = rule is not None and confidence >= rule.confidence
         last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
@@ -311,14 +313,14 @@ class Classifier:
         if novel <= self.novelty_rate:
             flags = (*flags, "unknown")
         novelty = info.novelty
-        if novelty is not None and novelty.withholds(none.task, novel, self.novelty_rate):
+        if novelty is not None and novelty.withholds(blank.task, novel, self.novelty_rate):
             label, confidence = UNKNOWN, 1.0 - novel
         elif rule is not None and not sure and not rule.fixed:
             flags = (*flags, "unsure")
         if rule is None:
             flags = (*flags, "uncertified")
         return replace(
-            none,
+            blank,
             label=label,
             confidence=round(confidence, 6),
             flags=flags,

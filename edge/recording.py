@@ -382,14 +382,14 @@ def find(paths: list[str]) -> list[Path]:
     Raises:
         InputError: a path does not exist, or a folder holds no recording.
     """
-    found: list[Path] = []
+    files: list[Path] = []
     for text in paths:
         path = Path(text)
         if path.is_dir():
             inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
             if not inside:
                 raise InputError(f"{path}: no .npz recording in this folder")
-            found += inside
+            files += inside
         else:
-            found.append(path)
-    return found
+            files.append(path)
+    return files

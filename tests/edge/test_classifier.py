@@ -144,11 +144,11 @@ def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(
 
 
 def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(model, make_touch):
-    one = make_touch(seconds=0.5, lead_s=0.2)
-    t = np.concatenate([one.t, one.t + 1.0, [2.5]])
-    frames = np.concatenate([one.frames, one.frames, np.zeros((1, 16, 24), dtype=np.uint16)])
-    joints = np.concatenate([one.joints, one.joints, one.joints[-1:]])
-    events = watch(model, Recording(t, frames, joints, None, one.meta))
+    touch = make_touch(seconds=0.5, lead_s=0.2)
+    t = np.concatenate([touch.t, touch.t + 1.0, [2.5]])
+    frames = np.concatenate([touch.frames, touch.frames, np.zeros((1, 16, 24), dtype=np.uint16)])
+    joints = np.concatenate([touch.joints, touch.joints, touch.joints[-1:]])
+    events = watch(model, Recording(t, frames, joints, None, touch.meta))
     kinds = [type(e) for _, e in events]
     assert kinds == [Onset, Release, Onset, Decided, Decided, Release, Decided, Decided]
     assert events[1][1].onset_s == 0.2

@@ -48,11 +48,11 @@ def quiet(tmp_path, make_touch):
 @pytest.fixture
 def parted(recordings, tmp_path):
     """A touch and half a second without one, so that a loop of it is many contacts."""
-    one = recording.load(recordings / "hard_1.npz")
+    touch = recording.load(recordings / "hard_1.npz")
     rest = 50
-    t = np.concatenate([one.t, one.t[-1] + np.arange(1, rest + 1) / 100.0])
-    frames = np.concatenate([one.frames, np.zeros((rest, 16, 24), np.uint16)])
-    joints = np.concatenate([one.joints, np.repeat(one.joints[-1:], rest, axis=0)])
+    t = np.concatenate([touch.t, touch.t[-1] + np.arange(1, rest + 1) / 100.0])
+    frames = np.concatenate([touch.frames, np.zeros((rest, 16, 24), np.uint16)])
+    joints = np.concatenate([touch.joints, np.repeat(touch.joints[-1:], rest, axis=0)])
     path = tmp_path / "parted.npz"
-    recording.save(path, Recording(t, frames, joints, meta=one.meta))
+    recording.save(path, Recording(t, frames, joints, meta=touch.meta))
     return path

@@ -51,10 +51,10 @@ def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_pat
                 mine.save(frames(None), complete=True)
 
     recorders = [threading.Thread(target=record) for _ in range(2)]
-    for one in recorders:
-        one.start()
-    for one in recorders:
-        one.join()
+    for recorder_thread in recorders:
+        recorder_thread.start()
+    for recorder_thread in recorders:
+        recorder_thread.join()
     assert len(list(tmp_path.glob("box-*.npz"))) == 40
 
 
@@ -242,11 +242,11 @@ def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(edge, recordings, t
 
 
 def test_two_contacts_are_two_trials(edge, make_touch, tmp_path):
-    one = make_touch(seconds=0.5, arm=False)
+    touch = make_touch(seconds=0.5, arm=False)
     gap = np.zeros((50, 16, 24), dtype=np.uint16)
-    frames = np.concatenate([one.frames, gap, one.frames, gap])
-    both = Recording(np.arange(len(frames)) / 100.0, frames, meta=one.meta)
-    save(tmp_path / "two.npz", both)
+    frames = np.concatenate([touch.frames, gap, touch.frames, gap])
+    recording_of_two = Recording(np.arange(len(frames)) / 100.0, frames, meta=touch.meta)
+    save(tmp_path / "two.npz", recording_of_two)
     events = edge("record", "--fake", tmp_path / "two.npz", "--label", "object=a", "--out",
                   tmp_path / "t")[1]  # fmt: skip
     # 20 frames of lead-in, 50 of contact, 30 that show its end.
