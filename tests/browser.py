@@ -1,7 +1,7 @@
-"""A report in a real browser: what overflows, images that are missing, links that lead nowhere.
+"""Check a report in a real browser: overflow, missing pictures, broken links.
 
-Needs Chromium with its driver (Debian: `apt install chromium chromium-driver`) and selenium, the
-extra `browser`; skips with a reason where they are absent.
+This needs Chromium with its driver (Debian: `apt install chromium chromium-driver`) and the
+dependency group `browser`; tests are skipped with a reason where they are missing.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ import pytest
 WIDTHS = (1200, 400)
 WIDER_THAN_THE_PAGE = """
 const width = document.documentElement.clientWidth;
-return [...document.querySelectorAll('body *')].filter(one => {
-  const box = one.getBoundingClientRect();
+return [...document.querySelectorAll('body *')].filter(element => {
+  const box = element.getBoundingClientRect();
   return box.width > 0 && box.right > width + 1;
-}).filter((one, i, all) => !all.includes(one.parentElement))
-  .map(one => one.tagName + ': ' + one.textContent.slice(0, 60));
+}).filter((element, i, all) => !all.includes(element.parentElement))
+  .map(element => element.tagName + ': ' + element.textContent.slice(0, 60));
 """
 NOT_SHOWN = """
-return [...document.images].filter(one => !one.complete || one.naturalWidth === 0)
-  .map(one => one.alt);
+return [...document.images].filter(image => !image.complete || image.naturalWidth === 0)
+  .map(image => image.alt);
 """
-LINKS = "return [...document.links].map(one => one.getAttribute('href'));"
+LINKS = "return [...document.links].map(link => link.getAttribute('href'));"
 
 
 def available() -> bool:
-    """Whether there is a browser to look with."""
+    """Whether Chromium, its driver and selenium are installed."""
     programs = all(map(shutil.which, ("chromium", "chromedriver")))
     return programs and importlib.util.find_spec("selenium") is not None
 
@@ -40,7 +40,7 @@ def available() -> bool:
 @contextmanager
 def chromium(width: int, *, dark: bool = False) -> Iterator[Any]:
     """A headless browser with a window of that width."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="needs the extra `browser`")
+    webdriver = pytest.importorskip("selenium.webdriver", reason="needs the group `browser`")
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if program is None or driver is None:
         pytest.skip("needs Chromium and chromedriver")
@@ -60,28 +60,28 @@ def chromium(width: int, *, dark: bool = False) -> Iterator[Any]:
 
 
 def faults(report: Path) -> list[str]:
-    """What is wrong with a report, at each of `WIDTHS`."""
-    found = []
+    """A line for each fault of a report, at each of `WIDTHS`."""
+    lines = []
     for width in WIDTHS:
         with chromium(width) as browser:
             browser.get(report.resolve().as_uri())
             browser.execute_script(
-                "document.querySelectorAll('details').forEach(one => one.open = true)"
+                "document.querySelectorAll('details').forEach(section => section.open = true)"
             )
             wide = browser.execute_script(WIDER_THAN_THE_PAGE)
-            found += [f"{width} px: wider than the page: {one}" for one in wide]
-            found += [f"no picture: {one}" for one in browser.execute_script(NOT_SHOWN)]
+            lines += [f"{width} px: wider than the page: {element}" for element in wide]
+            lines += [f"missing picture: {alt}" for alt in browser.execute_script(NOT_SHOWN)]
             for link in browser.execute_script(LINKS):
                 if link.startswith("#"):
-                    there = bool(browser.find_elements("id", link[1:]))
+                    exists = bool(browser.find_elements("id", link[1:]))
                 else:
-                    there = (report.parent / link).is_file()
-                found += [] if there else [f"leads nowhere: {link}"]
-    return found
+                    exists = (report.parent / link).is_file()
+                lines += [] if exists else [f"broken link: {link}"]
+    return lines
 
 
 def shoot(report: Path, out: Path, width: int, *, dark: bool = False) -> None:
-    """The whole page as a PNG."""
+    """Save the full page as a PNG."""
     with chromium(width, dark=dark) as browser:
         theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})

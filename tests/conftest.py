@@ -13,8 +13,8 @@ from edge.recording import Recording, save
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 
-# The same examples in every run, so that a red test is the change's; `EXPLORE=1` looks for others.
-# No test is one of time: a busy machine must not turn it red.
+# Each run draws the same examples, so only a change can turn a test red; `EXPLORE=1` draws others.
+# There are no deadlines, because a busy machine must not turn a test red.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
@@ -44,7 +44,7 @@ def touch(
     arm: bool = True,
     rate: float = 100.0,
 ) -> Recording:
-    """A contact that grows: a hard one in force, a soft one in area; not physics, but a shape."""
+    """A contact that grows: a hard one in force, a soft one in area. It imitates no physics."""
     rng = np.random.default_rng([seed, len(kind)])
     n = round((lead_s + seconds) * rate)
     t = np.arange(n) / rate
@@ -95,14 +95,14 @@ def recordings(tmp_path_factory) -> Path:
 
 
 PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")
-"""Options of `make export` that give the paper's features, where a test is not about the choice."""
+"""Options of `make export` that fix the paper's features, for tests that need no choice."""
 
 
 @pytest.fixture(scope="session")
 def exported(recordings, tmp_path_factory) -> Path:
     """A folder with the model.onnx and golden.npz of those recordings.
 
-    `EDGE_CLASSIFY_EXPORTED` names one that is ready: a board has no scikit-learn.
+    `EDGE_CLASSIFY_EXPORTED` names an existing folder, for a board without scikit-learn.
     """
     ready = os.environ.get("EDGE_CLASSIFY_EXPORTED")
     if ready is not None:
@@ -116,7 +116,7 @@ def exported(recordings, tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def real() -> Path:
-    """The folder of real recordings; tests that need it are skipped where it is absent."""
+    """The folder of real recordings; tests that need it are skipped without it."""
     if not REAL.is_dir():
         pytest.skip("../shared/real is absent: the real recordings are not part of the project")
     return REAL

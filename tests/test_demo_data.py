@@ -1,4 +1,4 @@
-"""The demo that the wheel carries, and the golden outputs of its model."""
+"""The demo in the wheel, and the golden outputs of its model."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ def test_the_demo_touches_one_of_each_category_and_gets_them_right(capsys):
 
 @pytest.mark.parametrize("path", demo.recordings(), ids=lambda path: path.stem)
 def test_the_chips_in_between_change_no_decision(path, capsys):
-    """What the drivers read off the fake chips is what the recording holds."""
+    """The drivers read from the fake chips what the recording holds."""
     assert main(["replay", "--model", str(demo.MODEL), str(path)]) == 0
     straight = decisions(capsys.readouterr().out)
     main(["demo"])

@@ -1,4 +1,4 @@
-"""docs/: the tutorial and the notebook run as they are written, and links lead somewhere."""
+"""docs/: the tutorial and the notebook run as written, and links and paths exist."""
 
 import json
 import re
@@ -19,7 +19,7 @@ PAGES = sorted(DOCS.glob("*.md"))
 
 
 def commands():
-    """The tutorial's lines of shell, but for the first block, which makes the environment."""
+    """The tutorial's shell commands, without the first block, which makes the environment."""
     blocks = re.findall(r"```sh\n(.*?)```", (DOCS / "tutorial.md").read_text(), re.S)
     return [line for lines in blocks[1:] for line in lines.splitlines()]
 

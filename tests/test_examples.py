@@ -1,4 +1,4 @@
-"""Each program in examples/ runs: the ROS node over a stand-in for rclpy, others as they are."""
+"""The programs in examples/ run unchanged; the ROS node runs over a stand-in for rclpy."""
 
 import json
 import re
@@ -21,7 +21,7 @@ PILLOW = demo.FOLDER / "pillow-movable.npz"
 
 
 def run(monkeypatch, capsys, program, *arguments):
-    """What an example prints, line by line."""
+    """The lines that an example prints."""
     path = EXAMPLES / program
     assert len(path.read_text().splitlines()) <= 10
     monkeypatch.setattr(sys, "argv", [program, *map(str, arguments)])
@@ -73,13 +73,13 @@ def test_a_skin_is_watched(monkeypatch, capsys):
 
 
 class Publisher(list):
-    """Keeps what is published."""
+    """Keeps the published messages."""
 
     publish = list.append
 
 
 class Ros:
-    """As much of rclpy and its messages as the node uses: one node, spun until it has ended."""
+    """The part of rclpy and its messages that the node uses: one node, spun until it has ended."""
 
     def __init__(self, **parameters):
         self.parameters, self.topics, self.heard = parameters, {}, {}
@@ -141,7 +141,7 @@ def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
 
 
 def test_the_ros_node_takes_joint_angles_by_name(monkeypatch):
-    """A skin that cannot be opened here: it is played, and JointState gives the angles."""
+    """The skin is played from a recording, and JointState gives the angles."""
     recording = edge.load(PILLOW)
     model, chain = edge.Model(demo.MODEL), edge.Chain.cody()
     model.info = replace(model.info, chain=chain)

@@ -1,4 +1,4 @@
-"""examples/firmware/: the protocol that a microcontroller runs, read by our own driver."""
+"""examples/firmware/: our own driver reads the protocol that a microcontroller runs."""
 
 import os
 import pty
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory):
-    """Builds the firmware's protocol for this machine, for so many bits a taxel."""
+    """Builds the firmware's protocol for this machine, with the given bits per taxel."""
     folder = tmp_path_factory.mktemp("firmware")
 
     def build(bits):
@@ -72,8 +72,8 @@ def test_its_registers_are_what_the_driver_reads_over_i2c(host, bits):
         assert chip.healthy()
         bus.transfer(chip.frame)
         assert chip.frame.buffer[:2].tobytes() == n.to_bytes(2, "big")
-        taxels, whole = parse(chip.frame.buffer[None], TAXELS, bits)
-        assert whole.all()
+        taxels, intact = parse(chip.frame.buffer[None], TAXELS, bits)
+        assert intact.all()
         assert taxels[0].tolist() == ([0] * TAXELS if n == 0 else values(bits, n - 1).tolist())
         assert unknown == b""
 
@@ -97,8 +97,8 @@ def test_its_frames_come_over_a_serial_port(plugged):
     seen = []
     for _ in range(5):
         bus.transfer(chip.frame)
-        taxels, whole = parse(chip.frame.buffer[None], TAXELS, 12)
-        assert whole.all()
+        taxels, intact = parse(chip.frame.buffer[None], TAXELS, 12)
+        assert intact.all()
         seen.append(taxels[0].tolist())
     # Two requests came before: the one at opening, and the driver's for the identity.
     assert seen == [values(12, n).tolist() for n in range(2, 7)]
@@ -106,7 +106,7 @@ def test_its_frames_come_over_a_serial_port(plugged):
 
 
 def test_noise_on_the_line_costs_one_answer_at_most(plugged):
-    """What comes between two requests ends with the next zero."""
+    """Bytes between two requests end with the next zero."""
     bus = SerialBus(plugged[0], timeout_s=5.0)
     chip = Block(bus, 0, taxels=TAXELS, bits=12)
     for noise in (b"\x05", b"\0\0", b"\xff" * 300, b"\x04\x10\x01\x01\0", b"\x03\x10\0"):
@@ -136,7 +136,7 @@ def test_the_example_skin_reads_the_example_firmware(plugged, tmp_path):
     assert raw.ravel().tolist() == values(12, int(raw[0, 0])).tolist()
 
 
-def test_the_sketch_says_what_the_example_skin_says():
+def test_the_sketch_agrees_with_the_example_skin():
     sketch = (MATRIX / "matrix.ino").read_text()
     (bus,) = skinfile.load(skinfile.shipped("matrix")).buses
     (chip,) = bus.chips

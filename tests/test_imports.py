@@ -1,7 +1,9 @@
-"""Data flows one way: what each package may import."""
+"""Each package imports only what it may, so that data flows one way."""
 
 import ast
+import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -10,18 +12,24 @@ import pytest
 ROOT = Path(__file__).parents[1]
 BOARD = {"numpy", "onnxruntime", "smbus2", "edge"}
 OPTIONAL = {"serial": "edge/i2c/serial_bus.py", "argcomplete": "edge/cli.py"}
-"""Of the wheel's extras, and the one module that may ask for each."""
+"""The packages of the wheel's extras, and the only module that may import each."""
 FORBIDDEN = {"pickle", "joblib.dump", "marshal", "shelve"}
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@cache
 def imported(path: Path) -> set[str]:
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    names = set()
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found.add(node.module or "edge" if node.level == 0 else "edge")
-    return found
+            names.add(node.module or "edge" if node.level == 0 else "edge")
+    return names
 
 
 def modules(package: str) -> list[Path]:
@@ -29,16 +37,16 @@ def modules(package: str) -> list[Path]:
 
 
 @pytest.mark.parametrize("path", modules("edge"), ids=lambda p: str(p.relative_to(ROOT)))
-def test_the_board_needs_numpy_onnxruntime_and_smbus2_alone(path):
+def test_the_board_imports_only_numpy_onnxruntime_and_smbus2(path):
     roots = {name.split(".")[0] for name in imported(path)}
-    here = {name for name, at in OPTIONAL.items() if path == ROOT / at}
-    assert roots - BOARD - here <= set(sys.stdlib_module_names)
+    optional = {name for name, user in OPTIONAL.items() if path == ROOT / user}
+    assert roots - BOARD - optional <= set(sys.stdlib_module_names)
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
 def test_an_optional_dependency_is_imported_only_where_it_is_used(name):
     """Within a function, so that the module works without it."""
-    tree = ast.parse((ROOT / OPTIONAL[name]).read_text())
+    tree = parsed(ROOT / OPTIONAL[name])
     loaded = [n for n in ast.walk(tree) if isinstance(n, ast.Import) and n.names[0].name == name]
     inside = [n for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)]
     assert loaded
@@ -57,14 +65,13 @@ def test_nothing_pickles(package):
 
 
 FRAME = ["i2c", "skin", "touch", "model", "classifier", "runtime", "commands"]
-"""The way of one frame through `edge/`: each stage knows those before it."""
+"""The way of one frame through `edge/`; a stage imports only earlier ones."""
 OF_A_FRAME = {"edge.touch.frame", "edge.touch.layout"}
-"""What the stages hand on; the skin makes them."""
+"""The skin makes these, and later stages pass them on."""
 
 
 @pytest.mark.parametrize("stage", FRAME)
 def test_no_stage_reaches_back(stage):
-    """bus, chip, skin, region, track, features, model, decision: each knows those before it."""
     later = FRAME[FRAME.index(stage) + 1 :]
     path = ROOT / "edge" / stage
     for module in sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]:
@@ -83,9 +90,7 @@ def test_no_room_of_a_touch_reaches_back(name):
 
 
 def test_importing_the_path_does_not_load_onnxruntime():
-    """It is most of the start-up time, and only a model needs it."""
-    import subprocess
-
+    """Loading it takes most of the start-up time, and only a model needs it."""
     code = "import sys, edge.cli, edge.classifier; sys.exit('onnxruntime' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
 
@@ -101,7 +106,7 @@ def test_no_modules_import_each_other_in_a_circle():
     for name, path in paths.items():
         named = {
             f"{node.module}.{alias.name}"
-            for node in ast.walk(ast.parse(path.read_text()))
+            for node in ast.walk(parsed(path))
             if isinstance(node, ast.ImportFrom)
             for alias in node.names
         }

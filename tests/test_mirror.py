@@ -1,4 +1,4 @@
-"""Tests mirror the modules: each module has a test file of its name, or one that is named here."""
+"""Tests mirror the modules: each module has a test file of its name, or one that is listed here."""
 
 import re
 from pathlib import Path
@@ -15,14 +15,14 @@ TOPICS = {
     "edge/commands/test_live_commands.py",
     "edge/commands/test_replay_verify.py",
     "edge/commands/test_owner_loop.py",
-    # The fake's parts are only worth what they give together.
+    # The parts of the fake work only together.
     "edge/fake/test_fake_bus.py",
     # smbus2 itself, over a stand-in for the kernel; the loop as a service.
     "edge/i2c/test_smbus2.py",
     "edge/runtime/test_service.py",
     "train/importers/test_importers.py",
     "train/importers/test_log_importers.py",
-    # The simulator against laws of physics, whichever effects they need.
+    # The simulator against laws of physics, with the effects that each law needs.
     "train/simulate/test_simulate_oracles.py",
     "train/simulate/test_simulate_soft_oracles.py",
     "train/simulate/test_simulate_pushing.py",
@@ -33,7 +33,7 @@ TOPICS = {
     "train/simulate/test_simulate_run.py",
     "train/simulate/test_simulate_scene.py",
     "train/simulate/test_simulate_paper.py",
-    # Reports, by what stands in them; an export as a whole.
+    # Reports by their contents; complete exports.
     "export/test_early_stopping.py",
     "train/study/test_study_report.py",
     "train/tradeoff/test_tradeoff.py",
@@ -65,7 +65,7 @@ THROUGH = {
     "train/simulate/state.py": "train/simulate/test_trial.py",
     "train/simulate/sensor_frames.py": "train/simulate/test_simulate_run.py",
 }
-"""{module, or a report's folder of sections: the test file that specifies it as a part of more}."""
+"""{module, or folder of a report's sections: the test file that specifies it with others}."""
 
 MODULES = [
     path.relative_to(ROOT)
@@ -107,5 +107,5 @@ def test_every_test_file_has_the_name_of_a_module_or_is_a_topic(package):
     assert sorted(set(files) - names - TOPICS) == [], "name it after its module"
 
 
-def test_no_topic_is_left_over():
+def test_every_topic_exists():
     assert sorted(TOPICS - set(TESTS)) == []

@@ -1,4 +1,4 @@
-"""The public names: lazily loaded, each with an example that runs; and every other example."""
+"""Public names load lazily and have examples; every example in a docstring runs."""
 
 import doctest
 import subprocess
@@ -20,9 +20,9 @@ WITH_EXAMPLES = sorted(
 
 @pytest.mark.parametrize("name", edge.__all__)
 def test_every_public_name_is_there_with_an_example_in_its_docstring(name):
-    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(edge, name), name)
-    assert found.examples
-    assert not any(doctest.SKIP in example.options for example in found.examples)
+    (example,) = doctest.DocTestFinder(recurse=False).find(getattr(edge, name), name)
+    assert example.examples
+    assert not any(doctest.SKIP in line.options for line in example.examples)
     assert name in dir(edge)
 
 

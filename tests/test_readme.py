@@ -1,4 +1,4 @@
-"""README.md and docs/: the commands exist as they are written there, and the tables are true."""
+"""README.md and docs/: the commands run as written, and the tables are true."""
 
 import errno
 import re
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
-CODE = [" ".join(found.split()) for found in re.findall(r"`([^`]+)`", TEXT)]
+CODE = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", TEXT)]
 BOARD = [c for c in dict.fromkeys(CODE) if c.startswith("edge-classify ")]
 WORKSTATION = [c for c in dict.fromkeys(CODE) if c.startswith("python -m train ") and "--" in c]
 MAKE = [c for c in dict.fromkeys(CODE) if c.startswith("make ")]
@@ -31,7 +31,7 @@ FAKED = ("scan", "calibrate", "view", "record", "run")
 
 @pytest.fixture(scope="module")
 def bench(exported, recordings, tmp_path_factory):
-    """A folder with what the README's commands name."""
+    """A folder with the files that the README's commands name."""
     folder = tmp_path_factory.mktemp("owner")
     touch = load(recordings / "hard_0.npz")
     thresholds = touch.layout
@@ -48,7 +48,7 @@ def bench(exported, recordings, tmp_path_factory):
 
 @pytest.mark.parametrize("command", BOARD)
 def test_a_command_of_the_board_does_as_it_is_written(command, bench, monkeypatch, capsys):
-    """In the order of the page; over fake chips where it reads the skin."""
+    """In the order of the page; commands that read the skin use fake chips."""
     monkeypatch.chdir(bench)
     written = command.replace("REC…", "REC.npz").replace("--model M ", "--model model.onnx ")
     words = shlex.split(written)[1:]

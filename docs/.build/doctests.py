@@ -11,11 +11,11 @@ EXAMPLE = re.compile(r"(?:^>>> .*\n?)(?:^\S.*\n?|^ .*\n?)*", re.M)
 
 
 class Doctests(griffe.Extension):
-    """Fences each `>>>` example, which Markdown would take for a quotation."""
+    """Fence each `>>>` example, which Markdown would otherwise read as a quotation."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
         """Rewrite an object's docstring as it is collected."""
         if obj.docstring is not None:
             obj.docstring.value = EXAMPLE.sub(
-                lambda found: f"```pycon\n{found[0].rstrip()}\n```\n", obj.docstring.value
+                lambda example: f"```pycon\n{example[0].rstrip()}\n```\n", obj.docstring.value
             )

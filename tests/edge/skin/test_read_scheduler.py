@@ -147,7 +147,11 @@ def felt(file, recording, info):
     tracker = ContactTracker(recording.layout, chain=info.chain, horizon_s=info.window_s)
     with skin:
         loop = Loop(skin, lasts_s=playback.ends, joints=playback)
-        contact, *_ = (contact for frame in loop.frames() for contact in tracker.push(frame))
+        contact = None
+        for frame in loop.frames():
+            contact = next(iter(tracker.push(frame)), contact)
+            if contact is not None and frame.t > contact.onset_s + info.window_s + 0.05:
+                break
     vector = feature_vector(contact.series(), info.window_s)
     return vector.reshape(len(FEATURES), -1), contact.onset_s - playback.start, loop.schedule.missed
 
