@@ -1,7 +1,7 @@
-"""What software adds to the wire, bits against the least, and the period that the loop keeps.
+"""Time of the software on top of the wire, bits above the minimum, and the loop's period.
 
-An unmodified smbus2 runs over the C stand-in for /dev/i2c-N of the tests, whose calls return at
-once: what is left is software. `python -m bench.bench_bus --seconds 600` measures the loop's
+An unmodified smbus2 runs over the tests' C stand-in for /dev/i2c-N, whose calls return at once, so
+that only the software takes time. `python -m bench.bench_bus --seconds 600` measures the loop's
 period over a longer run.
 """
 
@@ -18,9 +18,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 LEAST_BITS = 8 * 20 + 32 * 255
-"""A selection for each of 8 mux channels, a pointer write and a read for each of 32 AD7147."""
+"""One selection for each of 8 mux channels, a pointer write and a read for each of 32 AD7147."""
 WIRE_S = (12 * 255 + 3 * 20) / 400_000
-"""The least time of a frame over three buses: 12 chips and 3 channels on the longest."""
+"""The shortest time of a frame over three buses: 12 chips and 3 channels on the longest."""
 
 
 def _shim():
@@ -31,7 +31,7 @@ def _shim():
 
 
 def inside(*arguments: str) -> dict:
-    """What `measure` or `keep_period` gives, in a process of its own over the stand-in."""
+    """The result of `measure` or `keep_period` in a process of its own over the stand-in."""
     shim = _shim()
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
@@ -46,7 +46,7 @@ def inside(*arguments: str) -> dict:
 
 
 def _least_us(action, rounds=60, calls=20) -> float:
-    """Processor time of all threads in the best round: other programs' share does not count."""
+    """Processor time of all threads in the best round, without the share of other programs."""
     times = []
     for _ in range(rounds):
         began = time.process_time()
@@ -75,12 +75,12 @@ def measure() -> dict:
             for reader in skin.readers:
                 reader.read(reader.slots)
 
-        def put_together():
+        def assemble():
             skin._assemble(skin.clock.now())
 
         out = {
             "buses": _least_us(buses_in_turn),
-            "frame": _least_us(put_together),
+            "frame": _least_us(assemble),
             "threads": _least_us(skin.read),
         }
         buses = [SMBus(spec.device) for spec in skin.file.buses]
@@ -115,7 +115,7 @@ def keep_period(seconds: float) -> dict:
 
 
 def bench_overhead_of_software(note):
-    """The buses' work one after another is more than side by side: an upper bound."""
+    """An upper bound: one after another, the buses take more time than side by side."""
     parts = inside()
     ours = parts["buses"] + parts["frame"]
     note(f"the wire's {WIRE_S * 1e6:.0f} us at 400 kHz", ours / WIRE_S * 1e-6, "at most 0.02")
@@ -134,10 +134,10 @@ def bench_bits_on_the_wire(note):
 
 
 def bench_period(note):
-    found = inside("--seconds", "20")
+    periods = inside("--seconds", "20")
     for name in ("p50", "p99", "p99.9", "longest"):
-        note(f"ms, {name} of {found['frames']}", found[name], "10")
-    note("ticks left out", found["missed"], "0")
+        note(f"ms, {name} of {periods['frames']}", periods[name], "10")
+    note("ticks left out", periods["missed"], "0")
 
 
 def main() -> None:
@@ -146,8 +146,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float)
     arguments = parser.parse_args()
     if arguments.inside:
-        found = measure() if arguments.seconds is None else keep_period(arguments.seconds)
-        print(json.dumps(found))
+        result = measure() if arguments.seconds is None else keep_period(arguments.seconds)
+        print(json.dumps(result))
         return
     print(json.dumps(inside("--seconds", str(arguments.seconds or 60.0)), indent=2))
 

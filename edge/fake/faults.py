@@ -1,4 +1,4 @@
-"""Faults by script: what goes wrong, on which transactions, repeatable by seed."""
+"""Scripts of faults on chosen transactions, repeatable by seed."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ Kind = Literal["error", "flip", "misroute", "reset", "hold", "break"]
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that goes wrong.
+    """One kind of fault.
 
-    A transaction meets it where every condition that is given holds.
+    A transaction meets it where all given conditions hold.
 
     Attributes:
-        kind: `error` fails it with `code`; `flip` turns one bit of what is read; `misroute`
-            makes a write to a mux select another channel; `reset` resets the chip before it;
-            `hold` makes the chip serve what it served before; `break` lets go of the wire at a
-            random byte of what is read, from which on all bits are 1.
+        kind: `error` fails it with `code`; `flip` turns one bit of the bytes read; `misroute`
+            makes a write to a mux select another channel; `reset` resets the chip first; `hold`
+            makes the chip serve its former bytes; `break` lets go of the wire at a random byte
+            of those read, from which on all bits are 1.
         code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
             bus from being opened again while the fault lasts.
         at: numbers of transactions on the bus, counted from 0 when the script starts.
@@ -50,7 +50,7 @@ NO_FAULTS: tuple[Fault, ...] = ()
 
 @dataclass(frozen=True)
 class Route:
-    """Where a transaction goes: bus, address, and the mux and channel it passes."""
+    """The target of a transaction: bus, address, and the mux and channel on the way."""
 
     bus: str
     address: int
@@ -69,13 +69,13 @@ class Script:
     def __init__(self, faults: Sequence[Fault], bus: str, seed: int = 0) -> None:
         self.faults = [f for f in faults if f.bus in (None, bus)]
         self.met = 0
-        """How many transactions met a fault."""
+        """Number of transactions that met a fault."""
         self._n = -1
-        # A stream per bus, so that what one bus meets does not depend on the others' threads.
+        # One stream for each bus, so that its faults do not depend on the other threads.
         self.random = random.Random(f"faults/{seed}/{bus}")
 
     def next(self, route: Route, t: float) -> Fault | None:
-        """The fault that the next transaction meets, the first of those that match."""
+        """The first fault that matches the next transaction, or None."""
         self._n += 1
         for fault in self.faults:
             if (

@@ -1,4 +1,4 @@
-"""A fake skin: a recording, or any scene, played onto the registers of fake chips."""
+"""A fake skin: a recording or any other scene, played onto the registers of fake chips."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Scene = Callable[[float], NDArray[np.uint16]]
 
 
 class Playback:
-    """A recording as a scene: each frame holds until the next.
+    """A recording as a scene: each frame lasts until the next.
 
     >>> recording = Recording(np.array([0.0, 0.01]), np.zeros((2, 4, 4), np.uint16))
     >>> Playback(recording).ends
@@ -56,16 +56,16 @@ class Playback:
         self._length = float(t[-1]) + last
         self._loop = loop
         self.start = 0.0
-        """When it began to play, on the skin's clock."""
+        """Start of the playback on the skin's clock."""
 
     @property
     def ends(self) -> float:
-        """When it is over, in seconds; infinity where it loops."""
+        """Length in seconds; infinity where it loops."""
         return math.inf if self._loop else self._length
 
     @property
     def dof(self) -> int | None:
-        """How many joint angles it has, or None."""
+        """Number of joint angles, or None without any."""
         return None if self._joints is None else int(self._joints.shape[1])
 
     def _index(self, t: float) -> int:
@@ -88,7 +88,7 @@ class Playback:
 
 
 def calibrated(file: SkinFile) -> SkinFile:
-    """The file, with a calibration: of fake chips that make no noise where it has none."""
+    """The file with its calibration, or with that of fake chips without noise."""
     if file.calibration is not None:
         return file
     baseline = np.zeros(file.layout.rows * file.layout.cols, dtype=np.uint16)
@@ -114,11 +114,11 @@ def fake_buses(
     """Fake chips on fake buses, as the skin's file lays them out.
 
     Args:
-        file: what is where; its calibration, where it has one, is what the chips rest at.
-        scene: what they feel.
+        file: the wiring; the chips rest at its calibration, if it has one.
+        scene: the counts that the chips feel.
         clock: shared by the buses.
-        timed: the clock advances by the bits on the wire, and chips convert in their own time.
-        noise_counts: standard deviation of the raw values, drawn anew at each conversion.
+        timed: the clock advances with the bits on the wire, and conversions take their time.
+        noise_counts: standard deviation of the raw values at each reading.
         faults: see `edge.fake.faults`.
         seed: of noise and faults.
     """
@@ -148,11 +148,11 @@ def fake_buses(
 
 
 class _Felt:
-    """Raw values of all taxels that one bus reads: rest and sign turned back on."""
+    """Raw values of all taxels of one bus, with rest value and sign put back."""
 
     def __init__(self, spec: BusSpec, scene: Scene, rest: NDArray[np.uint16]) -> None:
         self._scene = scene
-        # One place more than taxels, for stages that are none.
+        # One place more than taxels, for stages without one.
         self._rest = np.append(rest, 0).astype(np.int64)
         self._gain = np.zeros(len(self._rest), dtype=np.int64)
         self._top = np.full(len(self._rest), 65534, dtype=np.int64)
@@ -163,7 +163,7 @@ class _Felt:
         self._at, self._raw = math.nan, self._rest
 
     def raw(self, t: float) -> NDArray[np.int64]:
-        """(taxels + 1,) raw values at a time; chips that ask for the same time share them."""
+        """(taxels + 1,) raw values at a time; chips asking for the same time share them."""
         if t != self._at:
             self._raw = self._rest.copy()
             self._raw[:-1] += self._gain[:-1] * self._scene(t).reshape(-1)
@@ -173,7 +173,7 @@ class _Felt:
         return self._raw
 
     def sense(self, chip: ChipSpec, noise: float, stream: np.random.Generator | None) -> Sense:
-        """What one chip senses."""
+        """The function that gives one chip its raw values."""
         taxels, top = np.array(chip.taxels), chip.highest
 
         def quiet(t: float) -> NDArray[np.uint16]:
@@ -230,7 +230,7 @@ def fake_skin(
 
 
 def still(file: SkinFile) -> Skin:
-    """A fake skin that nothing touches."""
+    """A fake skin without contact."""
     silence = np.zeros(file.layout.shape, dtype=np.uint16)
     return fake_skin(file, lambda t: silence)
 
@@ -270,7 +270,7 @@ def play(
 
 
 def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
-    """Bits on each bus's wire for so many frames, counted as the drivers send them."""
+    """Bits on the wire of each bus for so many frames, counted while the drivers send them."""
     whole = replace(file, reading=replace(file.reading, region_of_interest=False))
     with still(whole) as skin:
         buses = [reader.bus for reader in skin.readers]

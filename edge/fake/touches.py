@@ -1,9 +1,9 @@
 """Labelled touches for any skin: the demo's simulated contacts, mapped onto its geometry.
 
-Each taxel's force of a simulated contact is spread over the patch that the taxel covers, and what
-falls on the patches of the other skin is added up there: the sum of the forces stays, and so do
-lengths. Trials differ in place, strength and speed. They are made to rehearse with, before a wire
-is soldered: a model fitted on them knows nothing of the real skin.
+The force on each taxel of a simulated contact is spread over the taxel's patch, and added up on
+the patches of the other skin: the sum of the forces stays, and so do lengths. Trials differ in
+place, strength and speed. They serve to rehearse before a wire is soldered; a model fitted on them
+knows nothing of the real skin.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from edge.skin.file import SkinFile
 from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.01
-"""The pitch taken for a skin whose own is not known."""
+"""Assumed pitch of a skin whose own is unknown."""
 STRENGTH, SPEED = (0.8, 1.25), (0.9, 1.1)
-"""Factors that a trial's forces and its pace are drawn from."""
+"""Ranges from which the factors of a trial's forces and speed are drawn."""
 LEAD_S = 0.3
-"""Before the simulated contact begins."""
+"""Time before the simulated contact begins."""
 TAIL_S = 0.3
-"""After it, while its last forces go on: no touch ends within the window of a decision."""
+"""Time after it, during which its last forces go on: no touch ends within a decision's window."""
 WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
-"""Where the force of a count is not known, the strongest taxel of the weakest contact has so many
-times the counts of the onset, which is taken to be at least so many."""
+"""Where counts per newton are unknown, the strongest taxel of the weakest contact has so many times
+the counts of the onset, which is taken to be at least so many."""
 
 
 def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str, Recording]]:
-    """Name and recording of each touch: so many of every contact of the demo.
+    """Name and recording of each touch, for every contact of the demo.
 
     Args:
         file: the skin.
-        trials: of each contact.
+        trials: number of touches of each contact.
         seed: of place, strength and speed.
     """
     sources = [(path, load(path)) for path in demo.recordings()]
@@ -82,7 +82,7 @@ def still(file: SkinFile, seconds: float) -> Recording:
 
 
 def reach(file: SkinFile) -> int:
-    """The most counts that a touch can give on every chip, from where its fake rests."""
+    """The greatest count that a touch can give on every fake chip."""
     rest = calibrated(file).calibration
     assert rest is not None
     most = 65535
@@ -113,9 +113,9 @@ def _mapped(
     t = np.arange(int((LEAD_S + lasts + TAIL_S) * rate_hz) + 1) / rate_hz
     at = (t - LEAD_S) * speed + source.t[0]
     right = np.clip(np.searchsorted(source.t, at, side="right"), 1, len(source.t) - 1)
-    part = (at - source.t[right - 1]) / (source.t[right] - source.t[right - 1])
-    part = np.clip(part, 0.0, 1.0)[:, None, None]
-    felt = (1.0 - part) * forces[right - 1] + part * forces[right]
+    share = (at - source.t[right - 1]) / (source.t[right] - source.t[right - 1])
+    share = np.clip(share, 0.0, 1.0)[:, None, None]
+    felt = (1.0 - share) * forces[right - 1] + share * forces[right]
     felt[at < source.t[0]] = 0.0
     along = _spread(source.layout.rows, pitch(source.layout)[0], pitch(onto)[0], onto.rows,
                     middle[0], row)  # fmt: skip
@@ -126,7 +126,7 @@ def _mapped(
 
 
 def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:
-    """Row and column about which the forces of a contact lie; the column on the circle."""
+    """Row and column of the centre of a contact's forces; the column on the circle."""
     total = forces.sum(axis=0)
     rows, cols = total.shape
     angle = np.exp(2j * math.pi * np.arange(cols) / cols)
@@ -145,10 +145,10 @@ def _spread(
     from_ring: bool = False,
     onto_ring: bool = False,
 ) -> NDArray[np.float64]:
-    """(sources, taxels) shares of each source row (or column) that fall on each taxel's.
+    """(sources, taxels) shares of each source row or column that fall on each row or column.
 
-    Each source is as wide as its pitch, and so is each taxel; `middle` of the sources comes to
-    lie on `centre` of the taxels.
+    Sources and taxels are as wide as their pitch. The position `middle` of the sources is mapped
+    to the position `centre` of the taxels.
     """
     offset = np.arange(sources) - middle
     if from_ring:

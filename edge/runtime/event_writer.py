@@ -45,7 +45,7 @@ class LineWriter:
         gone: the reader has gone, as `head` does once it has enough; all further lines are lost.
     """
 
-    def __init__(self, name: str, write: Callable[[bytes], None]) -> None:
+    def __init__(self, name: str, write: Callable[[bytes], object]) -> None:
         """Start the thread.
 
         Args:
@@ -139,10 +139,13 @@ class Lines:
             InputError: the address is not of that form, or its host is unknown.
         """
         self._socket = None if udp is None else _connected(udp)
-        self._udp, self._udp_lost = udp, 0
         self._patient, self._form = patient, form
         self._out = LineWriter("stdout", _line_by_line(sys.stdout if out is None else out))
+        self._udp = None
         self._writers = [self._out]
+        if udp is not None and self._socket is not None:
+            self._udp = LineWriter(udp, self._socket.send)
+            self.add(self._udp)
         self._closed = False
 
     def add(self, writer: LineWriter) -> None:
@@ -152,35 +155,28 @@ class Lines:
     @property
     def unheard(self) -> bool:
         """Whether stdout's reader has gone and nothing else takes the events."""
-        return self._out.gone and self._socket is None and len(self._writers) == 1
+        return self._out.gone and len(self._writers) == 1
 
     @property
     def lost(self) -> dict[str, int]:
         """{destination: number of lost lines}, without destinations that lost none."""
         counts = {writer.name: writer.lost for writer in self._writers}
-        if self._udp is not None:
-            counts[self._udp] = self._udp_lost
         return {name: count for name, count in counts.items() if count}
 
     def write(self, events: Iterable[Mapping[str, Any]]) -> None:
         """Write events in their order."""
         for event in events:
             self._out.put(self._form(event), self._patient)
-            if self._socket is not None:
-                try:
-                    self._socket.send(json_line(event).encode() + b"\n")
-                except OSError:
-                    # Nobody listens, or the network is down or full: decisions go on.
-                    self._udp_lost += 1
+            if self._udp is not None:
+                self._udp.put(json_line(event), self._patient)
 
     def close(self) -> None:
         """Close all destinations, and report lost lines on stderr; twice is fine."""
         if self._closed:
             return
         self._closed = True
-        self._out.close(self._patient)
         for writer in self._writers:
-            writer.close()
+            writer.close(self._patient)
         if self._socket is not None:
             self._socket.close()
         problems = {writer.name: writer.problem for writer in self._writers}

@@ -1,4 +1,4 @@
-"""Counts above a baseline that follows slow drift; integers only, so that results repeat."""
+"""Counts above a baseline that follows slow drift, in integers, so that results repeat."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike, NDArray
 SCALE_BITS = 8
 """The baseline is kept in 1/256 counts, so that a slow drift is not lost to rounding."""
 FOLLOW_BITS = 2
-"""A step is at most 1/4 of the distance: noise moves the baseline little."""
+"""A step is at most 1/4 of the distance, so that noise hardly moves the baseline."""
 
 
 class Baseline:
     """The rest values of n taxels.
 
-    Each call of `follow` lets them follow their taxels by at most `step_counts`, and by `limit`
-    counts away from the calibration; not to call it freezes them.
+    Each call of `follow` moves them by at most `step_counts` towards the raw values, and never more
+    than `limit` counts away from the calibration. Without calls they stay.
     """
 
     def __init__(
@@ -31,10 +31,10 @@ class Baseline:
 
         Args:
             rest: (n,) raw counts with nothing touching.
-            sign: (n,) or one, 1 where a touch raises the raw value, -1 where it lowers it.
-            dead_band: (n,) or one, counts under which a taxel reads 0; at least 1.
-            step_counts: how far one step follows; rounded to 1/256 count, up.
-            limit: how many counts it may go from `rest`.
+            sign: (n,) or a scalar, 1 where a touch raises the raw value, -1 where it lowers it.
+            dead_band: (n,) or a scalar, counts under which a taxel reads 0; at least 1.
+            step_counts: length of a step; rounded up to 1/256 count.
+            limit: greatest distance from `rest`, in counts.
         """
         self._rest = np.array(rest, dtype=np.int32) << SCALE_BITS
         n = self._rest.shape
@@ -52,11 +52,11 @@ class Baseline:
 
     @property
     def counts(self) -> NDArray[np.int32]:
-        """(n,) raw counts that it stands at."""
+        """(n,) raw counts of the baseline."""
         return self._counts
 
     def above(self, raw: NDArray[np.uint16]) -> NDArray[np.uint16]:
-        """Counts above baseline (n,): sign and dead band applied, 0 to 65535."""
+        """Counts above the baseline (n,), 0 to 65535, with sign and dead band applied."""
         counts = raw.astype(np.int32)
         counts -= self._counts
         if not self._rising:
@@ -66,7 +66,7 @@ class Baseline:
         return counts.astype(np.uint16)
 
     def follow(self, raw: NDArray[np.uint16], fresh: NDArray[np.bool_]) -> None:
-        """Take a step after the drift of the `fresh` taxels; call it while nothing touches."""
+        """Follow the drift of the `fresh` taxels by a step; call it while nothing touches."""
         error = raw.astype(np.int32)
         error <<= SCALE_BITS
         error -= self._now

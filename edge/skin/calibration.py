@@ -1,4 +1,4 @@
-"""A skin's calibration written into its file, and what it says about the noise."""
+"""A skin's calibration: written into its file, and the dead band that follows from its noise."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from edge.skin.file import SkinFile, TaxelCalibration, parse
 
 
 def calibration_text(calibration: TaxelCalibration) -> str:
-    """The `[calibration]` table as TOML, a line a row of the skin."""
+    """The `[calibration]` table as TOML, one line for each row of the skin."""
 
     def rows(values: Iterable[Iterable[object]]) -> Iterator[str]:
         for row in values:
@@ -34,10 +34,10 @@ def calibration_text(calibration: TaxelCalibration) -> str:
 
 
 def with_calibration(text: str, calibration: TaxelCalibration, where: str = "skin") -> str:
-    """The file's text with its `[calibration]` replaced; all else, comments too, stays.
+    """The file's text with its `[calibration]` replaced and all else kept, comments included.
 
     Raises:
-        InputError: the file writes its calibration in a way that cannot be replaced.
+        InputError: the calibration in the file has a form that cannot be replaced.
     """
     before = parse(text, where)
     table = re.compile(
@@ -57,7 +57,7 @@ def with_calibration(text: str, calibration: TaxelCalibration, where: str = "ski
 
 
 def save_calibration(path: str | os.PathLike[str], calibration: TaxelCalibration) -> Path:
-    """Put a calibration into a skin's file, whole or not at all; the old file stays beside it.
+    """Write a calibration into a skin's file, completely or not at all, and keep the old file.
 
     Returns:
         Path of the old file, `skin.toml.bak`.
@@ -76,7 +76,7 @@ def save_calibration(path: str | os.PathLike[str], calibration: TaxelCalibration
 
 
 def dead_band(skin: SkinFile) -> NDArray[np.int32]:
-    """(rows * cols,) counts under which a taxel reads 0; at least 1, so that none is negative."""
+    """(rows * cols,) counts under which a taxel reads 0; at least 1: no count is negative."""
     floor = max(1, skin.signal.dead_band_counts)
     if skin.calibration is None:
         return np.full(skin.layout.rows * skin.layout.cols, floor, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""The loop in real time: ticks that do not drift, frames with their joints, a clean stop."""
+"""The loop in real time: frames with their joint angles at ticks that do not drift."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from edge.touch.frame import Frame
 COLLECT_TICKS = 100
 COLLECT_SLACK_S = 0.001
 STOP_S = 0.05
-"""A loop that waits longer than this for its tick asks in between whether to end."""
+"""A loop that waits longer than this for its tick checks in between whether to end."""
 
 
 class JointSource(Protocol):
-    """Where joint angles come from."""
+    """A source of joint angles."""
 
     def at(self, t: float) -> NDArray[np.float64] | None:
-        """Angles (dof,) in radians at a time of the loop's clock; None where not known."""
+        """Angles (dof,) in radians at a time of the loop's clock; None where unknown."""
         ...
 
 
 class Periods:
-    """Times between ticks, counted in bins of 10 us: any length of run in the same memory.
+    """Times between ticks, counted in bins of 10 us, so that a long run needs no more memory.
 
     >>> periods = Periods()
     >>> for period in (0.01, 0.01, 0.01, 0.02):
@@ -51,14 +51,14 @@ class Periods:
         self.longest = 0.0
 
     def add(self, period_s: float) -> None:
-        """Count one; longer than a second counts as a second."""
+        """Count a period; one longer than a second counts as a second."""
         # A period on a bin's edge must not fall below it by the last bit of a float.
         self._counts[min(int(period_s / self.BIN_S + 1e-6), self.BINS - 1)] += 1
         self.n += 1
         self.longest = max(self.longest, period_s)
 
     def percentile(self, percent: float) -> float:
-        """Seconds that so many percent of the periods are not above (to a bin's upper edge)."""
+        """The period in seconds that so many percent do not exceed, rounded up to a bin."""
         if self.n == 0:
             return math.nan
         wanted, seen = math.ceil(self.n * percent / 100.0), 0
@@ -71,16 +71,16 @@ class Periods:
 
 @dataclass
 class Stop:
-    """Whether someone has asked the loop to end."""
+    """Whether the loop has been asked to end."""
 
     asked: bool = False
 
 
 class Schedule:
-    """Ticks at start + k * period: one that comes late does not move the next ones.
+    """Ticks at start + k * period: a late tick does not move the next ones.
 
-    Ticks that have passed altogether are left out and counted in `missed`. Garbage is
-    collected here, while there is time to the next tick.
+    Ticks that have passed are left out and counted in `missed`. Garbage is collected here, while
+    there is time to the next tick.
     """
 
     def __init__(self, clock: Clock, period_s: float) -> None:
@@ -97,7 +97,7 @@ class Schedule:
         """Wait for the next tick, or until `stop` is asked for.
 
         Returns:
-            The tick's time as it should be, in seconds.
+            The time for which the tick was planned, in seconds.
         """
         now = self.clock.now()
         if self.tick < 0:
@@ -126,9 +126,9 @@ class Schedule:
 
 @contextmanager
 def garbage_aside() -> Iterator[None]:
-    """Keep the collector out of the block: what is there stays, what comes is freed by count.
+    """Disable garbage collection in the block; reference counting still works.
 
-    `Schedule.wait` collects what is left over, between two ticks.
+    `Schedule.wait` collects the rest between two ticks.
     """
     was = gc.isenabled()
     gc.collect()
@@ -144,7 +144,7 @@ def garbage_aside() -> Iterator[None]:
 
 @contextmanager
 def stop_on(*signals: int) -> Iterator[Stop]:
-    """Let signals end the loop after the current frame; a second signal terminates at once."""
+    """Let a signal end the loop after the current frame; a second one terminates at once."""
     stop = Stop()
     before: dict[int, Any] = {}
 
@@ -162,7 +162,7 @@ def stop_on(*signals: int) -> Iterator[Stop]:
 
 
 class Loop:
-    """Frames of a skin at its rate.
+    """The frames of a skin at its rate.
 
     >>> from edge.fake.player import still
     >>> from edge.skin import file
@@ -184,19 +184,19 @@ class Loop:
         Args:
             skin: started.
             joints: asked for the angles at each frame's time.
-            lasts_s: how long.
-            stop: ends it early.
+            lasts_s: duration.
+            stop: ends the loop early.
         """
         self.skin, self.joints = skin, joints
         self.schedule = Schedule(skin.clock, skin.period_s)
         self._lasts, self._stop = lasts_s, stop or Stop()
 
     def frames(self) -> Iterator[Frame]:
-        """Read until the time is over or someone asks to stop."""
+        """Read until the time is over or a stop is asked for."""
         with garbage_aside():
             while not self._stop.asked:
                 due = self.schedule.wait(self._stop)
-                # A thousandth of a tick: a time that is meant to be the end is the end.
+                # A thousandth of a tick allows for rounding.
                 if due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s:
                     return
                 if self._stop.asked:

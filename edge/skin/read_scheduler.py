@@ -1,8 +1,8 @@
-"""Which chips to read next, where one bus cannot carry the whole skin at the loop's rate.
+"""The chips to read next, where one bus cannot carry the whole skin at the loop's rate.
 
-While nothing touches, the chips are read in turn, as many a frame as the wire carries: a coarse
-scan. The chips at and around taxels that feel something are read in every frame, and the others
-share what is left of the wire. A taxel that was not read keeps its last value and its own time
+While nothing touches, the chips are read in turn, as many in a frame as the wire carries. During a
+contact, the chips at and around the touched taxels are read in every frame, and the others share
+the rest of the wire. A taxel that was not read keeps its last value and its own time
 (`Frame.times`).
 """
 
@@ -22,11 +22,11 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 MARGIN = 0.9
-"""Share of a period that planned readings may fill; retries and health checks need the rest."""
+"""Share of a period for planned readings; retries and checks need the rest."""
 SPARE = 0.15
-"""Share of the wire that is kept for chips away from the contact, so that none is forgotten."""
+"""Share of the wire for chips away from the contact, so that none is forgotten."""
 REACH = 1
-"""Taxels around a contact that count as its neighbourhood."""
+"""Width in taxels of a contact's neighbourhood."""
 OLDEST_FRAMES = 25
 """After so many frames without a reading a taxel is no longer valid. With `SPARE` of a bus for
 the rest, a full turn through 32 chips takes at most 20 frames."""
@@ -34,13 +34,13 @@ the rest, a full turn through 32 chips takes at most 20 frames."""
 
 @dataclass(frozen=True)
 class BusBudget:
-    """What one bus carries in a period, and what its chips cost.
+    """The bits that one bus carries in a period, and those that its chips cost.
 
     Attributes:
         bits: of one period.
         costs: bits of each chip's reading.
-        select: bits that it takes to connect a mux channel.
-        channels: for each chip a number; chips behind the same mux channel share it.
+        select: bits to connect a mux channel.
+        channels: for each chip a number, equal for chips behind the same mux channel.
     """
 
     bits: float
@@ -50,7 +50,7 @@ class BusBudget:
 
 
 class ReadScheduler:
-    """Chooses the chips that the next frame reads.
+    """Choose the chips that the next frame reads.
 
     >>> from edge.skin import file
     >>> scheduler = ReadScheduler.of(file.load(file.shipped("cody")))
@@ -77,7 +77,7 @@ class ReadScheduler:
             near = np.zeros((len(chips), *layout.shape), dtype=np.bool_)
             for i, chip in enumerate(chips):
                 near[i].reshape(-1)[[t for t in chip if t != UNUSED]] = True
-            # A chip is concerned where its own taxels or those within reach feel something.
+            # A chip is near a contact on its own taxels or on those within reach.
             spread = spread_by(near, REACH, layout.wraps)
             self._near.append(spread.reshape(len(chips), -1))
         self._read_at = [np.full(len(w.costs), -1, dtype=np.int64) for w in budgets]
@@ -85,7 +85,7 @@ class ReadScheduler:
 
     @classmethod
     def of(cls, file: SkinFile) -> ReadScheduler:
-        """The scheduler of a skin, at the rate that its file asks for."""
+        """The scheduler of a skin, at its file's rate."""
         reading = file.reading
         budgets = [
             BusBudget(
@@ -103,7 +103,7 @@ class ReadScheduler:
 
         Args:
             frame: the last one, or None before the first.
-            touch_counts: a taxel above this is being touched.
+            touch_counts: a taxel above this is touched.
         """
         self._tick += 1
         felt: NDArray[np.bool_] | None = None
@@ -126,14 +126,14 @@ class ReadScheduler:
         left = self._take(chosen, [i for i in oldest_first if not hot[i]], budget, left)
         self._take(chosen, [i for i in oldest_first if hot[i]], budget, left)
         if not chosen:
-            chosen.append(oldest_first[0])  # a wire too slow for a chip a period still reads one
+            chosen.append(oldest_first[0])  # even a wire too slow for one chip reads one
         chosen.sort()
         read_at[chosen] = self._tick
         return chosen
 
     @staticmethod
     def _take(chosen: list[int], wanted: Sequence[int], budget: BusBudget, bits: float) -> float:
-        """Add chips while the bits last; returns what is left of them."""
+        """Add chips while the bits last, and return the bits left."""
         connected = {budget.channels[i] for i in chosen}
         for i in wanted:
             if i in chosen:
@@ -155,7 +155,7 @@ def _channels(spec: BusSpec) -> tuple[int, ...]:
 
 
 def spread_by(mask: NDArray[np.bool_], reach: int, wraps: bool) -> NDArray[np.bool_]:
-    """Masks (n, rows, cols) grown by `reach` taxels in each direction, across the seam too."""
+    """Masks (n, rows, cols) grown by `reach` taxels in all directions, also across the seam."""
     out = mask.copy()
     for _ in range(reach):
         grown = out.copy()
