@@ -14,7 +14,8 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fcntl import ioctl
+from fcntl import LOCK_EX, LOCK_NB, flock, ioctl
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,6 +25,8 @@ from edge.errors import EdgeError
 
 I2C_TIMEOUT = 0x0702
 """ioctl of linux/i2c-dev.h; its unit is 10 ms, and it applies to the whole adapter."""
+I2C_SLAVE = 0x0703
+"""ioctl that gives EBUSY where a driver of the kernel owns the address; `I2C_RDWR` never does."""
 I2C_RDWR = 0x0707
 LARGEST_MESSAGES = 42
 LARGEST_BYTES = 8192
@@ -61,7 +64,7 @@ class BusArbitration(BusError, BlockingIOError):
 
 
 class BusBusy(BusError, OSError):
-    """A driver of the kernel owns the address (EBUSY)."""
+    """A driver of the kernel owns the address, or another program the bus (EBUSY)."""
 
 
 class BusRefused(BusError, ValueError):
@@ -245,6 +248,19 @@ def device_path(device: str | int) -> str:
     return f"/dev/i2c-{device}" if isinstance(device, int) else device
 
 
+def lock_holder(fd: int) -> str:
+    """Name and number of the process that holds the lock of an open file."""
+    try:
+        inode = str(os.fstat(fd).st_ino)
+        for line in Path("/proc/locks").read_text().splitlines():
+            fields = line.split()
+            if fields[1] == "FLOCK" and fields[5].split(":")[-1] == inode:
+                return f"{Path('/proc', fields[4], 'comm').read_text().strip()} ({fields[4]})"
+    except (OSError, IndexError):
+        pass
+    return "another program"
+
+
 class LinuxBus:
     """An adapter of Linux, `/dev/i2c-N`, over smbus2.
 
@@ -262,22 +278,26 @@ class LinuxBus:
                 the kernel's own default is a second.
 
         Raises:
-            BusError: it is not there, may not be opened, or carries no plain I2C.
+            BusError: it does not exist, may not be opened, is in use, or carries no plain I2C.
         """
         self.name = device_path(device)
         self.timeout_s = timeout_s
         self._smbus: Any = None
         self._fd = -1
+        self._asked: set[int] = set()
+        """Addresses that no driver of the kernel owned when a transfer was first prepared."""
         self.reopen()
 
     now = staticmethod(time.monotonic)
     sleep = staticmethod(time.sleep)
 
     def reopen(self) -> None:
-        """Close it, open it again and set its timeout.
+        """Close it, open it again, lock it and set its timeout.
+
+        Two programs that select channels of one mux would read each other's chips.
 
         Raises:
-            BusError: it is not there, may not be opened, or carries no plain I2C.
+            BusError: it does not exist, may not be opened, is in use, or carries no plain I2C.
         """
         import smbus2
 
@@ -287,17 +307,36 @@ class LinuxBus:
             smbus.open(self.name)
             if not smbus.funcs & smbus2.I2cFunc.I2C:
                 raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
+            flock(smbus.fd, LOCK_EX | LOCK_NB)
             ioctl(smbus.fd, I2C_TIMEOUT, max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)))
+        except BlockingIOError:
+            other = lock_holder(smbus.fd)
+            smbus.close()
+            busy = BusBusy(f"{self.name}: {other} is using the bus; end it first (EBUSY)")
+            busy.errno, busy.bus = errno.EBUSY, self.name
+            raise busy from None
         except OSError as error:
             smbus.close()
             raise bus_error(error.errno, self.name) from None
         self._smbus, self._fd = smbus, smbus.fd
 
     def prepare(self, *messages: Message) -> Transfer:
-        """Build smbus2's structures over the messages' own buffers, without a copy."""
+        """Build smbus2's structures over the messages' own buffers, without a copy.
+
+        Raises:
+            BusBusy: a driver of the kernel owns the address.
+        """
         from smbus2 import i2c_msg
         from smbus2.smbus2 import i2c_rdwr_ioctl_data
 
+        address = messages[0].address
+        if address not in self._asked and self._fd >= 0:
+            try:
+                ioctl(self._fd, I2C_SLAVE, address)
+            except OSError as error:
+                if error.errno == errno.EBUSY:
+                    raise bus_error(errno.EBUSY, self.name, address) from None
+            self._asked.add(address)
         prepared: list[Any] = []
         for message in messages:
             buffer = message.buffer

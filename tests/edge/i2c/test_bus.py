@@ -1,6 +1,8 @@
 """Errors by name, bits on the wire, and what the Linux adapter says when there is none."""
 
 import errno
+import fcntl
+import os
 
 import numpy as np
 import pytest
@@ -75,3 +77,11 @@ def test_a_file_that_is_no_bus_is_refused(tmp_path):
 def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
     with pytest.raises(ValueError, match="contiguous uint8"):
         read(0x2C, into)
+
+
+def test_the_process_that_holds_a_lock_is_named(tmp_path):
+    path = tmp_path / "i2c"
+    with path.open("w") as held, path.open("w") as wanted:
+        assert bus.lock_holder(wanted.fileno()) == "another program"
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert bus.lock_holder(wanted.fileno()).endswith(f" ({os.getpid()})")

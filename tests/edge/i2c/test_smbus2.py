@@ -83,6 +83,26 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
     assert done.stdout.startswith("/dev/i2c-1, address 0x70: the transfer broke off"), done.stderr
 
 
+def test_a_bus_that_another_program_uses_is_refused(library):
+    done = python(library, "from edge.i2c.bus import LinuxBus; LinuxBus(1)", I2CDEV_LOCKED="1")
+    assert done.stderr.splitlines()[-1] == (
+        "edge.i2c.bus.BusBusy: /dev/i2c-1: another program is using the bus; end it first (EBUSY)"
+    )
+
+
+def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_named(library):
+    code = (
+        WHOLE_SKIN
+        + """
+        print(sorted({s.error.partition(": ")[2] for s in skin.status() if s.error}))
+    """
+    )
+    done = python(library, code, I2CDEV_OWNED="0x2E")
+    valid, sentences = done.stdout.splitlines()
+    assert valid == f"{384 - 8 * 12} 0"
+    assert sentences == "['a driver of the kernel owns the address; unbind it (EBUSY)']"
+
+
 def test_a_bus_that_is_not_there_is_one_sentence(library):
     code = "from edge.i2c.bus import LinuxBus; LinuxBus(77)"
     done = python(library, code)

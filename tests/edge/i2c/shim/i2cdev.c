@@ -7,7 +7,8 @@
  *
  * I2CDEV_LOG names a file that gets a line for each ioctl but I2C_RDWR; I2CDEV_MUTE=bus:address
  * takes one address of channel 0 away, I2CDEV_SHORT=address lets the calls to an address complete
- * only the first of their messages.
+ * only the first of their messages. With I2CDEV_LOCKED another program holds the lock of every
+ * bus, and I2CDEV_OWNED=address is an address that a driver of the kernel owns.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -21,6 +22,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 enum { BUSES = 10, CHANNELS = 8, CHIPS = 4, REGISTERS = 0x400, HANDLES = 1024 };
@@ -151,6 +153,17 @@ int close(int fd)
     return real(fd);
 }
 
+int flock(int fd, int operation)
+{
+    int (*real)(int, int) = dlsym(RTLD_NEXT, "flock");
+    if (fd < 0 || fd >= HANDLES || !bus_of[fd])
+        return real(fd, operation);
+    if (!getenv("I2CDEV_LOCKED"))
+        return 0;
+    errno = EWOULDBLOCK;
+    return -1;
+}
+
 int ioctl(int fd, unsigned long request, ...)
 {
     static int (*real)(int, unsigned long, ...);
@@ -171,6 +184,13 @@ int ioctl(int fd, unsigned long request, ...)
         timeout_of[fd] = (long)argument;
         note("timeout", timeout_of[fd]);
         return 0;
+    }
+    if (request == I2C_SLAVE) {
+        const char *owned = getenv("I2CDEV_OWNED");
+        if (!owned || (long)argument != strtol(owned, NULL, 0))
+            return 0;
+        errno = EBUSY;
+        return -1;
     }
     if (request != I2C_RDWR) {
         note("unexpected", (long)request);
