@@ -116,7 +116,10 @@ def candidates(
     for sets in combinations_tried:
         for kind in KINDS if projection is None else (projection,):
             paper = sets == ("paper",)
-            if features is None and projection is None and paper != (kind == "pca"):
+            # By default discriminants are not tried for the paper's few features, and a quick
+            # choice tries discriminants alone for the others.
+            untried = kind == "lda" if paper else kind == "pca" and quick
+            if features is None and projection is None and untried:
                 continue
             thorough = features is not None and kind == "pca"
             scalings = PAPER_SCALINGS if paper and thorough else ("IV",)

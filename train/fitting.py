@@ -35,7 +35,7 @@ LEAK = 0.5
 """The data leak where the first frame recognises more than this share of the trials that do not
 have the most frequent label."""
 FEWEST_TRIALS = 3
-LONG_TOUCHES = 3.0
+LONG_TOUCHES = 2.0
 """Longer windows are tried where half of the touches last so many windows."""
 
 

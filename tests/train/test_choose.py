@@ -31,6 +31,12 @@ def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
 
+def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
+    tried = {(candidate.sets, candidate.projection) for candidate in candidates(TASKS)}
+    both = {(sets, kind) for sets in PLAIN for kind in ("pca", "lda")}
+    assert tried == both - {(("paper",), "lda")}
+
+
 def test_arguments_you_pass_are_held_fixed():
     (candidate,) = candidates(
         TASKS, features=["paper"], projection="pca", scaling="V", components=3, k=2
@@ -98,7 +104,7 @@ def test_a_window_that_is_given_is_kept(given, make_touch, tmp_path):
 
 
 def test_touches_that_last_little_longer_than_the_window_are_told_in_it(make_touch, tmp_path):
-    assert train.fit(touches(make_touch, tmp_path, 3.0, 1.8), **FEW).window_s == 1.2
+    assert train.fit(touches(make_touch, tmp_path, 2.0, 1.8), **FEW).window_s == 1.2
 
 
 def test_decision_points_of_a_long_window_are_as_many_as_of_the_usual_one(make_touch, tmp_path):
