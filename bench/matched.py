@@ -86,7 +86,7 @@ def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
             "object": [item],
         }
     )
-    batch = run_batch(scene, tuple(next(iter(kinds(scene).values()))), STEP_S)
+    batch = run_batch(scene, tuple(next(iter(kinds(scene).values()))))
     slide = batch.traces.get("slide_m", np.zeros_like(batch.force))
     return batch.counts[0], batch.force[0], slide[0]
 

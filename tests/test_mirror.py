@@ -33,6 +33,7 @@ TOPICS = {
     "train/simulate/test_simulate_run.py",
     "train/simulate/test_simulate_scene.py",
     "train/simulate/test_simulate_paper.py",
+    "train/simulate/test_effects.py",
     # Reports by their contents; complete exports.
     "export/test_early_stopping.py",
     "train/study/test_study_report.py",
@@ -54,16 +55,14 @@ THROUGH = {
     "train/importers/mcap.py": "train/importers/test_log_importers.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
-    "train/simulate/base_steps.py": "train/simulate/test_simulate_oracles.py",
     "train/simulate/families.py": "train/simulate/test_simulate_truth.py",
     "train/simulate/effects/slope.py": "train/simulate/test_simulate_pushing.py",
     "train/simulate/effects/turning.py": "train/simulate/test_simulate_pushing.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
     "train/simulate/explain.py": "train/simulate/test_simulate_called_for.py",
-    "train/simulate/reader.py": "train/simulate/test_simulate_scene.py",
     "train/simulate/scene_model.py": "train/simulate/test_simulate_scene.py",
-    "train/simulate/state.py": "train/simulate/test_trial.py",
-    "train/simulate/sensor_frames.py": "train/simulate/test_simulate_run.py",
+    "train/simulate/base.py": "train/simulate/test_simulate_oracles.py",
+    "train/simulate/trials.py": "train/simulate/test_simulate_oracles.py",
 }
 """{module, or folder of a report's sections: the test file that specifies it with others}."""
 

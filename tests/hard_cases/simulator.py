@@ -48,8 +48,7 @@ def judged(
     trace = pushed(stiffness, mass, h, mu, steps)
     wrong = 0
     for i in range(stiffness.size):
-        one = type(trace)(**{k: v[:, i : i + 1] for k, v in vars(trace).items()})
-        wrong += bool(judge(one, stiffness[i], mass[i], h[i], mu[i], 0.8 * mu[i]))
+        wrong += bool(judge(trace.of(i), stiffness[i], mass[i], h[i], mu[i], 0.8 * mu[i]))
     return float(wrong)
 
 

@@ -24,7 +24,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="trials of each object in each condition, instead of the scene's",
     )
-    parser.add_argument("--batch", type=int, default=256, help="trials that are simulated together")
+    parser.add_argument(
+        "--batch", type=int, default=1024, help="trials simulated side by side at most"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="processes; -1 for all cores")
     parser.add_argument(
         "--backend", choices=("local", "dask"), default="local", help="where the batches run"
@@ -53,15 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out:
         from tqdm import tqdm
 
-        from train.simulate.base_steps import press
-        from train.simulate.compiled import is_fresh
         from train.simulate.run import total_trials, write
 
-        if is_fresh(press):
-            print(
-                "compiling the simulator, once for this machine: about half a minute",
-                file=sys.stderr,
-            )
         with tqdm(total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr) as bar:
             written = write(
                 scene,

@@ -1,43 +1,67 @@
-"""Kinematics of an arm, compiled: one trial's arithmetic, which knows of no other's."""
+"""Kinematics of an arm, for many trials at once: arrays whose last axis is the trial."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from train.simulate.compiled import Array
 
-JOINTS = 16
-"""That turn, at most."""
-SHIFT, TURN, AXIS, MAIN, WIDTH = 0, 3, 12, 15, 16
-"""Of a row of the table: a shift, a turn by rows, the joint's axis, which of the frame's own axes
-that is (3 where it is none)."""
+Array = NDArray[np.float64]
+
+
+class Link(NamedTuple):
+    """A constant step, then a joint that turns.
+
+    Attributes:
+        shift: (3,) metres.
+        turn: (3, 3), or None where the step does not turn.
+        axis: (3,) of the joint, a unit vector in the frame that the step reaches.
+        main: which of that frame's own axes the joint turns about, or None.
+    """
+
+    shift: Array
+    turn: Array | None
+    axis: Array
+    main: int | None
+
+
+class Pose(NamedTuple):
+    """Where the arms of n trials are.
+
+    Attributes:
+        origin: (3, n) metres, the tip.
+        rotation: (3, 3, n), of which `rotation[k]` is the tip's k-th axis.
+        axes: (3, dof, n), each joint's axis in the base's frame.
+        origins: (3, dof, n) metres, a point of each axis.
+    """
+
+    origin: Array
+    rotation: Array
+    axes: Array
+    origins: Array
 
 
 class Kinematics:
-    """A chain of turning joints taken apart into constant steps and turns.
+    """A chain of turning joints, taken apart into constant steps and turns.
 
     Attributes:
-        table: (dof + 1, WIDTH) what lies before each joint, and its axis; last what lies behind.
-        limits: (2, dof, 1) radians, the lower and the upper of each joint; without them infinite.
+        links: one for each joint.
+        tail: the constant step behind the last joint.
+        limits: (2, dof, 1) radians, the lower and the upper limit of each joint, or infinite.
     """
 
     def __init__(self, chain: Chain) -> None:
-        """Of a chain.
+        """Take a chain apart.
 
         Raises:
-            InputError: a joint slides, or there are too many.
+            InputError: a joint slides.
         """
-        if chain.dof > JOINTS:
-            raise InputError(
-                f"the arm has {chain.dof} joints that turn; the simulator takes at most {JOINTS}: "
-                "make the others fixed"
-            )
-        rows: list[Array] = []
+        self.links: list[Link] = []
         pending = (np.zeros(3), np.eye(3))
         for joint in chain.joints:
             if joint.kind == "prismatic":
@@ -49,16 +73,36 @@ class Kinematics:
             if joint.kind == "fixed":
                 pending = _joined(before, pending)
                 continue
-            axis = np.array(joint.axis) / math.hypot(*joint.axis)
-            main = int(np.argmax(np.abs(axis)))
-            rows.append(_row(before, axis, main if abs(axis[main]) == 1.0 else 3))
-        self.table = np.array([*rows, _row(pending, np.zeros(3), 3)])
-        none = (-math.inf, math.inf)
-        self.limits = np.array([pair or none for pair in chain.limits]).T[:, :, None]
+            self.links.append(_link(before, np.array(joint.axis) / math.hypot(*joint.axis)))
+        self.tail = _link(pending, np.zeros(3))
+        unlimited = (-math.inf, math.inf)
+        self.limits = np.array([pair or unlimited for pair in chain.limits]).T[:, :, None]
+
+    def pose(self, q: Array) -> Pose:
+        """The arms' poses at joint angles (dof, n)."""
+        dof, n = q.shape
+        sines, cosines = np.sin(q), np.cos(q)
+        origin, rotation = np.zeros((3, n)), np.zeros((3, 3, n))
+        rotation[0, 0] = rotation[1, 1] = rotation[2, 2] = 1.0
+        axes, origins = np.empty((2, 3, dof, n))
+        for j, link in enumerate(self.links):
+            origin, rotation = _moved(link, origin, rotation)
+            origins[:, j] = origin
+            axes[:, j] = _combined(link.axis, rotation)
+            rotation = _turned(link, sines[j], cosines[j], rotation)
+        origin, rotation = _moved(self.tail, origin, rotation)
+        return Pose(origin, rotation, axes, origins)
 
 
-def _row(before: tuple[Array, Array], axis: Array, main: int) -> Array:
-    return np.concatenate([before[0], before[1].ravel(), axis, [main]])
+def _link(before: tuple[Array, Array], axis: Array) -> Link:
+    shift, turn = before
+    main = int(np.argmax(np.abs(axis)))
+    return Link(
+        shift,
+        None if np.array_equal(turn, np.eye(3)) else turn,
+        axis,
+        main if abs(axis[main]) == 1.0 else None,
+    )
 
 
 def _fixed(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[Array, Array]:
@@ -76,77 +120,52 @@ def _joined(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Arra
     return a[0] + a[1] @ b[0], a[1] @ b[1]
 
 
-@njit(error_model="numpy")
-def move(step: Array, origin: Array, rotation: Array) -> None:
-    """Go on by a row's shift and turn, as seen from the frame that has been reached."""
-    for i in range(3):
-        shifted = rotation[i, 0] * step[SHIFT]
-        for k in range(1, 3):
-            shifted += rotation[i, k] * step[SHIFT + k]
-        origin[i] += shifted
-    for i in range(3):
-        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
-        for k in range(3):
-            rotation[i, k] = a * step[TURN + k] + b * step[TURN + 3 + k] + c * step[TURN + 6 + k]
+def _combined(parts: Array, rotation: Array) -> Array:
+    """(3, n): the axes of (3, 3, n) times their parts (3,); a part of 0 costs nothing."""
+    out = np.zeros(rotation.shape[1:])
+    for part, axis in zip(parts.tolist(), rotation, strict=True):
+        if part != 0.0:
+            out += axis * part
+    return out
 
 
-@njit(error_model="numpy")
-def turn(step: Array, angle: float, rotation: Array) -> None:
-    """Turn about the row's axis (Rodrigues): I + sin K + (1 - cos) K^2."""
-    sine, cosine, main = math.sin(angle), math.cos(angle), int(step[MAIN])
-    if main < 3:
+def _moved(link: Link, origin: Array, rotation: Array) -> tuple[Array, Array]:
+    """Origin and axes after a link's constant step."""
+    origin = origin + _combined(link.shift, rotation)
+    if link.turn is not None:
+        rotation = np.stack([_combined(column, rotation) for column in link.turn.T])
+    return origin, rotation
+
+
+def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
+    """The axes after a turn about the link's axis (Rodrigues): I + sin K + (1 - cos) K^2."""
+    out = np.empty_like(rotation)
+    if link.main is not None:
         # About one of the frame's own axes the other two turn in their plane.
-        if step[AXIS + main] < 0.0:
+        if link.axis[link.main] < 0.0:
             sine = -sine
-        first, second = (main + 1) % 3, (main + 2) % 3
-        for i in range(3):
-            a, b = rotation[i, first], rotation[i, second]
-            rotation[i, first] = a * cosine + b * sine
-            rotation[i, second] = b * cosine - a * sine
-        return
-    x, y, z = step[AXIS], step[AXIS + 1], step[AXIS + 2]
-    rest = 1.0 - cosine
-    for i in range(3):
-        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
-        # a row of the rotation times K, and that times K again
-        u, v, w = b * z - c * y, c * x - a * z, a * y - b * x
-        rotation[i, 0] = a + (sine * u + rest * (v * z - w * y))
-        rotation[i, 1] = b + (sine * v + rest * (w * x - u * z))
-        rotation[i, 2] = c + (sine * w + rest * (u * y - v * x))
+        first, second = (link.main + 1) % 3, (link.main + 2) % 3
+        a, b = rotation[first], rotation[second]
+        out[link.main] = rotation[link.main]
+        out[first] = a * cosine + b * sine
+        out[second] = b * cosine - a * sine
+        return out
+    (x, y, z), (a, b, c), versine = link.axis.tolist(), rotation, 1.0 - cosine
+    # Each row of the rotation times K, and that times K again.
+    u, v, w = b * z - c * y, c * x - a * z, a * y - b * x
+    out[0] = a + (sine * u + versine * (v * z - w * y))
+    out[1] = b + (sine * v + versine * (w * x - u * z))
+    out[2] = c + (sine * w + versine * (u * y - v * x))
+    return out
 
 
-@njit(error_model="numpy")
-def pose_of(
-    table: Array, q: Array, origin: Array, rotation: Array, axes: Array, origins: Array
-) -> None:
-    """One arm's pose at its angles (dof, or more room).
-
-    Args:
-        origin: (3,) metres, the tip.
-        rotation: (3, 3), the tip's axes as columns.
-        axes: (3, dof), each joint's axis in the base's frame.
-        origins: (3, dof) metres, a point of each axis.
-    """
-    for i in range(3):
-        origin[i] = 0.0
-        for k in range(3):
-            rotation[i, k] = 1.0 if i == k else 0.0
-    for j in range(len(table) - 1):
-        step = table[j]
-        move(step, origin, rotation)
-        for i in range(3):
-            origins[i, j] = origin[i]
-            axes[i, j] = (
-                rotation[i, 0] * step[AXIS]
-                + rotation[i, 1] * step[AXIS + 1]
-                + rotation[i, 2] * step[AXIS + 2]
-            )
-        turn(step, q[j], rotation)
-    move(table[-1], origin, rotation)
+def dot(a: Array, b: Array) -> Array:
+    """The scalar products of vectors (3, ...)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit(error_model="numpy")
-def dot(a: Array, b: Array) -> float:
-    """The scalar product of two vectors (3,)."""
-    product: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return product
+def cross(a: Array, b: Array) -> Array:
+    """(3, ...): the cross products of vectors (3, ...)."""
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from train.simulate.assemble import make_plan
-from train.simulate.compiled import Array
-from train.simulate.engine import Batch, begin, kind_of, run_batch
+from train.simulate.arm import Array
+from train.simulate.contact import total
+from train.simulate.engine import PLACED, PhysicsRun, begin, run_physics
+from train.simulate.plan import ALL, PACE, make_plan
 from train.simulate.scene_model import Scene, TrialSpec
-from train.simulate.schema import SPREAD
 
-HALVINGS = 6
+HALVINGS = 4
 BEFORE_BELIEF = 3
 """Halvings that an order is estimated from."""
-SHORTEST_S = 1e-5
-"""No step is verified on a finer one."""
-VERIFIED_BY = 4.0
+MOST_STEPS = 20_000
+"""Of a trial that verifies a step; they are short everywhere, not near a jolt alone."""
+VERIFIED_BY = 2.0
 """How much shorter than the last of the halves the step is that verifies them."""
 OF_A_SWING = 0.2
 """A step that is this part of sqrt(m / k) shows how a mass m swings on a contact's stiffness k."""
+PRESSED_M = 0.002
+"""Depth to which what swings is pressed: the springs met by then are those that it swings on."""
 LITTLE_GAIN = 2.0
 
 
@@ -52,57 +55,109 @@ class Convergence:
     within: bool
 
 
-def middle_values(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
+def middle_values(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
     """{name: (n,)} of trials in the middle of every range, without spread."""
-    out: dict[str, Array] = {}
-    for name in set.intersection(*(set(trial.object.values) for trial in trials)):
-        out[name] = np.array([trial.object.values[name].middle for trial in trials])
-    n = len(trials)
-    out["lead_s"] = np.full(n, scene.lead.middle)
-    out["taxel_n_m"] = np.full(n, scene.taxel_n_m.middle)
-    for name in SPREAD:
-        if name in ("place_m", "yaw_deg", "roll_deg"):
-            out[name] = np.zeros(n)
-    return out
+    held = [
+        {
+            **dict.fromkeys(PLACED, 0.0),
+            **{name: value.middle for name, value in spec.object.values.items()},
+            "lead_s": scene.lead.middle,
+            "taxel_n_m": scene.taxel_n_m.middle,
+        }
+        for spec in specs
+    ]
+    names = {name: None for values in held for name in values}
+    return {name: np.array([values.get(name, math.nan) for values in held]) for name in names}
 
 
-def physics(scene: Scene, trials: tuple[TrialSpec, ...], step_s: float) -> Batch:
-    """The middle trials' forces and joints at a step."""
-    kind = kind_of(scene, trials[0].object, trials[0].condition)
-    plan = make_plan(scene, kind.effects)
-    values = middle_values(scene, trials)
-    return run_batch(scene, trials, step_s, plan=plan, values=values, images=False)
+def physics(
+    scene: Scene, specs: Sequence[TrialSpec], step_s: float | None = None, *, paced: bool = True
+) -> PhysicsRun:
+    """The middle trials' forces and joints, at a step or at their own; `paced` where steps are
+    finer near a jolt."""
+    if step_s is not None:
+        specs = [replace(spec, step_s=step_s) for spec in specs]
+    specs = tuple(specs)
+    plan = make_plan(scene, specs)
+    if not paced:
+        plan = replace(plan, stages={**plan.stages, **{stage: [] for stage in PACE}})
+    values = middle_values(scene, specs)
+    return run_physics(scene, specs, plan=plan, values=values, images=False)
 
 
-def measure(scene: Scene, trials: tuple[TrialSpec, ...], halvings: int = HALVINGS) -> Convergence:
-    """Halve the step of one kind's middle trials, one trial an object, and see what changes.
+@dataclass
+class _Kind:
+    """One trial of each object and condition of a kind, and what the steps tried have shown."""
+
+    specs: list[TrialSpec]
+    steps_s: list[float]
+    forces: list[Array]
+
+    @property
+    def changes(self) -> list[float]:
+        return [_apart(one, other) for one, other in pairwise(self.forces)]
+
+
+def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:
+    """Run kinds at further steps, all side by side."""
+    specs = [replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs]
+    forces = physics(scene, specs, paced=paced).force
+    sizes = np.cumsum([len(kind.specs) for kind, _ in work])[:-1]
+    for (kind, step_s), force in zip(work, np.split(forces, sizes), strict=True):
+        kind.steps_s.append(step_s)
+        kind.forces.append(force)
+
+
+def measure(
+    scene: Scene, groups: Sequence[Sequence[TrialSpec]], halvings: int = HALVINGS
+) -> list[Convergence]:
+    """Halve the step of each kind's middle trials, one trial an object, and see what changes.
 
     The differences between neighbouring steps give the order p and, summed as the geometric
-    series that they are, the error left at each step (Richardson). What a step cannot show (a
-    light thing that swings faster) neither can its halves; so the forces are compared with those
-    of a step short enough for that.
+    series that they are, the error left at each step (Richardson). A step that is too long to show
+    how a light thing swings has halves that are too long as well; so the forces are compared with
+    those of a step short enough for that. Trials end with the window that labels are judged in.
     """
-    first = tuple({trial.key: trial for trial in reversed(trials)}.values())
-    tolerance = scene.trials["tolerance"]
-    steps_s = [1.0 / scene.trials["rate_hz"]]
-    forces = [physics(scene, first, steps_s[0]).force]
-    changes: list[float] = []
-    while len(changes) < halvings:
-        steps_s.append(steps_s[-1] / 2.0)
-        forces.append(physics(scene, first, steps_s[-1]).force)
-        changes.append(_apart(forces[-2], forces[-1]))
-        if len(changes) >= BEFORE_BELIEF and _left(changes)[-2] <= tolerance:
+    after_s = min(scene.trials["after_s"], scene.labels["window_s"])
+    scene = replace(scene, trials={**scene.trials, "after_s": after_s})
+    tolerance, frame = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
+    kinds = [
+        _Kind(list({spec.key: spec for spec in reversed(specs)}.values()), [], [])
+        for specs in groups
+    ]
+    first = min(BEFORE_BELIEF, halvings)
+    _run(scene, [(kind, frame / 2**k) for kind in kinds for k in range(first + 1)])
+    for k in range(first + 1, halvings + 1):
+        left = [kind for kind in kinds if not _left(kind.changes)[-2] <= tolerance]
+        left = [kind for kind in left if len(kind.steps_s) == k]
+        if not left:
             break
-    finest = max(min(_shows_swings(scene, first), steps_s[-1] / VERIFIED_BY), SHORTEST_S)
-    steps_s.append(finest)
-    true = physics(scene, first, finest).force
+        _run(scene, [(kind, frame / 2**k) for kind in left])
+    swings = _shows_swings(scene, kinds)
+    shortest = (scene.lead.high + after_s) / MOST_STEPS
+    _run(
+        scene,
+        [
+            (kind, max(min(swing, kind.steps_s[-1] / VERIFIED_BY), shortest))
+            for kind, swing in zip(kinds, swings, strict=True)
+        ],
+        paced=False,
+    )
+    return [_judged(kind, tolerance) for kind in kinds]
+
+
+def _judged(kind: _Kind, tolerance: float) -> Convergence:
+    *forces, true = kind.forces
+    changes = kind.changes[:-1]
     apart = [_apart(force, true) for force in forces]
     errors = (*(max(pair) for pair in zip(apart, _left(changes), strict=False)), apart[-1])
     limit = max(tolerance, LITTLE_GAIN * min(errors))
     if min(errors) <= tolerance:
         limit = tolerance
-    step_s, error = next((s, e) for s, e in zip(steps_s, errors, strict=False) if e <= limit)
-    return Convergence(tuple(steps_s), errors, _order(changes), step_s, error, error <= tolerance)
+    step_s, error = next((s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit)
+    return Convergence(
+        tuple(kind.steps_s), errors, _order(changes), step_s, error, error <= tolerance
+    )
 
 
 def _apart(one: Array, other: Array) -> float:
@@ -126,13 +181,15 @@ def _order(changes: list[float]) -> float:
     return float(np.clip(math.log2(max(min(shrunk, default=2.0), 1e-9)), 0.25, 1.0))
 
 
-def _shows_swings(scene: Scene, trials: tuple[TrialSpec, ...]) -> float:
-    """The step that shows how the lightest of the trials' objects swings on the skin."""
-    kind = kind_of(scene, trials[0].object, trials[0].condition)
-    if "sliding" not in kind.effects:
-        return math.inf
-    plan, values = make_plan(scene, kind.effects), middle_values(scene, trials)
-    state = begin(scene, plan, trials, 1.0, values)
-    rows, springs = state.arrays["weight"][:, :, None], state.arrays["stiffness"][:, None]
-    stiffest = (rows * springs * state.arrays.get("alive", 1.0)).sum(axis=(1, 2))
-    return OF_A_SWING * float(np.sqrt(values["mass_kg"] / stiffest).min())
+def _shows_swings(scene: Scene, kinds: list[_Kind]) -> list[float]:
+    """The step that shows how the lightest object of each kind swings on the skin."""
+    specs = tuple(spec for kind in kinds for spec in kind.specs)
+    t = begin(scene, specs, values=middle_values(scene, specs))
+    rows, springs = total(t.weight), total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
+    if "stems" in t.own:
+        stems = total(t.own["stems"].stiffness)
+        rows, springs = np.where(stems > 0.0, 1.0, rows), np.where(stems > 0.0, stems, springs)
+    steps = OF_A_SWING * np.sqrt(t.values.get("mass_kg", np.full(t.n, np.inf)) / (rows * springs))
+    moves = t.plan.also("sliding", ALL)
+    sizes = np.cumsum([len(kind.specs) for kind in kinds])[:-1]
+    return [float(part.min()) for part in np.split(np.where(moves, steps, np.inf), sizes)]

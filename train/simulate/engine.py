@@ -1,4 +1,9 @@
-"""Run a batch of trials through its plan."""
+"""Run trials side by side: draw their values, set them up, step them, and read their sensors.
+
+Each trial has a clock of its own. A round of the loop takes one step of every trial that is not
+done; a trial whose steps make up a frame ends the frame there. So finer steps near a jolt are taken
+by the trials concerned alone, and trials of different steps share one loop.
+"""
 
 from __future__ import annotations
 
@@ -11,63 +16,13 @@ from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
 from train.simulate import streams
-from train.simulate.assemble import make_plan
-from train.simulate.compiled import Array, each
+from train.simulate.arm import Array
 from train.simulate.energy import check_energy
-from train.simulate.plan import RUN_STAGES, Plan
-from train.simulate.reader import Value
-from train.simulate.readings import Readings
-from train.simulate.required_effects import required_effects
-from train.simulate.run_frames import run_frames
-from train.simulate.scene_model import Scene, SceneObject, TrialSpec
+from train.simulate.plan import ALL, FRAME, PACE, SAMPLE, SENSOR, SETUP, STEP, TUNE, Plan, make_plan
+from train.simulate.readings import FULL, Readings
+from train.simulate.scene_model import Scene, TrialSpec, Value
 from train.simulate.schema import STIFFNESSES
-from train.simulate.sensor_frames import SensorFrames
-from train.simulate.state import State
-
-
-@dataclass(frozen=True)
-class Kind:
-    """Trials that run the same plan on beds of the same form, and so can share a batch."""
-
-    effects: tuple[str, ...]
-    curved: bool
-    """Rows lie at different depths; a flat bed's law needs one line a column only."""
-
-
-def kind_of(scene: Scene, item: SceneObject, condition: str) -> Kind:
-    """What an object's trials have in common with others that can share their batch."""
-    effects = tuple(required_effects(scene, item, condition))
-    curved = "radius_m" in item.given and "tilt" not in effects
-    return Kind(effects, curved)
-
-
-@dataclass(frozen=True)
-class Batch:
-    """What a batch of n trials gave, `frames` frames each.
-
-    Attributes:
-        t: (frames,) seconds.
-        times: (n, frames) seconds, where a clock effect shifts them; None elsewhere.
-        kept: (n, frames) bool, where frames are dropped; None elsewhere.
-        counts: (n, frames, rows, cols) uint16.
-        valid: (n, rows, cols) bool, or None.
-        joints: (n, frames, dof) radians.
-        force: (n, frames) newtons.
-        traces: {name: (n, frames)} of what the effects keep, such as `slide_m`.
-        state: what the plan left behind.
-    """
-
-    trials: tuple[TrialSpec, ...]
-    t: Array
-    counts: NDArray[np.uint16]
-    joints: Array
-    force: Array
-    times: Array | None
-    kept: NDArray[np.bool_] | None
-    valid: NDArray[np.bool_] | None
-    traces: dict[str, Array]
-    state: State
-
+from train.simulate.trials import Trials
 
 SCALED = {
     "stiffness": STIFFNESSES,
@@ -80,20 +35,20 @@ PLACED = dict.fromkeys(("place_m", "yaw_deg", "roll_deg"), Value(0.0, 0.0))
 """Where the forearm meets an object: spreads about 0, of which no object has a value."""
 
 
-def values_of(scene: Scene, trials: tuple[TrialSpec, ...]) -> dict[str, Array]:
+def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
     """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
 
     Where an object has no such value (a fixed one its mass), it is NaN and nothing reads it.
     """
     groups: dict[tuple[str, int], list[int]] = {}
-    for i, trial in enumerate(trials):
+    for i, trial in enumerate(specs):
         groups.setdefault((trial.key, trial.attempt), []).append(i)
     out: dict[str, Array] = {}
     for members in groups.values():
         where = np.array(members)
-        for name, drawn in _values(scene, [trials[i] for i in members]).items():
+        for name, drawn in _values(scene, [specs[i] for i in members]).items():
             if name not in out:
-                out[name] = np.full(len(trials), np.nan)
+                out[name] = np.full(len(specs), np.nan)
             out[name][where] = drawn
     return out
 
@@ -130,172 +85,233 @@ def frame_count(scene: Scene) -> int:
 
 
 def begin(
-    scene: Scene, plan: Plan, trials: tuple[TrialSpec, ...], step_s: float, values: dict[str, Array]
-) -> State:
-    """The state of a batch before its first step; a whole number of steps makes a frame."""
-    state = State(
-        scene=scene,
-        skin=scene.cylinder,
-        trials=trials,
-        n=len(trials),
-        steps=max(1, round(1.0 / (scene.trials["rate_hz"] * step_s))),
-        values=values,
-        solve=plan.solve.address,
-    )
-    for function in plan.setup:
-        function(state)
-    each(plan.addresses("tune"), state.trial.here)
-    return state
-
-
-@dataclass(frozen=True)
-class PhysicsRun:
-    """The physics of a batch: what its skin bears, before any sensor reads it.
-
-    Attributes:
-        frames: the load on the taxels, frame by frame.
-        t: (frames,) seconds.
-        joints: (n, frames, dof) radians.
-        force: (n, frames) newtons.
-        traces: {name: (n, frames)}.
-        state: what the plan left behind.
-    """
-
-    frames: SensorFrames
-    t: Array
-    joints: Array
-    force: Array
-    traces: dict[str, Array]
-    state: State
-
-
-def run_batch(
     scene: Scene,
-    trials: tuple[TrialSpec, ...],
-    step_s: float,
+    specs: tuple[TrialSpec, ...],
     *,
     plan: Plan | None = None,
     values: dict[str, Array] | None = None,
-    images: bool = True,
-) -> Batch:
-    """Simulate trials of one kind together; each comes out as it would alone, bit by bit.
+) -> Trials:
+    """Trials before their first step.
 
     Args:
-        step_s: the physics' step; a whole number of them makes a frame.
-        plan: the kind's, where it is at hand.
+        plan: what they run, where it is at hand.
         values: {name: (n,)} in place of the scene's draws.
-        images: False for forces, joints and traces alone; `counts` are then empty.
-    """
-    first = trials[0]
-    plan = plan or make_plan(scene, kind_of(scene, first.object, first.condition).effects)
-    physics = run_physics(scene, trials, step_s, plan=plan, values=values, images=images)
-    seen = list(readings(physics, plan))
-
-    def all_of(name: str) -> Any:
-        found = [getattr(one, name) for one in seen]
-        return None if found[0] is None else np.stack(found)
-
-    found = {name: all_of(name) for name in ("joints", "times", "kept", "valid")}
-    found["counts"] = np.stack([one.frames() for one in seen])
-    force, traces = physics.force, physics.traces
-    return Batch(trials, physics.t, force=force, traces=traces, state=physics.state, **found)
-
-
-def run_physics(
-    scene: Scene,
-    trials: tuple[TrialSpec, ...],
-    step_s: float,
-    *,
-    plan: Plan,
-    values: dict[str, Array] | None = None,
-    images: bool = True,
-) -> PhysicsRun:
-    """The physics of `run_batch`, with the same arguments."""
-    values = values_of(scene, trials) if values is None else values
-    frames = frame_count(scene)
-    state = begin(scene, plan, trials, step_s, values)
-    check_start(state, plan)
-    n, dof = len(trials), len(scene.stiffness)
-    seen = SensorFrames(scene, plan, state, frames if images else 0)
-    joints, force = np.empty((n, frames, dof)), np.zeros((n, frames))
-    traces = np.zeros((len(plan.traces), n, frames))
-    run_frames(
-        state.records,
-        tuple(plan.addresses(stage) for stage in RUN_STAGES),
-        joints,
-        force,
-        seen.window,
-        seen.scale,
-        not seen.raw,
-        state.places(list(plan.traces.values())),
-        traces,
-    )
-    check_found(state)
-    t = np.arange(frames) / scene.trials["rate_hz"]
-    check_energy(state, joints, t)
-    kept = dict(zip(plan.traces, traces, strict=True))
-    return PhysicsRun(frames=seen, t=t, joints=joints, force=force, traces=kept, state=state)
-
-
-def check_found(state: State) -> None:
-    """Refuse a batch in which a contact's loads were not found.
 
     Raises:
-        EdgeError: names the scene, and how many trials that was in.
+        InputError: an object touches the arm before it moves.
     """
-    if state.trial.lost.any():
-        raise EdgeError(
-            f"{state.scene.name}: how far the forearm tilts was not found in "
-            f"{np.count_nonzero(state.trial.lost)} trials; "
-            "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
-        )
+    t = Trials(
+        scene,
+        specs,
+        values_of(scene, specs) if values is None else values,
+        make_plan(scene, specs) if plan is None else plan,
+    )
+    t.plan.run((*SETUP, *TUNE), t)
+    check_start(t)
+    return t
 
 
-def check_start(state: State, plan: Plan) -> None:
-    """Refuse a batch in which an object bears force before the arm has moved.
+def check_start(t: Trials) -> None:
+    """Refuse trials in which an object bears force before the arm has moved.
 
     Raises:
         InputError: names the first such trial, and by how much its face is turned.
     """
-    t = state.trial
-    each(plan.addresses("frame"), t.here)
-    t.free, t.c = t.y_frame, 0.0
-    each(np.array([state.solve]), t.here)
-    held = t.found[:, 0] > 0.0
+    t.plan.run(FRAME, t)
+    t.y[:], t.compliance[:] = t.y_frame, 0.0
+    held = t.ask(ALL, t.y[0], t.compliance[0])[0] > 0.0
     if held.any():
         i = int(np.argmax(held))
-        trial, yaw = state.trials[i], abs(state.values["yaw_deg"][i])
+        trial, yaw = t.specs[i], abs(t.values["yaw_deg"][i])
         raise InputError(
-            f"{state.scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
+            f"{t.scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
             f"trial {trial.number} of {trial.key}, where the face is turned by {yaw:.0f} degrees; "
             "give spread.yaw_deg or the object's width_m less, or trials.lead_s more time"
         )
 
 
-def readings(
-    physics: PhysicsRun, plan: Plan, which: NDArray[np.intp] | None = None
-) -> Iterator[Readings]:
-    """What a plan's sensor and clock show of a run's trials, one by one.
+@dataclass(frozen=True)
+class PhysicsRun:
+    """The physics of n trials: what their skin bears, before any sensor reads it.
 
-    One run serves any plan that differs in these alone, as long as each of them has some: the
-    frames are kept in whole counts where no sensor's effect is called for.
+    Attributes:
+        t: (frames,) seconds.
+        joints: (n, frames, dof) radians.
+        force: (n, frames) newtons.
+        traces: {name: (n, frames)} of what the effects keep, such as `slide_m`.
+        window: (n, frames, rows, C) counts on the columns that can touch, or of no frames.
+        trials: as the last step left them.
+    """
+
+    t: Array
+    joints: Array
+    force: Array
+    traces: dict[str, Array]
+    window: NDArray[np.float32]
+    trials: Trials
+
+
+def run_physics(
+    scene: Scene,
+    specs: tuple[TrialSpec, ...],
+    *,
+    plan: Plan | None = None,
+    values: dict[str, Array] | None = None,
+    images: bool = True,
+) -> PhysicsRun:
+    """Simulate trials side by side; each comes out as it would alone, bit by bit.
+
+    Args:
+        plan, values: as of `begin`.
+        images: False for forces, joints and traces alone.
+
+    Raises:
+        InputError: as of `begin`.
+        EdgeError: a contact's loads were not found, or energy came out of nothing.
+    """
+    t = begin(scene, specs, plan=plan, values=values)
+    frames = frame_count(scene)
+    joints, force = np.empty((t.n, frames, len(t.q))), np.zeros((t.n, frames))
+    sources = {"depth_m": (t, "deepest"), **t.plan.traces(t.own)}
+    traces = {name: np.zeros((t.n, frames)) for name in sources}
+    window = np.zeros((t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32)
+    joints[:, 0] = t.q.T
+    scale, active = scene.skin.counts_per_newton or 1.0, np.arange(t.n)
+    running: Any = ALL
+    while active.size:
+        starts = active[t.left[active] == 0]
+        if starts.size:
+            start_frames(t, starts)
+        t.plan.run(STEP, t, running)
+        t.left[active] -= 1
+        ends = active[t.left[active] == 0]
+        if not ends.size:
+            continue
+        t.frame[ends] += 1
+        k = t.frame[ends]
+        # A frame ends at its own time: sums of steps would drift from it.
+        t.t[ends] = k / t.rate_hz
+        t.plan.run(SAMPLE, t, some_of(t, ends))
+        joints[ends, k] = t.q.T[ends]
+        force[ends, k] = t.force[ends]
+        for name, (owner, field) in sources.items():
+            traces[name][ends, k] = getattr(owner, field)[ends]
+        if images:
+            touched = t.force[ends] > 0.0
+            counts = t.image.take(ends[touched], -1) * scale
+            window[ends[touched], k[touched]] = np.moveaxis(np.minimum(counts, FULL), -1, 0)
+        if (k == frames - 1).any():
+            active = active[t.frame[active] < frames - 1]
+            running = active
+    check_found(t)
+    times = np.arange(frames) / scene.trials["rate_hz"]
+    check_energy(t, joints, times)
+    return PhysicsRun(times, joints, force, traces, window, t)
+
+
+def some_of(t: Trials, i: NDArray[np.intp]) -> Any:
+    """An index of trials, `ALL` where it has them all."""
+    return ALL if len(i) == t.n else i
+
+
+def start_frames(t: Trials, starts: NDArray[np.intp]) -> None:
+    """Choose the steps of some trials' next frames, and look where their contacts are."""
+    before = t.steps[starts]
+    t.plan.run(PACE, t, some_of(t, starts))
+    changed = starts[t.steps[starts] != before]
+    if changed.size:
+        t.h[changed] = 1.0 / (t.rate_hz * t.steps[changed])
+        t.plan.run(TUNE, t, some_of(t, changed))
+    t.plan.run(FRAME, t, some_of(t, starts))
+    t.left[starts] = t.steps[starts]
+
+
+def check_found(t: Trials) -> None:
+    """Refuse trials in which a contact's loads were not found.
+
+    Raises:
+        EdgeError: names the scene, and how many trials that was in.
+    """
+    if t.lost.any():
+        raise EdgeError(
+            f"{t.scene.name}: how far the forearm tilts was not found in "
+            f"{np.count_nonzero(t.lost)} trials; "
+            "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+        )
+
+
+def readings(
+    physics: PhysicsRun,
+    which: NDArray[np.intp] | None = None,
+    scene: Scene | None = None,
+) -> Iterator[Readings]:
+    """What the sensors and their clock show of a run's trials, one by one.
 
     Args:
         which: the trials to read; None for all.
+        scene: one that differs from the run's in its sensors alone, to read with these.
     """
-    state = physics.state
-    for i in range(state.n) if which is None else which.tolist():
-        counts, taxels = physics.frames.borne(state, i)
+    t = physics.trials
+    scene = scene or t.scene
+    every = np.arange(t.n) if which is None else which
+    plan = t.plan if scene is t.scene else make_plan(scene, t.specs)
+    for i in every.tolist():
+        window = physics.window[i].reshape(physics.window.shape[1], -1)
+        some = np.flatnonzero(window.any(axis=0))
+        row, column = np.divmod(some, len(t.columns))
         seen = Readings(
-            seed=state.scene.seed,
+            scene=scene,
+            trial=t.specs[i],
+            effects=plan.effects[i],
             which=i,
-            trial=state.trials[i],
             t=physics.t,
-            counts=counts,
-            taxels=taxels,
-            shape=(state.skin.rows, state.skin.cols),
+            counts=window[:, some],
+            taxels=row * t.skin.cols + t.columns[column, i],
             joints=physics.joints[i].copy(),
         )
-        for function in (*plan.clock, *plan.sensor):
-            function(seen)
+        for stage in SENSOR:
+            for call in plan.stages[stage]:
+                if call.which[i]:
+                    call.function(seen)
         yield seen
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What n trials gave, `frames` frames each.
+
+    Attributes:
+        specs: the trials.
+        t: (frames,) seconds.
+        counts: (n, frames, rows, cols) uint16.
+        joints: (n, frames, dof) radians.
+        force: (n, frames) newtons.
+        traces: {name: (n, frames)}.
+        seen: the readings of each trial.
+        trials: as the last step left them.
+    """
+
+    specs: tuple[TrialSpec, ...]
+    t: Array
+    counts: NDArray[np.uint16]
+    joints: Array
+    force: Array
+    traces: dict[str, Array]
+    seen: list[Readings]
+    trials: Trials
+
+
+def run_batch(scene: Scene, specs: tuple[TrialSpec, ...], **options: Any) -> Batch:
+    """Simulate trials and read their sensors; options as of `run_physics`."""
+    physics = run_physics(scene, specs, **options)
+    seen = list(readings(physics))
+    return Batch(
+        specs,
+        physics.t,
+        np.stack([reading.frames() for reading in seen]),
+        np.stack([reading.joints for reading in seen]),
+        physics.force,
+        physics.traces,
+        seen,
+        physics.trials,
+    )

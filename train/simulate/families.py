@@ -10,8 +10,8 @@ import numpy as np
 
 from edge.touch.layout import SkinLayout
 from train.simulate import streams
-from train.simulate.motion import GRAVITY
-from train.simulate.reader import SceneTable
+from train.simulate.contact import GRAVITY
+from train.simulate.scene_model import SceneTable
 from train.simulate.schema import (
     CONDITIONS,
     FAMILIES,

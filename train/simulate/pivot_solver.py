@@ -1,19 +1,22 @@
-"""The loads on a forearm that pivots, compiled: one trial's.
+"""The loads on forearms that pivot, found for many trials at once.
 
 Rows press to different depths, a + lever * tilt, and the loads are a force and a moment. The
 energy of arm and bed is convex and piecewise quadratic in (a, tilt), so its minimum is the one
-answer; Newton's method finds it in a few rounds, and where it cycles between pieces a line search
-on the slope takes over.
+answer. Newton's method finds it in a few rounds (the Hessian is that of the pieces that are
+touched; Qi and Sun, Math. Programming 58, 1993); where it cycles between pieces, a line search on
+the slope takes over, in the few trials that need it.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import NamedTuple
 
-from numba import njit
+import numpy as np
+from numpy.typing import NDArray
 
-from train.simulate.compiled import indices, integers, matrix, vector, vectors
-from train.simulate.trial import Part
+from train.simulate.arm import Array
+from train.simulate.contact import total
 
 ROUNDS = 8
 """Plain Newton rounds before the line search takes over; two or three are usual."""
@@ -22,172 +25,234 @@ CLOSE_M, CLOSE_RAD = 1e-14, 1e-13
 CUTS = 40
 GUARDED_ROUNDS = 5000
 """A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
-NONE_LEFT = 1e-9
+NO_DIGITS = 1e-9
 """A determinant of C of so small a part of its terms has too few digits to divide by."""
 
 
-Answer = tuple[float, float, float, float, float]
-"""F and M, and the stiffness there: the whole, its mean lever, its spread about that."""
+@dataclass(frozen=True)
+class Springs:
+    """The springs of some of the trials, in the order of their depth.
 
-PIVOT = Part(
-    "tilt",
-    # The springs by depth: how many, metres at which each is touched, newtons a metre, which of
-    # the bed's it is; (rows, springs) of the bed's, 1 where one is not gone, if some can be.
-    *integers("springs", "gaps", "stiffness", "column", "alive"),
-    ("bursts", "?"),
-    # The rows: the part that the face covers, metres by which it draws back there, metres from
-    # the contact's middle, what answers to speed, if anything does; each row's stiffness and force.
-    *integers("rows", "weight", "line_gap", "lever", "load", "held", "out"),
-    ("viscous", "?"),
-    "gain",
-    # What the arm does within the step, y = free - C (F, M).
-    *("free0", "free1", "c00", "c01", "c11"),
-    # Loads to begin with, rounds beyond the plain ones; the loads, and whether they were not found.
-    *vectors(2, "guess", "settled"),
-    *integers("guarded_rounds"),
-    *("force", "moment"),
-    ("lost", "?"),
-)
-"""A pivoting forearm's contact: what is asked, and the answer."""
-pivot_of = PIVOT.of
+    Attributes:
+        at: (m,) which trials of the contacts.
+        gaps: (S, 1, m) metres at which each is touched.
+        stiffness: (S, 1, m) newtons a metre, or (S, rows, m) where it differs by row.
+        nearest: (S,) the smallest gap of any trial: no spring from here on is touched above it.
+    """
+
+    at: NDArray[np.intp]
+    gaps: Array
+    stiffness: Array
+    nearest: Array
 
 
-@njit(error_model="numpy")
-def answer(at: Any, y0: float, y1: float) -> Answer:
-    """The loads of the springs at y, and their stiffness; each row's force into `out`."""
-    gaps, stiffness = vector(at.gaps, at.springs), vector(at.stiffness, at.springs)
-    column, alive = indices(at.column, at.springs), matrix(at.alive, at.rows, at.springs)
-    weight, line_gap = vector(at.weight, at.rows), vector(at.line_gap, at.rows)
-    lever, load = vector(at.lever, at.rows), vector(at.load, at.rows)
-    held, out = vector(at.held, at.rows), vector(at.out, at.rows)
-    bursts, viscous, gain = at.bursts, at.viscous, at.gain
-    whole_force, moment, whole, first = 0.0, 0.0, 0.0, 0.0
-    for row in range(len(weight)):
-        if weight[row] == 0.0:
-            out[row] = held[row] = 0.0
-            continue
-        depth = y0 + lever[row] * y1 - line_gap[row]
-        force, k_row = 0.0, 0.0
-        for c in range(len(gaps)):
-            inside = depth - gaps[c]
-            if inside <= 0.0:
-                break
-            k = stiffness[c]
-            if bursts:
-                k *= alive[row, column[c]]
-            force += inside * k
-            k_row += k
-        force *= weight[row]
-        k_row *= weight[row]
-        if viscous:
-            sum_ = gain * force + load[row]
-            bears = force > 0.0 and sum_ > 0.0
-            force = sum_ if bears else 0.0
-            k_row = gain * k_row if bears else 0.0
-        out[row] = force
-        held[row] = k_row
-        whole_force += force
-        moment += force * lever[row]
-        whole += k_row
-        first += k_row * lever[row]
-    mean = first / whole if whole > 0.0 else 0.0
-    spread = 0.0
-    if whole > 0.0:
-        for row in range(len(weight)):
-            off = lever[row] - mean
-            spread += off * off * held[row]
-    return whole_force, moment, whole, mean, spread
+class Loads(NamedTuple):
+    """What beds bear, (n,) each but for the last.
+
+    Attributes:
+        force, moment: newtons and newton metres.
+        stiffness: newtons a metre of the whole bed there.
+        mean, spread: the mean lever of that stiffness, and its second moment about it.
+        rows: (rows, n) newtons.
+    """
+
+    force: Array
+    moment: Array
+    stiffness: Array
+    mean: Array
+    spread: Array
+    rows: Array
 
 
-@njit(error_model="numpy")
-def determinant(at: Any) -> float:
-    """Of C; 0 where it is rounding: an arm of one joint pushes and tilts in one, and C has no
-    inverse."""
-    det: float = at.c00 * at.c11 - at.c01 * at.c01
-    return det if det > NONE_LEFT * at.c00 * at.c11 else 0.0
+@dataclass(frozen=True)
+class Pivots:
+    """Contacts of n pivoting forearms: y = free - C (F, M) has to hold.
+
+    Attributes:
+        springs: of all trials, in groups of about as many.
+        weight, line_gap, lever: (rows, n) the part of each row that the face covers, metres by
+            which the face draws back there, metres from the contact's middle.
+        gain, load: (n,), (rows, n): a row bears gain F + load of its springs' F (`viscous`).
+        free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in them.
+    """
+
+    springs: list[Springs]
+    weight: Array
+    line_gap: Array
+    lever: Array
+    gain: Array | float
+    load: Array | float
+    free: Array
+    c: Array
+
+    def some(self, keep: NDArray[np.intp]) -> Pivots:
+        """Some of the contacts."""
+        springs = []
+        for group in self.springs:
+            place = np.full(self.free.shape[1], -1)
+            place[group.at] = np.arange(len(group.at))
+            members = place[keep]
+            at = (members >= 0).nonzero()[0]
+            if at.size:
+                inner = members[at]
+                gaps, stiffness = group.gaps.take(inner, -1), group.stiffness.take(inner, -1)
+                springs.append(Springs(at, gaps, stiffness, group.nearest))
+        return Pivots(
+            springs,
+            *(a.take(keep, -1) for a in (self.weight, self.line_gap, self.lever)),
+            *(a if isinstance(a, float) else a.take(keep, -1) for a in (self.gain, self.load)),
+            *(a.take(keep, -1) for a in (self.free, self.c)),
+        )
+
+    def loads(self, y: Array) -> Loads:
+        """The loads of the springs at coordinates y (2, n)."""
+        depth = y[0] + self.lever * y[1] - self.line_gap
+        force, held = np.zeros((2, *depth.shape))
+        for group in self.springs:
+            every = len(group.at) == depth.shape[1]
+            pressed = depth if every else depth.take(group.at, -1)
+            deep = int(np.searchsorted(group.nearest, pressed.max()))
+            if deep == 0:
+                continue
+            inside = np.maximum(pressed - group.gaps[:deep], 0.0)
+            stiffness = group.stiffness[:deep]
+            touched = (inside > 0.0) * stiffness
+            np.multiply(inside, touched, out=inside)
+            if every:
+                force, held = total(inside), total(touched)
+            else:
+                force[:, group.at], held[:, group.at] = total(inside), total(touched)
+        force, held = force * self.weight, held * self.weight
+        if not isinstance(self.load, float):
+            borne = self.gain * force + self.load
+            bears = (force > 0.0) & (borne > 0.0)
+            force, held = np.where(bears, borne, 0.0), np.where(bears, self.gain * held, 0.0)
+        stiffness = total(held)
+        mean = total(held * self.lever) / np.where(stiffness > 0.0, stiffness, 1.0)
+        off = self.lever - mean
+        spread = total(off * off * held)
+        return Loads(total(force), total(force * self.lever), stiffness, mean, spread, force)
+
+    def determinant(self) -> Array:
+        """Of C; 0 where it is rounding: an arm of one joint pushes and tilts in one, and C has no
+        inverse."""
+        det = self.c[0] * self.c[2] - self.c[1] * self.c[1]
+        return np.where(det > NO_DIGITS * self.c[0] * self.c[2], det, 0.0)
+
+    def step(self, y: Array, loads: Loads) -> Array:
+        """(2, n): p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean
+        lever, where H is diagonal and the determinant a sum of positive terms: no digits are lost
+        at 1e15 N/m."""
+        c00, c01, c11 = self.c
+        force, moment, k, mean, spread, _ = loads
+        r0 = y[0] - self.free[0] + (c00 * force + c01 * moment)
+        r1 = y[1] - self.free[1] + (c01 * force + c11 * moment)
+        det_c = self.determinant()
+        b01 = c01 + mean * c11
+        b00 = c00 + mean * (c01 + b01)
+        r = r0 + mean * r1
+        first, second = 1.0 + c11 * spread, 1.0 + b00 * k
+        det = 1.0 + b00 * k + c11 * spread + det_c * k * spread
+        p0 = (first * r - b01 * spread * r1) / det
+        p1 = (second * r1 - b01 * k * r) / det
+        p = np.stack([p0 - mean * p1, p1])
+        single = (det_c == 0.0) & (c00 > 0.0)
+        if single.any():
+            # One way to go, and a stiffness along it.
+            lean = c01 / np.where(single, c00, 1.0)
+            reach = 1.0 + lean * mean
+            p0 = r0 / (1.0 + c00 * (reach * reach * k + lean * lean * spread))
+            p = np.where(single, np.stack([p0, lean * p0]), p)
+        return p
+
+    def arm(self, y: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The loads that the arm gives at y, and (n,) whether C tells both of them."""
+        c00, c01, c11 = self.c
+        det = self.determinant()
+        tells, d = det > 0.0, self.free - y
+        over = np.where(tells, det, 1.0)
+        both = np.stack([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / over
+        return both, tells
+
+    def slope(self, y: Array, loads: Loads, p: Array) -> Array:
+        """Of the energy at y along -p."""
+        given, tells = self.arm(y)
+        single = p[0] * ((y[0] - self.free[0]) / self.c[0] + loads.force) + p[1] * loads.moment
+        both = p[0] * (loads.force - given[0]) + p[1] * (loads.moment - given[1])
+        return np.asarray(np.where(tells, -both, -single))
+
+    def agreed(self, y: Array, loads: Loads) -> Array:
+        """(2, n) the loads at the solution, from the side that has more digits: a stiff bed's depth
+        is all rounding, while what the arm has given way is not."""
+        c00, c01, _ = self.c
+        given, tells = self.arm(y)
+        single = (self.free[0] - y[0] - c01 * loads.moment) / np.where(c00 > 0.0, c00, 1.0)
+        stiff = (c00 * loads.stiffness > 1.0) & (loads.force > 0.0)
+        force = np.where(stiff, np.where(tells, given[0], single), loads.force)
+        moment = np.where(stiff & tells, given[1], loads.moment)
+        return np.where(force > 0.0, np.stack([force, moment]), 0.0)
 
 
-@njit(error_model="numpy")
-def newton_step(at: Any, y0: float, y1: float, found: Answer) -> tuple[float, float]:
-    """p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean lever, where
-    H is diagonal and the determinant a sum of positive terms: no digits are lost at 1e15 N/m."""
-    force, moment, whole, mean, spread = found
-    r0 = y0 - at.free0 + (at.c00 * force + at.c01 * moment)
-    r1 = y1 - at.free1 + (at.c01 * force + at.c11 * moment)
-    det_c = determinant(at)
-    if det_c == 0.0 and at.c00 > 0.0:
-        # One way to go, and a stiffness along it.
-        lean = at.c01 / at.c00
-        reach = 1.0 + lean * mean
-        p0 = r0 / (1.0 + at.c00 * (reach * reach * whole + lean * lean * spread))
-        return p0, lean * p0
-    c01 = at.c01 + mean * at.c11
-    c00 = at.c00 + mean * (at.c01 + c01)
-    r0 = r0 + mean * r1
-    det = 1.0 + c00 * whole + at.c11 * spread + det_c * whole * spread
-    p0 = ((1.0 + at.c11 * spread) * r0 - c01 * spread * r1) / det
-    p1 = ((1.0 + c00 * whole) * r1 - c01 * whole * r0) / det
-    return p0 - mean * p1, p1
+class Answer(NamedTuple):
+    """Loads (2, n), what each row bears (rows, n), and (n,) whether they were not found."""
+
+    loads: Array
+    rows: Array
+    lost: NDArray[np.bool_]
 
 
-@njit(error_model="numpy")
-def slope(at: Any, y0: float, y1: float, found: Answer, p0: float, p1: float) -> float:
-    """Of the energy at y along -p."""
-    det = determinant(at)
-    d0, d1 = y0 - at.free0, y1 - at.free1
-    if det == 0.0:
-        only: float = -(p0 * (d0 / at.c00 + found[0]) + p1 * found[1])
-        return only
-    g0 = (at.c11 * d0 - at.c01 * d1) / det + found[0]
-    g1 = (at.c00 * d1 - at.c01 * d0) / det + found[1]
-    along: float = -(p0 * g0 + p1 * g1)
-    return along
-
-
-@njit(error_model="numpy")
-def agree(at: Any, y0: float, y1: float, found: Answer) -> tuple[float, float]:
-    """The loads at the solution, from the side that has more digits: a stiff bed's depth is
-    all rounding, while what the arm has given way is not."""
-    force, moment, stiffness = found[0], found[1], found[2]
-    if at.c00 * stiffness > 1.0 and force > 0.0:
-        det, d0, d1 = determinant(at), at.free0 - y0, at.free1 - y1
-        if det > 0.0:
-            force = (at.c11 * d0 - at.c01 * d1) / det
-            moment = (at.c00 * d1 - at.c01 * d0) / det
-        else:
-            force = (d0 - at.c01 * moment) / at.c00
-    if force > 0.0:
-        return force, moment
-    return 0.0, 0.0
-
-
-@njit(error_model="numpy")
-def search(at: Any) -> None:
-    """The loads (F, M) with y = free - C (F, M), searched for from a guess of them.
+def search(pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS) -> Answer:
+    """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of them.
 
     The slope of the energy along a step rises steadily, so a step that ends with the slope
     turned uphill by more than half of what it began with is cut back along its secant.
     """
-    y0 = at.free0 - (at.c00 * at.guess[0] + at.c01 * at.guess[1])
-    y1 = at.free1 - (at.c01 * at.guess[0] + at.c11 * at.guess[1])
-    found = answer(at, y0, y1)
-    close = False
-    for turn in range(ROUNDS + at.guarded_rounds):
-        p0, p1 = newton_step(at, y0, y1, found)
-        close = abs(p0) <= CLOSE_M and abs(p1) <= CLOSE_RAD
-        if close:
+    c = pivots.c
+    y = pivots.free - np.stack(
+        [c[0] * guess[0] + c[1] * guess[1], c[1] * guess[0] + c[2] * guess[1]]
+    )
+    left = np.arange(y.shape[1])
+    contacts, at = pivots, y
+    loads = answer = contacts.loads(at)
+    searching = np.ones(len(left), dtype=bool)
+    for turn in range(ROUNDS + guarded_rounds):
+        p = contacts.step(at, loads)
+        searching = (np.abs(p[0]) > CLOSE_M) | (np.abs(p[1]) > CLOSE_RAD)
+        open_ = searching.nonzero()[0]
+        if not open_.size:
             break
-        size = 1.0
+        if 2 * open_.size <= len(left):
+            # The few that are not there yet go on by themselves.
+            y[:, left] = at
+            for whole, part in zip(answer, loads, strict=True):
+                whole[..., left] = part
+            left, contacts, searching = left[open_], contacts.some(open_), searching[open_]
+            at, p, *parts = (a.take(open_, -1) for a in (at, p, *loads))
+            loads = Loads(*parts)
+        else:
+            p = np.where(searching, p, 0.0)
         if turn >= ROUNDS:
-            begin = slope(at, y0, y1, found, p0, p1)
-            for _ in range(CUTS):
-                z0, z1 = y0 - size * p0, y1 - size * p1
-                end = slope(at, z0, z1, answer(at, z0, z1), p0, p1)
-                if not end > 0.5 * abs(begin):
-                    break
-                size *= min(max(begin / (begin - end), 0.1), 0.9)
-        y0 -= size * p0
-        y1 -= size * p1
-        found = answer(at, y0, y1)
-    at.force, at.moment = agree(at, y0, y1, found)
-    at.lost = not close
+            p = p * _cut(contacts, at, loads, p)
+        at = at - p
+        loads = contacts.loads(at)
+    y[:, left] = at
+    for whole, part in zip(answer, loads, strict=True):
+        whole[..., left] = part
+    lost = np.zeros(y.shape[1], dtype=bool)
+    lost[left] = searching
+    return Answer(pivots.agreed(y, answer), answer.rows, lost)
+
+
+def _cut(contacts: Pivots, at: Array, loads: Loads, p: Array) -> Array:
+    """(n,) the part of a step p that does not go too far."""
+    begin, size = contacts.slope(at, loads, p), np.ones(at.shape[1])
+    far = np.ones(at.shape[1], dtype=bool)
+    for _ in range(CUTS):
+        z = at - size * p
+        end = contacts.slope(z, contacts.loads(z), p)
+        far &= end > 0.5 * np.abs(begin)
+        if not far.any():
+            break
+        fall = np.where(far, begin - end, 1.0)
+        size = np.where(far, size * np.clip(begin / fall, 0.1, 0.9), size)
+    return size

@@ -1,122 +1,235 @@
-"""A plan: the flat tuples of functions that one kind of trial runs, and nothing else."""
+"""Which effects a scene's trials call for, and the order in which their hooks run.
+
+An effect is a module of `train.simulate.effects` with some of the hooks below. It is imported only
+where a trial calls for it, and its hooks run on the trials that do: each gets the trials and the
+index of those concerned. What all trials do (`base`) has hooks of the same names, which come first.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.simulate.readings import Readings
-from train.simulate.scene_model import Scene
-from train.simulate.schema import EFFECTS
-from train.simulate.state import State
-from train.simulate.trial import Part
+from edge.errors import InputError
+from train.simulate.scene_model import Scene, SceneObject, TrialSpec
+from train.simulate.schema import (
+    EFFECTS,
+    IMPLIED_BY_CONDITION,
+    IMPLIED_BY_FAMILY,
+    LABELLED_BY,
+    SHARED,
+)
 
-SetupFunction = Callable[[State], None]
-SensorFunction = Callable[[Readings], None]
-Compiled = Any
-"""A function of a trial, compiled (`trial.compiled`): it has an `address`."""
-Trace = tuple[Part | None, str]
-"""A field of an effect's own part of a trial, or of the trial itself."""
+Index = Any
+"""Which trials: an array of their numbers, or `ALL`."""
+ALL = slice(None)
 
-RUN_STAGES = ("pace", "tune", "frame", "step", "sample")
-"""Compiled: what chooses a frame's steps; what depends on their length, whenever it changes; once a
-frame before its steps; each step; once a frame after its steps."""
-PHYSICS_STAGES = ("setup", *RUN_STAGES)
-"""The setup runs once a batch."""
-SENSOR_STAGES = ("clock", "sensor")
-"""Once on the frames' times; once on all frames."""
-STAGES = (*PHYSICS_STAGES, *SENSOR_STAGES)
-PYTHON_STAGES = ("setup", *SENSOR_STAGES)
+SETUP = (
+    "swing",  # the arm in its steady sweep
+    "place",  # the object where the sweep meets it, and the columns that can touch
+    "soften",  # what is in series with a taxel
+    "widen",  # when each column is touched
+    "lay",  # the springs of the bed: the last of the effects alone
+    "fill",  # further springs, and what changes these
+    "law",  # the bed's law for the solver: the last of the effects alone
+    "stand",  # how the object stands, and whatever else begins
+)
+PACE = ("pace",)  # before a frame: how many steps it has
+TUNE = ("tune",)  # what depends on the length of a step, whenever that changes
+FRAME = (
+    "locate",  # the contact's coordinates and Jacobian: the last of the effects alone
+    "reach_along",  # further Jacobians
+)
+STEP = (
+    "predict",  # where arm and object would be without load
+    "drag",  # what holds the object
+    "press",  # the loads: the last of the effects alone
+    "settle",  # arm and object under these loads
+)
+SAMPLE = (
+    "bear",  # what the skin bears, and each row's depth: the last of the effects alone
+    "lean",  # what else bears on the skin
+    "image",  # the load on the taxels: the last of the effects alone
+    "pass_on",  # how it spreads, and what it breaks
+)
+SENSOR = (
+    "clock",  # the frames' times
+    "sensor",  # the readings
+)
+ANSWER = "answer"
+"""The solver of a contact, which `press` asks: the last of the effects alone."""
+INSTEAD = ("lay", "law", "locate", "press", ANSWER, "bear", "image")
+"""Hooks of which the last effect that has one takes the place of all others."""
+STAGES = (*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER, *SAMPLE, *SENSOR)
+
+
+@dataclass
+class Call:
+    """A hook, whose it is, and which trials it concerns (n,)."""
+
+    owner: str
+    function: Callable[..., Any]
+    which: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        """The trials as an index, prepared once."""
+        self.index: Index = ALL if self.which.all() else self.which.nonzero()[0]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What one kind of trial runs, in order."""
+    """The hooks that some trials run, and nothing else.
 
-    effects: tuple[str, ...]
-    setup: tuple[SetupFunction, ...]
-    pace: tuple[Compiled, ...]
-    tune: tuple[Compiled, ...]
-    frame: tuple[Compiled, ...]
-    step: tuple[Compiled, ...]
-    sample: tuple[Compiled, ...]
-    clock: tuple[SensorFunction, ...]
-    sensor: tuple[SensorFunction, ...]
-    solve: Compiled
-    press: Compiled
-    """The function of `step` that asks the solver."""
-    traces: dict[str, Trace]
-    """{name: where it stands}, kept for every frame."""
-    owners: dict[Any, str]
-    """{function: the effect it belongs to, or `base`}."""
+    Attributes:
+        effects: of each trial, in the catalogue's order.
+        calls: {effect: (n,) whether a trial calls for it}.
+        stages: {stage: its hooks in order}.
+    """
 
-    def addresses(self, stage: str) -> NDArray[np.int64]:
-        """Of the functions of a compiled stage, in order."""
-        return np.array([function.address for function in getattr(self, stage)], dtype=np.int64)
+    effects: tuple[tuple[str, ...], ...]
+    calls: dict[str, NDArray[np.bool_]]
+    stages: dict[str, list[Call]]
 
-    def __len__(self) -> int:
-        """How many functions there are in all stages."""
-        return sum(len(getattr(self, stage)) for stage in STAGES)
+    def run(self, stages: tuple[str, ...], trials: Any, i: Index = ALL) -> None:
+        """Run the hooks of stages for some of the trials."""
+        for stage in stages:
+            for call in self.stages[stage]:
+                if call.index is ALL:
+                    call.function(trials, i)
+                    continue
+                some = call.index if i is ALL else i[call.which[i]]
+                if some.size:
+                    call.function(trials, some)
+
+    def traces(self, own: dict[str, Any]) -> dict[str, tuple[Any, str]]:
+        """{name: (an effect's state, its attribute)} of what is kept of every frame."""
+        return {
+            name: (own[effect], attribute)
+            for effect in self.calls
+            for name, attribute in getattr(module_of(effect), "TRACES", {}).items()
+        }
+
+    def also(self, effect: str, i: Index) -> NDArray[np.bool_]:
+        """Which of the trials i call for an effect, too."""
+        if effect in self.calls:
+            return self.calls[effect][i]
+        return np.zeros(len(self.effects), dtype=bool)[i]
 
 
-@dataclass
-class Build:
-    """A plan in the making; effects add to it in the catalogue's order."""
+def module_of(effect: str) -> Any:
+    """An effect's code, loaded here."""
+    return import_module(f"train.simulate.effects.{effect}")
 
-    scene: Scene
-    effects: tuple[str, ...]
-    owner: str = "base"
-    entries: list[tuple[str, int, Any]] = field(default_factory=list)
-    solve: Compiled = field(init=False)
-    press: Compiled = field(init=False)
-    traces: dict[str, Trace] = field(default_factory=dict)
-    owners: dict[Any, str] = field(default_factory=dict)
-    parts: set[Part] = field(default_factory=set)
-    """That several effects share, and one of them has put in."""
 
-    def put(self, stage: str, rank: int, function: SetupFunction | Compiled) -> None:
-        """Add a function to a stage of the physics; the lower rank runs first."""
-        self.entries.append((stage, rank, function))
-        self.owners[function] = self.owner
+def make_plan(scene: Scene, specs: tuple[TrialSpec, ...]) -> Plan:
+    """The plan of a scene's trials."""
+    by_kind: dict[str, tuple[str, ...]] = {}
+    for spec in specs:
+        if spec.key not in by_kind:
+            by_kind[spec.key] = tuple(required_effects(scene, spec.object, spec.condition))
+    return plan_of(tuple(by_kind[spec.key] for spec in specs))
 
-    def read(self, stage: str, rank: int, function: SensorFunction) -> None:
-        """Add a function to a stage of the sensor; the lower rank runs first."""
-        self.put(stage, rank, function)
 
-    def replace(self, function: Any, by: Any) -> None:
-        """Let `by` run where `function` would."""
-        self.entries = [(s, r, by if f is function else f) for s, r, f in self.entries]
-        self.owners[by] = self.owner
-        if function is self.press:
-            self.press = by
+def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
+    """The plan of trials that call for these effects, each for its own."""
+    calls: dict[str, NDArray[np.bool_]] = {}
+    for name in (*SHARED, *EFFECTS):
+        wanted = {name, *SHARED.get(name, ())}
+        mask = np.array([not wanted.isdisjoint(own) for own in effects])
+        if mask.any():
+            calls[name] = mask
+    everyone = np.ones(len(effects), dtype=bool)
+    modules = [("base", import_module("train.simulate.base"), everyone)]
+    modules += [(name, module_of(name), mask) for name, mask in calls.items()]
+    stages: dict[str, list[Call]] = {stage: [] for stage in STAGES}
+    for stage, hooks in stages.items():
+        for owner, module, mask in modules:
+            function = getattr(module, stage, None)
+            if function is None:
+                continue
+            if stage in INSTEAD:
+                hooks[:] = [Call(c.owner, c.function, c.which & ~mask) for c in hooks]
+            hooks.append(Call(owner, function, mask))
+        hooks[:] = [call for call in hooks if call.which.any()]
+    return Plan(effects, calls, stages)
 
-    def wrap(self, solve: Compiled) -> None:
-        """Let `solve` answer for the contact; it may call the one before it."""
-        self.solve = solve
-        self.owners[solve] = self.owner
 
-    def trace(self, name: str, part: Part | None, field: str) -> None:
-        """Keep a field of every frame under this name: of an effect's part, or of the trial."""
-        self.traces[name] = part, field
+def settings(scene: Scene, effect: str) -> dict[str, float]:
+    """An effect's settings in a scene."""
+    defaults = {k: float(f.default or 0.0) for k, f in EFFECTS[effect].settings.items()}
+    return {**defaults, **scene.settings.get(effect, {})}
 
-    def settings(self, effect: str) -> dict[str, float]:
-        """The effect's settings of the scene."""
-        defaults = {k: float(f.default or 0.0) for k, f in EFFECTS[effect].settings.items()}
-        return {**defaults, **self.scene.settings.get(effect, {})}
 
-    def plan(self) -> Plan:
-        """The plan as it has been put together."""
-        ranked = sorted(self.entries, key=lambda entry: entry[1])
-        stages = {name: tuple(f for stage, _, f in ranked if stage == name) for name in STAGES}
-        return Plan(
-            effects=self.effects,
-            **stages,
-            solve=self.solve,
-            press=self.press,
-            traces=self.traces,
-            owners=self.owners,
+def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
+    """{effect: what called for it} of one object in one condition, in the catalogue's order."""
+    required: dict[str, str] = {}
+    for name in IMPLIED_BY_FAMILY.get(item.family, ()):
+        required[name] = f"family {item.family}"
+    for name in IMPLIED_BY_CONDITION.get(condition, ()):
+        required[name] = condition
+    for name, info in EFFECTS.items():
+        if info.keys and item.given.issuperset(info.keys):
+            required[name] = " and ".join(info.keys)
+    for name in scene.add:
+        if name not in required and _supports(item, condition, name):
+            required[name] = "effects.add"
+    for name in scene.leave_out:
+        required.pop(name, None)
+    while True:
+        gone = [n for n in required if not required.keys() >= {*EFFECTS[n].needs}]
+        if not gone:
+            return {name: required[name] for name in EFFECTS if name in required}
+        for name in gone:
+            required.pop(name, None)
+
+
+def _supports(item: SceneObject, condition: str, name: str) -> bool:
+    info = EFFECTS[name]
+    if info.families and item.family not in info.families:
+        return False
+    if any(name in names and condition != c for c, names in IMPLIED_BY_CONDITION.items()):
+        return False
+    return item.values.keys() >= {*info.keys}
+
+
+def check_supported(scene: Scene, where: str) -> None:
+    """Refuse a scene that names an effect which none of its objects can have.
+
+    Raises:
+        InputError: the sentence says what the effect needs.
+    """
+    for name in scene.leave_out:
+        for item in scene.objects:
+            label = LABELLED_BY.get(name, {}).get(item.family, "")
+            moves = name == "sliding" and "movable" in item.conditions
+            if label or moves:
+                raise InputError(
+                    f"{where}: effects.leave_out leaves out {name}, without which object "
+                    f"{item.name!r} would not be {label or 'movable'}, as its label says"
+                )
+    found = [required_effects(scene, o, c) for o in scene.objects for c in o.conditions]
+    if not scene.inertia and any("inertia" in required for required in found):
+        raise InputError(
+            f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one number a joint"
+        )
+    for name in scene.add:
+        if any(name in required for required in found):
+            continue
+        info = EFFECTS[name]
+        needs = []
+        if info.families:
+            needs.append(f"an object of family {' or '.join(info.families)}")
+        if info.keys:
+            needs.append(f"an object with {' and '.join(info.keys)}")
+        if name == "sliding":
+            needs.append("a movable object")
+        needs += [f"the effect {need}" for need in info.needs]
+        raise InputError(
+            f"{where}: effects.add names {name}, which this scene cannot support: "
+            f"it needs {', '.join(needs)}"
         )

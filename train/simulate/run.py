@@ -1,10 +1,11 @@
-"""A scene's trials in batches: on this machine, on several cores, or on a Dask cluster."""
+"""A scene's trials to recordings: on this machine, on several cores, or on a Dask cluster."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from os import cpu_count
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +16,15 @@ from edge import recording
 from edge.errors import InputError
 from edge.recording import Recording
 from train.cluster import on_cluster
-from train.simulate.assemble import make_plan
 from train.simulate.convergence import Convergence, measure
-from train.simulate.engine import (
-    Kind,
-    PhysicsRun,
-    begin,
-    check_start,
-    kind_of,
-    readings,
-    values_of,
-)
-from train.simulate.plan import Plan
+from train.simulate.engine import PhysicsRun, begin, readings
+from train.simulate.plan import required_effects
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import SOFT_FAMILIES
 from train.simulate.truth import true_runs
 
-BATCH = 256
-"""Trials in a batch: enough to spread numpy's cost a call, few enough to stay in the cache."""
+BATCH = 1024
+"""Trials that are simulated side by side, as far as memory goes: some 0.4 MB each."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +56,23 @@ class Written:
     rough: dict[str, float]
 
 
+Kind = tuple[str, ...]
+"""The effects that trials call for."""
+
+
 def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
-    """The scene's trials by kind, in the scene's order."""
+    """The scene's trials by the effects that they call for, at the steps that the scene gives.
+
+    A kind's step is the smallest that `step_s` gives its effects; where that is empty, a frame.
+    """
     out: dict[Kind, list[TrialSpec]] = {}
     for item in scene.objects:
         for condition in item.conditions:
-            trials = out.setdefault(kind_of(scene, item, condition), [])
-            trials += [TrialSpec(item, condition, number) for number in range(scene.count)]
+            effects = tuple(required_effects(scene, item, condition))
+            given = [scene.step_s[name] for name in ("base", *effects) if name in scene.step_s]
+            step_s = min(given, default=1.0 / scene.trials["rate_hz"])
+            trials = out.setdefault(effects, [])
+            trials += [TrialSpec(item, condition, k, step_s) for k in range(scene.count)]
     return out
 
 
@@ -78,33 +80,13 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
     """What halving the step does to each kind of trials; empty where the scene gives its steps.
 
     Raises:
-        InputError: an object touches the arm from the start: told before anything takes long.
+        InputError: an object touches the arm from the start, before anything takes long.
     """
     if scene.step_s:
         return {}
-    for kind, trials in kinds(scene).items():
-        plan = make_plan(scene, kind.effects)
-        for i in range(0, len(trials), BATCH):
-            some = tuple(trials[i : i + BATCH])
-            check_start(begin(scene, plan, some, 1.0, values_of(scene, some)), plan)
-    return {kind: measure(scene, tuple(trials)) for kind, trials in kinds(scene).items()}
-
-
-def steps(
-    scene: Scene,
-    found: dict[Kind, Convergence] | None = None,
-    every: Iterable[Kind] | None = None,
-) -> dict[Kind, float]:
-    """The physics' step of each kind of trials: the smallest that the scene's `step_s` gives
-    its effects, or the measured one where the scene gives none (`found` and `every` kind, if they
-    are at hand)."""
-    if not scene.step_s:
-        found = measured(scene) if found is None else found
-        return {kind: convergence.step_s for kind, convergence in found.items()}
-    return {
-        kind: min(scene.step_s[name] for name in ("base", *kind.effects) if name in scene.step_s)
-        for kind in every or kinds(scene)
-    }
+    every = kinds(scene)
+    begin(scene, tuple(spec for specs in every.values() for spec in specs))
+    return dict(zip(every, measure(scene, list(every.values())), strict=True))
 
 
 def file_name(scene: Scene, trial: TrialSpec) -> str:
@@ -114,15 +96,15 @@ def file_name(scene: Scene, trial: TrialSpec) -> str:
 
 def recordings(
     physics: PhysicsRun,
-    plan: Plan,
-    scene: Scene,
-    step_s: float,
     which: NDArray[np.intp] | None = None,
+    scene: Scene | None = None,
 ) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial of a run, or of some, as a scene's plan shows them."""
+    """(file name, recording) of each trial of a run, or of some, as of `engine.readings`."""
+    trials = physics.trials
+    scene = scene or trials.scene
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
-    values = {name: value.tolist() for name, value in physics.state.values.items()}
-    for seen in readings(physics, plan, which):
+    values = {name: value.tolist() for name, value in trials.values.items()}
+    for seen in readings(physics, which, scene):
         trial, kept = seen.trial, slice(None) if seen.kept is None else seen.kept
         t = seen.t if seen.times is None else seen.times
         drawn = {name: value[seen.which] for name, value in values.items()}
@@ -141,10 +123,10 @@ def recordings(
             "trial": file.removesuffix(".npz"),
             "simulation": {
                 "seed": scene.seed,
-                "step_s": step_s,
+                "step_s": trial.step_s,
                 "family": trial.object.family,
                 "redrawn": trial.attempt,
-                "effects": list(plan.effects),
+                "effects": list(seen.effects),
                 "values": {k: v for k, v in drawn.items() if math.isfinite(v)},
             },
         }
@@ -152,22 +134,18 @@ def recordings(
         yield file, Recording(t=t[kept], frames=frames, joints=joints, valid=seen.valid, meta=meta)
 
 
-def simulate_trials(
-    scene: Scene, trials: tuple[TrialSpec, ...], step_s: float
-) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of trials of one kind, each drawn until it does as its label says."""
-    first = trials[0]
-    plan = make_plan(scene, kind_of(scene, first.object, first.condition).effects)
-    for physics, true in true_runs(scene, trials, step_s, plan):
-        yield from recordings(physics, plan, scene, step_s, np.flatnonzero(true))
+def simulate_trials(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[str, Recording]]:
+    """(file name, recording) of trials, each drawn until it does as its label says."""
+    for physics, true in true_runs(scene, specs):
+        yield from recordings(physics, true)
 
 
 def simulate_part(
-    scene: Scene, trials: tuple[TrialSpec, ...], step_s: float, folder: str | None
+    scene: Scene, specs: tuple[TrialSpec, ...], folder: str | None
 ) -> list[Simulated]:
-    """Simulate one batch; write it where `folder` is given, else give the recordings back."""
+    """Simulate trials; write them where `folder` is given, else give the recordings back."""
     out: list[Simulated] = []
-    for name, trial in simulate_trials(scene, trials, step_s):
+    for name, trial in simulate_trials(scene, specs):
         if folder is not None:
             recording.save(f"{folder}/{name}", trial, lasting=False)
         redrawn = int(trial.meta["simulation"]["redrawn"])
@@ -177,24 +155,34 @@ def simulate_part(
 
 
 def parts(
-    scene: Scene, batch: int = BATCH, found: dict[Kind, Convergence] | None = None
-) -> list[tuple[tuple[TrialSpec, ...], float]]:
-    """The scene cut into batches: (trials, step) each; `found` as for `steps`."""
+    scene: Scene,
+    batch: int = BATCH,
+    found: dict[Kind, Convergence] | None = None,
+    jobs: int = 1,
+) -> list[tuple[TrialSpec, ...]]:
+    """The scene's trials, cut into batches of about equal work.
+
+    Args:
+        batch: trials at most in each.
+        found: the steps of a scene that gives none, where they have been measured.
+        jobs: at least so many batches, if there are as many trials.
+    """
     if batch < 1:
         raise InputError(f"--batch must be at least 1, not {batch}")
-    every = kinds(scene)
-    step = steps(scene, found, every)
-    return [
-        (tuple(trials[i : i + batch]), step[kind])
-        for kind, trials in every.items()
-        for i in range(0, len(trials), batch)
+    found = measured(scene) if found is None else found
+    every = [
+        replace(spec, step_s=found[kind].step_s) if kind in found else spec
+        for kind, specs in kinds(scene).items()
+        for spec in specs
     ]
+    count = min(max(-(-len(every) // batch), jobs), len(every))
+    return [tuple(every[i::count]) for i in range(count)]
 
 
 def simulate(scene: Scene, batch: int = BATCH) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial, simulated here, in the order of the batches."""
-    for trials, step_s in parts(scene, batch):
-        yield from simulate_trials(scene, trials, step_s)
+    """(file name, recording) of each trial, simulated here."""
+    for specs in parts(scene, batch):
+        yield from simulate_trials(scene, specs)
 
 
 def write(
@@ -212,7 +200,7 @@ def write(
     The files' bytes depend on the scene and its seed alone.
 
     Args:
-        batch: trials simulated together.
+        batch: trials simulated side by side at most.
         jobs: processes on this machine (joblib).
         backend: `local`, or `dask`: the scheduler at `address` runs the batches, and the
             recordings come back to be written here.
@@ -227,7 +215,7 @@ def write(
     except OSError as error:
         raise InputError(f"{target}: cannot be made: {error.strerror or error}") from None
     found = measured(scene)
-    work = parts(scene, batch, found)
+    work = parts(scene, batch, found, jobs if jobs > 0 else cpu_count() or 1)
     done: Iterable[list[Simulated]]
     if backend == "dask":
         done = _on_dask(scene, work, address)
@@ -256,31 +244,29 @@ def write(
 
 
 def _on_cores(
-    scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], folder: str, jobs: int
+    scene: Scene, work: list[tuple[TrialSpec, ...]], folder: str, jobs: int
 ) -> Iterable[list[Simulated]]:
     if jobs == 1:
-        return (simulate_part(scene, trials, step_s, folder) for trials, step_s in work)
+        return (simulate_part(scene, specs, folder) for specs in work)
     from joblib import Parallel, delayed
 
     run = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    found: Iterable[list[Simulated]] = run(
-        delayed(simulate_part)(scene, trials, step_s, folder) for trials, step_s in work
+    done: Iterable[list[Simulated]] = run(
+        delayed(simulate_part)(scene, specs, folder) for specs in work
     )
-    return found
+    return done
 
 
 def _on_dask(
-    scene: Scene, work: list[tuple[tuple[TrialSpec, ...], float]], address: str | None
+    scene: Scene, work: list[tuple[TrialSpec, ...]], address: str | None
 ) -> Iterator[list[Simulated]]:
     from joblib import Parallel, delayed
 
     with on_cluster(address):
         run = Parallel(n_jobs=-1, return_as="generator_unordered")
-        yield from run(
-            delayed(simulate_part)(scene, trials, step_s, None) for trials, step_s in work
-        )
+        yield from run(delayed(simulate_part)(scene, specs, None) for specs in work)
 
 
 def total_trials(scene: Scene) -> int:
     """How many trials a scene has."""
-    return int(np.sum([len(t) for t in kinds(scene).values()]))
+    return scene.count * sum(len(item.conditions) for item in scene.objects)

@@ -15,9 +15,8 @@ from edge.touch.layout import RELEASE_S, SkinLayout
 from train.simulate import schema
 from train.simulate.arm import Kinematics
 from train.simulate.families import draw_family
-from train.simulate.reader import SceneTable, Value
-from train.simulate.required_effects import check_supported
-from train.simulate.scene_model import Scene, SceneObject
+from train.simulate.plan import check_supported
+from train.simulate.scene_model import Scene, SceneObject, SceneTable, Value
 from train.simulate.schema import EFFECTS
 from train.simulate.streams import FARTHEST
 

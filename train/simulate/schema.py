@@ -25,8 +25,6 @@ class EffectInfo:
     says: str
     stage: str
     """`contact` (part of the step), `sensor` (on the frames) or `clock` (on their times)."""
-    functions: int
-    """How many functions it adds to the plan (0: it takes the place of one, or wraps one)."""
     settings: dict[str, Field] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     """Effects without which it means nothing."""
@@ -92,6 +90,7 @@ OBJECT = {
     "stem_spread_m": Field(0.0, 1.0, None, "depth over which the stems stand"),
     "stem_slip_m": Field(0.0, 10.0, None, "bend at which a stem slips off", open_low=True),
     "stem_damping": Field(0.0, 1.0, None, "damping ratio of a stem"),
+    "stem_deviation": Field(0.0, 2.0, None, "of the logarithm of the stems' stiffnesses"),
     "stem_kg": Field(0.0, 10.0, 0.02, "moving mass of a stem", open_low=True),
     "bubble_n_m": Field(0.0, 1e12, None, "stiffness of a bubble at rest", open_low=True),
     "bubble_m": Field(0.0, 0.1, 0.004, "height of a bubble", open_low=True),
@@ -111,6 +110,7 @@ FAMILY_KEYS: dict[str, dict[str, float]] = {
         "stem_spread_m": 0.06,
         "stem_slip_m": 0.12,
         "stem_damping": 0.15,
+        "stem_deviation": 0.3,
         "stem_kg": 0.02,
     },
 }
@@ -129,116 +129,101 @@ THICKNESS = {FOAM: "depth_m", PILLOW: "depth_m", BUBBLES: "bubble_m", FOLIAGE: "
 ELASTIC = (FOAM, PILLOW)
 EFFECTS: dict[str, EffectInfo] = {
     # In the order in which they take their place in the step and on the frames.
-    "foundation": EffectInfo("elastic foundation under each taxel", "contact", 1, families=ELASTIC),
+    "foundation": EffectInfo("elastic foundation under each taxel", "contact", families=ELASTIC),
     "lateral": EffectInfo(
         "foam that pulls its neighbourhood along: an elastic layer",
         "contact",
-        2,
         needs=("foundation",),
         families=ELASTIC,
     ),
     "bottoming": EffectInfo(
-        "foam that is pressed flat", "contact", 1, needs=("foundation",), families=ELASTIC
+        "foam that is pressed flat", "contact", needs=("foundation",), families=ELASTIC
     ),
     "cover": EffectInfo(
         "a sleeve over the skin, in series and spreading the load",
         "contact",
-        2,
         keys=("cover_n_m",),
     ),
     "pop": EffectInfo(
-        "bubbles: the gas law, no stiffness after the burst", "contact", 3, families=(BUBBLES,)
+        "bubbles: the gas law, no stiffness after the burst", "contact", families=(BUBBLES,)
     ),
     "stems": EffectInfo(
-        "foliage: stems that bend, damp and slip off", "contact", 2, families=(FOLIAGE,)
+        "foliage: stems that bend, damp and slip off", "contact", families=(FOLIAGE,)
     ),
     "tilt": EffectInfo(
         "the forearm pivots about the contact",
         "contact",
-        2,
         families=(RIGID, FOAM, PILLOW, BUBBLES),
     ),
-    "relaxation": EffectInfo("standard linear solid", "contact", 1, families=ELASTIC),
+    "relaxation": EffectInfo("standard linear solid", "contact", families=ELASTIC),
     "inertia": EffectInfo(
         "the arm's inertia: it hits, lifts off and comes down again",
         "contact",
-        7,
         {"loss_s": Field(0.0, 1.0, 0.0015, "the skin's dashpot, as a part of its stiffness")},
     ),
     "friction": EffectInfo(
         "the object's face holds the skin until it slides along it",
         "contact",
-        4,
         {"shear_n_m": Field(0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True)},
         keys=("skin_friction",),
     ),
-    "sliding": EffectInfo("sticks, then slides on the floor", "contact", 2),
+    "sliding": EffectInfo("sticks, then slides on the floor", "contact"),
     "slope": EffectInfo(
-        "a table that is not level", "contact", 1, needs=("sliding",), keys=("slope_deg",)
+        "a table that is not level", "contact", needs=("sliding",), keys=("slope_deg",)
     ),
     "turning": EffectInfo(
         "a push beside the middle turns what it moves",
         "contact",
-        2,
         needs=("sliding",),
         keys=("aside_m", "foot_m"),
     ),
     "stribeck": EffectInfo(
-        "friction that falls with speed", "contact", 2, needs=("sliding",), keys=("stribeck_m_s",)
+        "friction that falls with speed", "contact", needs=("sliding",), keys=("stribeck_m_s",)
     ),
     "tipping": EffectInfo(
         "tips over its edge where that takes less than sliding",
         "contact",
-        1,
         needs=("sliding",),
         keys=("base_m", "height_m"),
     ),
     "crosstalk": EffectInfo(
         "each taxel feels its neighbours",
         "sensor",
-        1,
         {"part": Field(0.0, 0.2, 0.02, "of each of the four neighbours")},
     ),
     "hysteresis": EffectInfo(
         "the reading lags behind the load, either way",
         "sensor",
-        1,
         {"counts": Field(0.0, 65535, 30.0, "half the width of the loop")},
     ),
     "drift": EffectInfo(
         "a baseline that wanders, its own for each taxel",
         "sensor",
-        1,
         {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of the taxels' slopes")},
     ),
     "noise": EffectInfo(
         "normal noise on each reading",
         "sensor",
-        1,
         {"counts": Field(0.0, 65535, 8.0, "standard deviation")},
     ),
     "saturation": EffectInfo(
         "no reading above a limit",
         "sensor",
-        1,
         {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)},
     ),
     "dead_band": EffectInfo(
         "small readings are zero",
         "sensor",
-        1,
         {"counts": Field(0.0, 65535, 50.0, "readings below it are zero")},
     ),
     "quantisation": EffectInfo(
         "coarse steps of the converter",
         "sensor",
-        1,
         {"counts": Field(1.0, 65535, 4.0, "size of a step")},
     ),
     "dead_taxels": EffectInfo(
         "taxels that read nothing in a trial",
         "sensor",
-        1,
         {
             "part": Field(0.0, 1.0, 0.01, "of all taxels"),
             "known": Field(0, 1, 1, "1: marked invalid; 0: they read zero", whole=True),
@@ -247,13 +232,11 @@ EFFECTS: dict[str, EffectInfo] = {
     "jitter": EffectInfo(
         "frames come early or late",
         "clock",
-        1,
         {"s": Field(0.0, 1.0, 0.001, "standard deviation, cut at 0.45 of a frame")},
     ),
     "dropped_frames": EffectInfo(
         "frames that are lost",
         "clock",
-        1,
         {"part": Field(0.0, 0.9, 0.02, "of all frames")},
     ),
 }
@@ -265,6 +248,8 @@ IMPLIED_BY_FAMILY = {
     FOLIAGE: ("stems",),
 }
 IMPLIED_BY_CONDITION = {"movable": ("sliding",)}
+SHARED = {"viscous": ("relaxation", "inertia")}
+"""{module of `effects` that several effects build upon: these}."""
 LABELLED_BY = {
     "foundation": {FOAM: "soft", PILLOW: "soft"},
     "pop": {BUBBLES: "soft"},

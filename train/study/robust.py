@@ -16,8 +16,7 @@ from train.report import figures
 from train.report.score import grid_search, score, transfer
 from train.report.section import Figure, Section, Table
 from train.report.skins import follow, vectors
-from train.simulate.assemble import make_plan
-from train.simulate.engine import kind_of, run_physics
+from train.simulate.engine import run_physics
 from train.simulate.run import file_name, parts, recordings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
@@ -27,6 +26,8 @@ FACTORS = (0.5, 2.0)
 SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
 """Effects that change what is read, never what happens."""
 UNCHANGED = "as recorded"
+BATCHES = 2
+"""Parts of a scene that are simulated anew one by one; more cost more time in all."""
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -75,7 +76,6 @@ def groups(scenes: Mapping[str, Scene]) -> list[list[str]]:
 def measured(
     scenes: Mapping[str, Scene],
     trials: tuple[TrialSpec, ...],
-    step_s: float,
     wanted: Collection[str],
     layout: SkinLayout,
     tracking: TrackSettings,
@@ -85,23 +85,16 @@ def measured(
 
     Args:
         scenes: {name: scene} that differ in their sensor alone.
-        trials: drawn trials of one kind.
-        step_s: time step of the physics.
+        trials: as they were drawn.
         wanted: file names of the trials to follow.
         layout: the skin, with its thresholds.
         tracking: how contacts are followed.
         chain: the arm, or None.
     """
-    first = trials[0]
-    plans = {
-        name: make_plan(scene, kind_of(scene, first.object, first.condition).effects)
-        for name, scene in scenes.items()
-    }
-    shown = next(iter(scenes))
-    physics = run_physics(scenes[shown], trials, step_s, plan=plans[shown])
+    physics = run_physics(next(iter(scenes.values())), trials)
     contacts: dict[str, dict[str, FeatureSeries | None]] = {}
     for name, scene in scenes.items():
-        sensed = recordings(physics, plans[name], scene, step_s)
+        sensed = recordings(physics, scene=scene)
         kept = {file: recording for file, recording in sensed if file in wanted}
         followed = follow(list(kept.values()), layout, tracking, chain)
         contacts[name] = dict(zip(kept, followed, strict=True))
@@ -126,10 +119,10 @@ def anew(context: Context, scenes: Mapping[str, Scene]) -> dict[str, list[Featur
     cases = []
     for group in [{name: scenes[name] for name in names} for names in groups(scenes)]:
         shown = next(iter(group.values()))
-        for trials, step_s in parts(shown):
+        for trials in parts(shown, jobs=BATCHES):
             drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
             cases.append(
-                (group, drawn, step_s, set(wanted), data.layout, data.tracking, data.chain)
+                (group, drawn, set(wanted), data.layout, data.tracking, data.chain)
             )
     merged: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
     for answer in context.map("simulated again", measured, cases):

@@ -1,4 +1,4 @@
-"""A bench for the simulator's own step functions: one joint that pushes along a line."""
+"""A bench for the simulator's own steps: one joint that pushes along a line."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from train.simulate import base
-from train.simulate.compiled import each
-from train.simulate.effects import relaxation, sliding
-from train.simulate.motion import MOVER
-from train.simulate.plan import Build
+from train.simulate.plan import STEP, TUNE, plan_of
 from train.simulate.scene import from_dict
-from train.simulate.state import State
+from train.simulate.scene_model import TrialSpec
+from train.simulate.trials import Trials
 
 
 @dataclass
@@ -30,12 +27,16 @@ class Trace:
     speed: np.ndarray
     depth: np.ndarray
 
+    def of(self, i: int) -> Trace:
+        """One pusher's trace."""
+        return Trace(**{name: seen[:, i : i + 1] for name, seen in vars(self).items()})
+
 
 class Rig:
     """n pushers of stiffness `arm_k` whose ends run at `speed` against beds of springs.
 
     The step is the simulator's own; only the arm's geometry is left out (one joint of lever 1).
-    A bed's law is looked at whole where the gaps of its springs are not given.
+    All lines of a bed's law are looked at where the gaps of its springs are not given.
     """
 
     def __init__(
@@ -55,49 +56,27 @@ class Rig:
         given = [np.asarray(v, dtype=float) for v in values.values()]
         law = [np.asarray(part, dtype=float) for part in (gaps, slopes, intercepts)]
         n = max([v.size for v in (*given, np.asarray(h), law[1][0])])
-        build = Build(
-            from_dict({"object": [{"name": "x", "family": "rigid", "conditions": ["fixed"]}]}),
-            effects,
-        )
-        base.add(build)
-        for build.owner in effects:
-            {"sliding": sliding, "relaxation": relaxation}[build.owner].add(build)
-        plan = build.plan()
-        self.steps = plan.addresses("step")
-        h = np.broadcast_to(np.asarray(h, float), (n,))
-        self.state = state = State(
-            scene=build.scene,
-            skin=build.scene.cylinder,
-            trials=(),
-            n=n,
-            steps=1,
-            values={key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)},
-            solve=plan.solve.address,
-        )
-        t = state.trial
-        t.h, t.joints, t.coordinates = h, 1, 1
-        t.rate[:, 0], t.travel_s[:, 0], t.joint_k[:, 0] = speed, travel_s, arm_k
-        t.damping[:, 0] = arm_d
-        t.jacobian[:, 0, 0] = 1.0
-        t.law_lines = len(law[1])
-        t.law_gaps, t.slopes, t.intercepts = (
-            state.lend(name, np.broadcast_to(part, (len(law[1]), n)))
-            for name, part in zip(("law_gaps", "slopes", "intercepts"), law, strict=True)
-        )
-        for function in plan.setup:
-            if plan.owners[function] != "base":
-                function(state)
-        each(plan.addresses("tune"), t.here)
-        t.compliance[:, 0] = t.give[:, 0]
+        box = {"name": "x", "family": "rigid", "conditions": ["fixed"]}
+        scene = from_dict({"object": [box]})
+        values = {key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)}
+        specs = (TrialSpec(scene.objects[0], "fixed", 0),) * n
+        self.trials = t = Trials(scene, specs, values, plan_of((effects,) * n))
+        t.h = np.broadcast_to(np.asarray(h, float), (n,)).copy()
+        t.rate, t.joint_k, t.damping = np.zeros((5, 1)), np.ones((5, 1)), np.zeros((5, 1))
+        t.rate[0], t.joint_k[0], t.damping[0], t.travel_s[0] = speed, arm_k, arm_d, travel_s
+        t.jacobian[0, 0] = 1.0
+        shape = (len(law[1]), n)
+        t.law_gaps, t.slopes, t.intercepts = (np.broadcast_to(part, shape) for part in law)
+        t.plan.run(("stand", *TUNE), t)
+        t.compliance[0] = t.give[0]
 
     def run(self, steps: int) -> Trace:
-        t, seen = self.state.trial, []
-        mover = self.state.own.get(MOVER, MOVER.rows(self.state.n))
+        t, seen, still = self.trials, [], np.zeros(self.trials.n)
         for _ in range(steps):
-            each(self.steps, t.here)
-            target = t.start[:, 0] + t.rate[:, 0] * np.minimum(t.t, t.travel_s[:, 0])
-            now = (t.t, t.loads[:, 0], t.q[:, 0], target, mover.slide, mover.speed, t.depth[:, 0])
-            seen.append(np.array(now))
+            t.plan.run(STEP, t)
+            mover = t.own.get("sliding", SimpleNamespace(slide=still, speed=still))
+            now = (t.t, t.loads[0], t.q[0], t.equilibrium(t.t)[0])
+            seen.append(np.array([*now, mover.slide, mover.speed, t.depth[0]]))
         return Trace(*np.moveaxis(seen, 1, 0))
 
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from dataclasses import replace
 
-import numpy as np
-
-from train.simulate.arm import Kinematics, pose_of
 from train.simulate.engine import Batch, run_batch
 from train.simulate.run import kinds
 from train.simulate.scene import Scene, from_dict
@@ -28,15 +25,11 @@ def make(objects, *add, **trials) -> Scene:
     )
 
 
-def run(scene, step_s=0.01) -> Batch:
-    return run_batch(scene, tuple(next(iter(kinds(scene).values()))), step_s)
+def specs_of(scene, step_s=0.01):
+    """All trials of a scene, at a step."""
+    every = (spec for specs in kinds(scene).values() for spec in specs)
+    return tuple(replace(spec, step_s=step_s) for spec in every)
 
 
-def poses(chain, q) -> SimpleNamespace:
-    """The poses (..., n) of an arm at its angles (dof, n), as of `arm.pose_of`."""
-    table, (dof, n) = Kinematics(chain).table, q.shape
-    shapes = {"origin": (3,), "rotation": (3, 3), "axes": (3, dof), "origins": (3, dof)}
-    found = {name: np.empty((n, *shape)) for name, shape in shapes.items()}
-    for i in range(n):
-        pose_of(table, np.ascontiguousarray(q[:, i]), *(part[i] for part in found.values()))
-    return SimpleNamespace(**{name: np.moveaxis(part, 0, -1) for name, part in found.items()})
+def run(scene, step_s=0.01, **options) -> Batch:
+    return run_batch(scene, specs_of(scene, step_s), **options)

@@ -20,7 +20,7 @@ OBJECTS = (
 def test_halving_the_step_halves_the_error(condition, keys, add):
     scene = make(one_object(conditions=[condition], width_m=0.05, **keys), *add)
     scene.trials["tolerance"] = 1e-9
-    found = measure(scene, tuple(next(iter(kinds(scene).values()))), halvings=4)
+    (found,) = measure(scene, list(kinds(scene).values()), halvings=4)
     assert found.errors[-1] < found.errors[0]
     assert 0.6 <= found.order <= 1.0
     assert found.errors[-1] < 0.005
@@ -32,8 +32,8 @@ def test_a_light_thing_that_swings_within_a_step_is_not_believed():
         conditions=["movable"], mass_kg=1e-4, friction_static=0.5, friction_kinetic=0.4
     )
     scene = make(thing, lead_s=0.05, after_s=0.15)
-    trials = tuple(next(iter(kinds(scene).values())))
-    found = measure(scene, trials)
+    trials = next(iter(kinds(scene).values()))
+    (found,) = measure(scene, [trials])
     assert not found.within
     true = physics(scene, trials, 2e-5).force
     step = physics(scene, trials, found.step_s).force
@@ -48,7 +48,7 @@ def test_the_step_follows_the_tolerance():
     chosen = []
     for tolerance in (0.05, 0.004):
         scene.trials["tolerance"] = tolerance
-        found = measure(scene, tuple(next(iter(kinds(scene).values()))))
+        (found,) = measure(scene, list(kinds(scene).values()))
         within = [s for s, e in zip(found.steps_s, found.errors, strict=False) if e <= tolerance]
         assert found.step_s == within[0]
         chosen.append(found.step_s)

@@ -7,14 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import njit
 
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run
-from train.simulate.compiled import addresses
 from train.simulate.effects import tilt
-from train.simulate.pivot_solver import GUARDED_ROUNDS, PIVOT, search
-from train.simulate.reader import Value
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, search
+from train.simulate.scene_model import Value
 
 
 def test_newton_on_the_tilt_needs_its_line_search():
@@ -88,26 +86,15 @@ def tilt_cases(n, seed):
     return springs, free, c
 
 
-@njit(error_model="numpy")
-def search_each(contacts):
-    """The simulator's search, contact by contact."""
-    for i in range(len(contacts)):
-        search(contacts[i])
-
-
 def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
     """The simulator's answers, searched for from no load."""
-    at = PIVOT.rows(len(free[0]))
-    own = {name: values.T.copy() for name, values in vars(springs).items()}
-    own |= {name: np.zeros_like(own["lever"]) for name in ("held", "out")}
-    for name, values in own.items():
-        at[name] = addresses(values)
-    at.springs, at.rows = len(springs.gaps), len(springs.lever)
-    at.free0, at.free1 = free
-    at.c00, at.c01, at.c11 = c
-    at.guarded_rounds = guarded_rounds
-    search_each(at.view(np.ndarray))
-    return at
+    n = len(free[0])
+    gaps = springs.gaps
+    groups = [Springs(np.arange(n), gaps[:, None], springs.stiffness[:, None], gaps.min(axis=1))]
+    rows = (springs.weight, springs.line_gap, springs.lever)
+    pivots = Pivots(groups, *rows, 1.0, 0.0, np.array(free), np.array(c))
+    found = search(pivots, np.zeros((2, n)), guarded_rounds)
+    return SimpleNamespace(force=found.loads[0], moment=found.loads[1], lost=found.lost)
 
 
 def tilt_error(springs, free, c, loads):

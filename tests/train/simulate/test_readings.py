@@ -3,21 +3,28 @@
 import numpy as np
 import pytest
 
-from train.simulate.readings import Readings
-from train.simulate.run_frames import FULL
+from train.simulate.readings import FULL, Readings
+from train.simulate.scene import from_dict
 
 FRAMES, ROWS, COLS = 3, 2, 4
+SCENE = from_dict(
+    {
+        "skin": {"rows": ROWS, "cols": COLS},
+        "motion": {"place_m": 0.18},
+        "object": [{"name": "box", "family": "rigid", "conditions": ["fixed"]}],
+    }
+)
 
 
 def reading(taxels, counts, kind=np.float32) -> Readings:
     return Readings(
-        seed=0,
-        which=0,
+        scene=SCENE,
         trial=None,
+        effects=(),
+        which=0,
         t=np.arange(FRAMES) / 100.0,
         counts=np.array(counts, dtype=kind).reshape(FRAMES, len(taxels)),
         taxels=np.array(taxels, dtype=np.intp),
-        shape=(ROWS, COLS),
         joints=np.zeros((FRAMES, 1)),
     )
 

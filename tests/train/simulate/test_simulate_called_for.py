@@ -13,15 +13,11 @@ import pytest
 
 from edge.errors import InputError
 from train.simulate import streams
-from train.simulate.assemble import make_plan
-from train.simulate.engine import begin, kind_of, run_batch, values_of
-from train.simulate.motion import MOVER
-from train.simulate.plan import PYTHON_STAGES, RUN_STAGES, STAGES
-from train.simulate.required_effects import required_effects
+from train.simulate.engine import run_batch, values_of
+from train.simulate.plan import INSTEAD, STAGES, make_plan, required_effects
 from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
-from train.simulate.trial import SLOTS
 
 ROOT = Path(__file__).parents[3]
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
@@ -63,8 +59,8 @@ def everything():
 
 
 def batch_of(one, index=0):
-    kind, trials = list(kinds(one).items())[index]
-    return run_batch(one, tuple(trials), 0.01), kind
+    effects, specs = list(kinds(one).items())[index]
+    return run_batch(one, tuple(specs)), effects
 
 
 def test_1_an_effect_not_called_for_is_not_loaded():
@@ -87,9 +83,9 @@ def test_1_an_effect_not_called_for_is_not_loaded():
 def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
     one = scene(*add)
     before = [batch_of(one, i)[0] for i in range(2)]
-    for i, kind in enumerate(kinds(one)):
+    for i, effects in enumerate(kinds(one)):
         for name in EFFECTS:
-            if name not in kind.effects:
+            if name not in effects:
                 bomb = types.ModuleType(name)
                 bomb.__getattr__ = lambda attribute, name=name: pytest.fail(f"{name} was touched")
                 monkeypatch.setitem(sys.modules, f"train.simulate.effects.{name}", bomb)
@@ -99,48 +95,28 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
         assert before[i].joints.tobytes() == after.joints.tobytes()
 
 
-OWN = {
-    "lateral": {"lateral"},
-    "cover": {"cover"},
-    "pop": {"pop"},
-    "stems": {"stems"},
-    "tilt": {"tilt"},
-    "relaxation": {"viscous"},
-    "inertia": {"inertia", "viscous"},
-    "friction": {"friction"},
-    "sliding": {"motion"},
-    "turning": {"turning"},
-    "stribeck": {"stribeck"},
-    "tipping": {"tipping"},
+STATE = {
+    *("lateral", "pop", "stems", "tilt", "inertia", "friction", "sliding", "turning", "tipping"),
+    "viscous",
 }
-
-
-BASE_ARRAYS = {
-    *("weight", "line_gap", "line_depth", "gaps", "stiffness"),
-    *("column_gaps", "reach", "law_gaps", "slopes", "intercepts", "image"),
-}
+"""Effects with state of their own."""
 
 
 def test_3_only_the_called_effects_state_exists():
     called = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
     one = scene(*called, objects=everything())
-    for i, kind in enumerate([*kinds(one)]):
-        batch = batch_of(one, i)[0]
-        expected = set().union(*(OWN.get(name, set()) for name in kind.effects))
-        assert {SLOTS[part.slot] for part in batch.state.own} == expected, kind.effects
-        for own in batch.state.trial.own:
-            assert {SLOTS[slot] for slot in np.flatnonzero(own)} == expected, kind.effects
+    for i in range(len(kinds(one))):
+        batch, effects = batch_of(one, i)
+        expected = STATE & {*effects, "viscous"}
+        assert set(batch.trials.own) == expected, effects
         traces = {"sliding": "slide_m", "turning": "turn_rad"}
-        called = {name for effect, name in traces.items() if effect in kind.effects}
-        assert set(batch.traces) == {"depth_m", *called}
-        assert ("alive" in batch.state.arrays) is ("pop" in kind.effects)
-        assert batch.kept is not None
-        assert batch.valid is not None
+        kept = {name for effect, name in traces.items() if effect in effects}
+        assert set(batch.traces) == {"depth_m", *kept}
+        assert batch.seen[0].kept is not None
+        assert batch.seen[0].valid is not None
     bare = batch_of(scene(), 0)[0]
-    assert (bare.state.own, set(bare.traces)) == ({}, {"depth_m"})
-    assert not bare.state.trial.own.any()
-    assert set(bare.state.arrays) == BASE_ARRAYS
-    assert bare.times is bare.kept is bare.valid is None
+    assert (bare.trials.own, set(bare.traces)) == ({}, {"depth_m"})
+    assert bare.seen[0].times is bare.seen[0].kept is bare.seen[0].valid is None
 
 
 def test_4_adding_an_effect_leaves_the_others_draws():
@@ -175,32 +151,43 @@ def test_4_streams_go_by_name_not_by_place():
     assert streams.key("noise") == (3232097007, 3611913630)
 
 
-def test_5_the_number_of_functions_is_exact():
-    bare = make_plan(scene(), ())
-    assert {s: len(getattr(bare, s)) for s in STAGES} == {
-        "setup": 6,
-        "pace": 0,
-        "tune": 1,
-        "frame": 1,
-        "step": 3,
-        "sample": 3,
-        "clock": 0,
-        "sensor": 0,
-    }
+HOOKS = {
+    "base": {"swing", "place", "lay", "law", "tune", "locate", "predict", "press", "answer",
+             "settle", "bear", "image"},
+    "foundation": {"soften"},
+    "lateral": {"widen", "fill", "image"},
+    "bottoming": {"fill"},
+    "cover": {"soften", "pass_on"},
+    "pop": {"lay", "law", "stand", "image", "pass_on"},
+    "stems": {"lay", "law", "tune", "settle", "bear", "image"},
+    "tilt": {"law", "locate", "answer", "settle", "bear"},
+    "viscous": {"stand", "tune", "settle"},
+    "relaxation": {"stand"},
+    "inertia": {"swing", "stand", "pace", "tune", "predict", "settle"},
+    "friction": {"stand", "reach_along", "predict", "drag", "settle", "lean"},
+    "sliding": {"stand", "predict", "drag", "press"},
+    "slope": {"stand"},
+    "turning": {"stand", "pass_on"},
+    "stribeck": {"drag"},
+    "tipping": {"stand", "drag"},
+    "jitter": {"clock"},
+    "dropped_frames": {"clock"},
+}  # fmt: skip
+
+
+def test_5_each_trial_runs_its_own_hooks_and_no_other():
     implied = ("foundation", "lateral", "bottoming", "relaxation", "pop", "stems")
     one = scene(*[n for n in EFFECTS if n not in implied], objects=everything())
-    seen = set()
-    for kind in kinds(one):
-        plan = make_plan(one, kind.effects)
-        extra = sum(EFFECTS[name].functions for name in kind.effects)
-        if {"relaxation", "inertia"} & set(kind.effects):
-            extra += 4 if "tilt" in kind.effects else 3  # what the two share
-        if {"friction", "sliding"} <= set(kind.effects):
-            extra += 1  # the shear loads the floor
-        if {"friction", "tilt"} <= set(kind.effects):
-            extra += 1  # and an askew skin
-        assert len(plan) == len(bare) + extra, kind.effects
-        seen |= set(kind.effects)
+    specs = tuple(specs[0] for specs in kinds(one).values())
+    plan, seen = make_plan(one, specs), set()
+    for i, effects in enumerate(plan.effects):
+        shared = {"viscous"} if {"relaxation", "inertia"} & set(effects) else set()
+        owners = ["base", *shared, *effects]
+        for stage in STAGES:
+            ran = [call.owner for call in plan.stages[stage] if call.which[i]]
+            have = [name for name in owners if stage in HOOKS.get(name, {"sensor"})]
+            assert ran == (have[-1:] if stage in INSTEAD else have), (effects, stage)
+        seen |= set(effects)
     assert seen == set(EFFECTS)
 
 
@@ -209,20 +196,19 @@ def test_6_results_do_not_depend_on_the_batch(sensor):
     add = ["tilt", "inertia"]
     if sensor:
         add += [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
-    one = scene(*add, objects=everything(), after_s=0.4, count=3)
-    for kind, trials in kinds(one).items():
-        trials = tuple(trials)
-        whole = run_batch(one, trials, 0.01)
-        for part in (trials[:1], trials[::-1]):
-            some = run_batch(one, part, 0.01)
-            where = [trials.index(t) for t in part]
-            assert some.counts.tobytes() == whole.counts[where].tobytes(), kind.effects
-            assert some.joints.tobytes() == whole.joints[where].tobytes(), kind.effects
-            assert some.force.tobytes() == whole.force[where].tobytes(), kind.effects
-            if sensor:
-                for name in ("times", "kept", "valid"):
-                    read, all_read = getattr(some, name), getattr(whole, name)
-                    assert read.tobytes() == all_read[where].tobytes(), (name, kind.effects)
+    one = scene(*add, objects=everything(), after_s=0.4, count=2)
+    every = tuple(spec for specs in kinds(one).values() for spec in specs)
+    together = run_batch(one, every)
+    alone = [(spec,) for spec in every[::2]]
+    for part in (*alone, every[::-1], every[3:10]):
+        some, where = run_batch(one, part), [every.index(spec) for spec in part]
+        for name in ("counts", "joints", "force"):
+            bits = getattr(together, name)[where].tobytes()
+            assert getattr(some, name).tobytes() == bits, (name, part[0].key)
+        for one_seen, k in zip(some.seen, where, strict=True) if sensor else ():
+            for name in ("times", "kept", "valid"):
+                read, before = getattr(one_seen, name), getattr(together.seen[k], name)
+                assert read.tobytes() == before.tobytes(), (name, part[0].key)
 
 
 def test_who_called_is_told():
@@ -236,7 +222,6 @@ def test_who_called_is_told():
     assert called["noise"] == "effects.add"
     assert "sliding" not in required_effects(one, foam, "fixed")
     assert "stribeck" not in required_effects(one, foam, "fixed")
-    assert kind_of(one, foam, "fixed") != kind_of(one, foam, "movable")
 
 
 def test_leaving_out_what_is_implied():
@@ -244,18 +229,6 @@ def test_leaving_out_what_is_implied():
     foam = next(o for o in one.objects if o.family == "foam")
     assert "relaxation" not in required_effects(one, foam, "fixed")
     assert "foundation" in required_effects(one, foam, "fixed")
-
-
-def test_the_plan_is_flat():
-    plan = make_plan(scene("tilt"), ("tilt", "sliding"))
-    trials = tuple(list(kinds(scene("tilt")).values())[1])
-    state = begin(scene("tilt"), plan, trials, 0.01, values_of(scene("tilt"), trials))
-    assert all(callable(f) for stage in PYTHON_STAGES for f in getattr(plan, stage))
-    found = [address for stage in RUN_STAGES for address in plan.addresses(stage)]
-    assert all(found)
-    assert len(set(found)) == len(found) == len(plan) - len(plan.setup)
-    assert state.of(MOVER).slide.shape == (3,)
-    assert set(STAGES) == {*PYTHON_STAGES, *RUN_STAGES}
 
 
 def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():

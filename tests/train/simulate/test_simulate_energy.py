@@ -9,23 +9,18 @@ what is pushed has its speed and its lean.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from numba import njit
 
 from edge.errors import EdgeError
-from tests.train.simulate.scenes import make, one_object, run
-from train.simulate import engine, viscous
-from train.simulate.assemble import make_plan
-from train.simulate.base import equilibrium
-from train.simulate.compiled import addresses, each
-from train.simulate.effects.tipping import TIPPING
+from tests.train.simulate.scenes import make, one_object, run, specs_of
+from train.simulate import engine
+from train.simulate.effects import viscous
 from train.simulate.energy import check_energy
-from train.simulate.motion import MOVER
-from train.simulate.plan import RUN_STAGES
+from train.simulate.plan import ALL, Call, make_plan
 from train.simulate.run import kinds
-from train.simulate.run_frames import set_paces
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS, IMPLIED_BY_FAMILY, LABELLED_BY
 
@@ -67,54 +62,46 @@ ROUNDING = 1e-9
 class Ledger:
     """Joules, step by step: what the contact took of the arm, and what is pushed of the contact."""
 
-    def __init__(self, scene, effects):
-        """Of a scene's trials with these effects."""
-        self.scene, self.plan = scene, make_plan(scene, effects)
-        self.inertia = np.array(scene.inertia)[:, None] if "inertia" in effects else 0.0
-        self.damping = np.array(scene.damping)[:, None]
+    def __init__(self, scene, specs, meddle=None):
+        """Of a scene's trials; `meddle` changes them after each step."""
+        self.scene, self.specs, self.meddle = scene, specs, meddle
+        plan = make_plan(scene, specs)
+        book = Call("ledger", self.book, np.ones(len(specs), dtype=bool))
+        self.plan = replace(plan, stages={**plan.stages, "settle": [*plan.stages["settle"], book]})
+        self.inertia = np.array(scene.inertia)[:, None] if "inertia" in plan.calls else 0.0
         self.took, self.idle, self.pushed, self.has = [], [], [], []
+        self.q = None
 
-    def run(self, trials, step_s, meddle=None):
-        """(n, frames) newtons of trials that run as the engine runs them, with every step booked;
-        `meddle` changes the state after each."""
-        values = engine.values_of(self.scene, trials)
-        state = engine.begin(self.scene, self.plan, trials, step_s, values)
-        pace, tune, frame, step, sample = (self.plan.addresses(stage) for stage in RUN_STAGES)
-        self.q, self.slide = state.q, np.zeros(state.n)
-        self.v, self.speed = np.broadcast_to(state.rate, state.q.shape), np.zeros(state.n)
-        force = np.zeros((state.n, engine.frame_count(self.scene)))
-        for k in range(1, force.shape[1]):
-            set_paces(state.records, pace, tune)
-            each(frame, state.trial.here)
-            for done in range(state.trial.steps.max()):
-                each(step, state.trial.here[state.trial.steps > done])
-                if meddle:
-                    meddle(state.trial)
-                self.book(state, state.trial.steps > done)
-            each(sample, state.trial.here)
-            force[:, k] = state.trial.force
-        return force
+    def run(self):
+        """(n, frames) newtons of the trials, with every step booked."""
+        return engine.run_physics(self.scene, self.specs, plan=self.plan).force
 
-    def book(self, state, moved):
-        """What this step moved, of the trials whose frame has not ended."""
-        q, load = state.trial.q[:, : len(self.q)].T.copy(), state.trial.loads[:, 0]
-        dq = q - self.q
-        v = np.where(moved, dq / state.trial.h, self.v)
-        spring = state.joint_k * (q - equilibrium(state, state.trial.t))
-        torque = self.inertia * (v - self.v) / state.trial.h + self.damping * v + spring
+    def book(self, t, i):
+        """What this step moved, of the trials that took it."""
+        if self.q is None:
+            self.q, self.slide = t.equilibrium(0.0) - t.lag, np.zeros(t.n)
+            self.v, self.speed = np.broadcast_to(t.rate, t.q.shape), np.zeros(t.n)
+        if self.meddle:
+            self.meddle(t)
+        moved = np.zeros(t.n, dtype=bool)
+        moved[i] = True
+        dq, load = t.q - self.q, t.loads[0]
+        v = np.where(moved, dq / t.h, self.v)
+        spring = t.joint_k * (t.q - t.equilibrium(t.t))
+        torque = self.inertia * (v - self.v) / t.h + t.damping * v + spring
         self.took.append(-(torque * dq).sum(axis=0))
-        self.q, self.v = q, v
+        self.q, self.v = t.q.copy(), v
         idle = load == 0.0
-        if viscous.VISCOUS in state.own:
-            idle = idle & (np.abs(state.arrays["viscous_load"]).max(axis=1) < 1e-6)
-        if MOVER in state.own:
-            mover = state.of(MOVER)
+        if "viscous" in t.own:
+            idle = idle & (np.abs(t.own["viscous"].load).max(axis=0) < 1e-6)
+        if "sliding" in t.own:
+            mover = t.own["sliding"]
             way, self.slide = mover.slide - self.slide, mover.slide.copy()
             self.pushed.append(load * way)
-            speed = np.where(moved, way / state.trial.h, self.speed)
-            self.speed = speed
-            self.has.append(0.5 * mover.inertia * speed * speed + lean(state, mover))
-            idle = idle & (self.has[-1] == 0.0)
+            self.speed = np.where(moved, way / t.h, self.speed)
+            has = 0.5 * mover.inertia * self.speed * self.speed + lean(t, mover)
+            self.has.append(has)
+            idle = idle & (has == 0.0)
         self.idle.append(idle)
 
     def judge(self, what):
@@ -134,11 +121,11 @@ class Ledger:
             )
 
 
-def lean(state, mover):
-    """What the lean of a thing that tips has stored; beyond the balance it gives it back."""
-    if TIPPING not in state.own:
+def lean(t, mover):
+    """The energy stored in the lean of a thing that tips; beyond the balance it gives it back."""
+    if "tipping" not in t.own:
         return 0.0
-    own = state.of(TIPPING)
+    own = t.own["tipping"]
     stored = own.force * (mover.slide - mover.slide**2 / (2.0 * own.travel))
     return np.where(own.tips, stored, 0.0)
 
@@ -166,7 +153,7 @@ def pair_scene(first, second):
             "effects": {"add": sorted(pair), "leave_out": sorted(own - pair)},
         }
     )
-    assert pair <= set(next(iter(kinds(one))).effects), pair
+    assert pair <= set(next(iter(kinds(one)))), pair
     return one
 
 
@@ -176,24 +163,20 @@ def test_no_effect_and_no_pair_of_them_makes_energy(first, step_s):
     for second in CONTACT[CONTACT.index(first) :]:
         if (one := pair_scene(first, second)) is None:
             continue
-        kind, trials = next(iter(kinds(one).items()))
-        ledger = Ledger(one, kind.effects)
-        force = ledger.run(tuple(trials), step_s)
-        assert (force.max(axis=1) > 0.0).all(), (first, second)
-        physics = engine.run_physics(one, tuple(trials), step_s, plan=ledger.plan)
-        assert force.tobytes() == physics.force.tobytes(), (first, second)
+        ledger = Ledger(one, specs_of(one, step_s))
+        assert (ledger.run().max(axis=1) > 0.0).all(), (first, second)
         ledger.judge((first, second))
 
 
-def test_the_ledger_notices_a_contact_that_gives_back_more_than_it_took():
+def test_the_ledger_notices_a_contact_that_gives_back_more_than_it_took(monkeypatch):
     one = pair_scene("inertia", "tilt")
-    kind, trials = next(iter(kinds(one).items()))
-    ledger = Ledger(one, kind.effects)
 
     def push(t):
-        t.q[t.loads[:, 0] > 0.0] -= 1e-3
+        t.q[:, t.loads[0] > 0.0] -= 1e-3
 
-    ledger.run(tuple(trials), 0.01, meddle=push)
+    monkeypatch.setattr(engine, "check_energy", lambda *_: None)
+    ledger = Ledger(one, specs_of(one), push)
+    ledger.run()
     with pytest.raises(AssertionError, match="gave back more"):
         ledger.judge("pushed")
 
@@ -209,60 +192,37 @@ def test_relaxing_foam_under_a_pivoting_arm_presses_no_harder_than_a_stiff_one()
         assert most(relax_ratio=ratio) <= 1.02 * stiff
 
 
-@njit
-def in_steps(rows, h):
-    for i in range(len(rows)):
-        viscous.in_steps(rows[i], h[i])
-
-
-@njit
-def move_on(rows, forces):
-    for i in range(len(rows)):
-        viscous.move_on(rows[i], 0, forces[i])
-
-
-def viscous_rows(n, **values):
-    """Contacts of one line each, and their arrays, which have to live as long."""
-    own = viscous.VISCOUS.rows(n)
-    own.lines = 1
-    for name, value in values.items():
-        own[name] = value
-    lent = {name: np.zeros((n, 1)) for name in ("force", "given", "load")}
-    for name, array in lent.items():
-        own[name] = addresses(array)
-    return own, lent
-
-
 def test_what_answers_to_speed_never_gives_more_than_it_took():
     rng = np.random.default_rng(3)
     n = 200
     ratio, relax_s, loss_s = 10.0 ** rng.uniform([[-1], [-3], [-6]], [[2], [6], [3]], (3, n))
-    own, lent = viscous_rows(n, ratio=ratio, relax_s=relax_s, loss_s=loss_s)
-    load = lent["load"]
+    own = viscous.begin(1, n)
+    own.ratio[:], own.relax_s[:], own.loss_s[:] = ratio, relax_s, loss_s
     depth, work = np.zeros(n), np.zeros(n)
     for k in range(500):
         if k % 10 == 0:  # whatever the step's length, and whenever it changes
-            in_steps(own.view(np.ndarray), 10.0 ** rng.uniform(-4, 0, n))
+            own.set_step(ALL, 10.0 ** rng.uniform(-4, 0, n))
         step = rng.normal(0.0, 0.1, n)
         elastic = np.maximum(depth + step, 0.0)
-        force = np.maximum(own.gain * elastic + load[:, 0], 0.0)
+        force = np.maximum(own.gain * elastic + own.load[0], 0.0)
         work += force * step
         depth = depth + step
-        move_on(own.view(np.ndarray), force)
-        assert (load <= 0.0).all()
+        own.move_on(ALL, force[None])
+        assert (own.load <= 0.0).all()
     assert (work > -1e-9).all()
 
 
 def test_a_ramp_relaxes_as_zeners_law_says_whatever_the_steps():
     rng = np.random.default_rng(5)
     ratio, relax_s, steepness = 1.5, 0.2, 7.0
-    own, lent = viscous_rows(1, ratio=ratio, relax_s=relax_s)
+    own = viscous.begin(1, 1)
+    own.ratio[:], own.relax_s[:] = ratio, relax_s
     t = 0.0
     for h in 10.0 ** rng.uniform(-5, -1, 60):
         t += h
-        in_steps(own.view(np.ndarray), np.array([h]))
-        whole = own.gain * steepness * t + lent["load"][:, 0]
-        move_on(own.view(np.ndarray), whole)
+        own.set_step(ALL, np.array([h]))
+        whole = own.gain * steepness * t + own.load[0]
+        own.move_on(ALL, whole[None])
         want = steepness * (t + ratio * relax_s * -math.expm1(-t / relax_s))
         assert whole[0] == pytest.approx(want, rel=1e-12)
 
@@ -271,12 +231,12 @@ def test_a_run_that_makes_energy_is_refused():
     one = make(one_object(), lead_s=0.1)
     batch = run(one)
     joints = batch.joints.copy()
-    check_energy(batch.state, joints, batch.t)
+    check_energy(batch.trials, joints, batch.t)
     joints[1, 100:, 0] -= 1.0
     with pytest.raises(EdgeError, match=r"trial 1 of thing-fixed makes energy: at 1 s"):
-        check_energy(batch.state, joints, batch.t)
+        check_energy(batch.trials, joints, batch.t)
     # Nor can it shake: its damping takes more than is put in.
     joints = batch.joints.copy()
     joints[1, 100::2, 0] += 0.02
     with pytest.raises(EdgeError, match=r"trial 1 of thing-fixed makes energy"):
-        check_energy(batch.state, joints, batch.t)
+        check_energy(batch.trials, joints, batch.t)

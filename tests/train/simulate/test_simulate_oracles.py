@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -11,19 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from edge.touch.arm import Chain
-from tests.train.simulate.scenes import make, one_object, poses, run
-from train.simulate import base
-from train.simulate.assemble import make_plan
-from train.simulate.compiled import each
+from tests.train.simulate.scenes import make, one_object, run, specs_of
+from train.simulate import engine
+from train.simulate.arm import Kinematics
+from train.simulate.contact import GRAVITY
 from train.simulate.effects import friction, tilt
-from train.simulate.effects.friction import SHEAR
 from train.simulate.effects.inertia import FINER
-from train.simulate.effects.tipping import TIPPING
-from train.simulate.engine import begin, run_batch, values_of
-from train.simulate.motion import GRAVITY, MOVER
-from train.simulate.plan import RUN_STAGES
-from train.simulate.run import kinds
-from train.simulate.run_frames import set_paces
+from train.simulate.plan import ALL, make_plan
 from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, load
 
 ARM_K = 115.0
@@ -34,9 +27,9 @@ class TestArm:
     def test_kinematics_are_the_edges(self):
         chain = Chain.cody()
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (chain.dof, 50))
-        pose, want = poses(chain, q), chain.pose(q.T)
+        pose, want = Kinematics(chain).pose(q), chain.pose(q.T)
         np.testing.assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
-        np.testing.assert_allclose(np.moveaxis(pose.rotation, 2, 0), want[:, :3, :3], atol=2e-15)
+        np.testing.assert_allclose(pose.rotation.T, want[:, :3, :3], atol=2e-15)
 
     def test_kinematics_of_a_skew_chain(self):
         chain = Chain.from_dict(
@@ -54,13 +47,13 @@ class TestArm:
             }
         )
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 20))
-        pose, want = poses(chain, q), chain.pose(q.T)
+        pose, want = Kinematics(chain).pose(q), chain.pose(q.T)
         np.testing.assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
-        np.testing.assert_allclose(np.moveaxis(pose.rotation, 2, 0), want[:, :3, :3], atol=2e-15)
+        np.testing.assert_allclose(pose.rotation.T, want[:, :3, :3], atol=2e-15)
 
     def test_the_gains_give_the_stiffness_that_was_measured_at_mid_forearm(self):
-        pose = poses(Chain.cody(), np.radians(CODY_START_DEG)[:, None])
-        along = pose.rotation[:, 2, 0]
+        pose = Kinematics(Chain.cody()).pose(np.radians(CODY_START_DEG)[:, None])
+        along = pose.rotation[2, :, 0]
         point = pose.origin[:, 0] + 0.103 * along
         jacobian = np.cross(pose.axes[:, :, 0].T, point - pose.origins[:, :, 0].T)
         push = jacobian[0] - along * (jacobian[0] @ along)
@@ -90,23 +83,21 @@ class TestArm:
 
     def test_a_frame_ends_at_its_own_time_and_not_at_the_sum_of_its_steps(self):
         batch = run(make(one_object()))
-        assert batch.state.trial.t.tolist() == [batch.t[-1]] * 2
+        assert batch.trials.t.tolist() == [batch.t[-1]] * 2
         assert np.add.accumulate(np.full(len(batch.t) - 1, 0.01))[-1] != batch.t[-1]
 
     def test_contact_holds_the_arm_where_the_object_is(self):
         # A rigid, fixed object: the skin's point at the contact does not go on along the push.
         batch = run(make(one_object(width_m=0.05)))
-        state = batch.state
-        held = poses(Chain.cody(), batch.joints[0].T)
-        point = held.origin + held.rotation[:, 2] * state.z[0]
-        along = ((point - state.trial.face[:1].T) * state.trial.normal[:1].T).sum(axis=0) + RADIUS
+        t = batch.trials
+        held = t.kinematics.pose(batch.joints[0].T)
+        point = held.origin + held.rotation[2] * t.z[0]
+        along = ((point - t.face[:, :1]) * t.normal[:, :1]).sum(axis=0) + RADIUS
         touched = np.flatnonzero(batch.force[0] > 0.0)
         assert np.abs(along[touched]).max() < 2e-3
-        one = copy(state)
-        one.start = state.start[:, :1]
-        free = poses(Chain.cody(), base.equilibrium(one, batch.t[-1]))
-        gone = free.origin[:, 0] + free.rotation[:, 2, 0] * state.z[0]
-        assert (gone - state.trial.face[0]) @ state.trial.normal[0] + RADIUS > 0.12
+        free = t.kinematics.pose(t.equilibrium(batch.t[-1]))
+        gone = free.origin[:, 0] + free.rotation[2, :, 0] * t.z[0]
+        assert (gone - t.face[:, 0]) @ t.normal[:, 0] + RADIUS > 0.12
 
 
 class TestSliding:
@@ -180,7 +171,7 @@ class TestSliding:
                 width_m=0.05,
             )
             batch = run(make(thing))
-            assert bool(batch.state.of(TIPPING).tips[0]) is tips
+            assert bool(batch.trials.own["tipping"].tips[0]) is tips
             start = int(np.argmax(batch.traces["slide_m"][0] > 0.0))
             hold = min(mu, 0.36 / (2 * height)) * GRAVITY
             assert batch.force[0, start - 1] <= hold
@@ -219,27 +210,27 @@ class TestInertia:
 
     def oracle(self, batch, loss_s):
         """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never pulling."""
-        state, rate = batch.state, math.radians(30.0)
-        slopes, intercepts = state.arrays["slopes"][0], state.arrays["intercepts"][0]
+        t, rate = batch.trials, math.radians(30.0)
+        slopes, intercepts = t.slopes[:, 0], t.intercepts[:, 0]
 
         def contact_at(q, speed):
-            pose = poses(state.scene.arm, np.array([[q]]))
-            axis = pose.origin[:, 0] + pose.rotation[:, 2, 0] * state.z[0]
-            normal = state.trial.normal[0]
-            depth = (axis - state.trial.face[0]) @ normal + RADIUS
+            pose = t.kinematics.pose(np.array([[q]]))
+            axis = pose.origin[:, 0] + pose.rotation[2, :, 0] * t.z[0]
+            normal = t.normal[:, 0]
+            depth = (axis - t.face[:, 0]) @ normal + RADIUS
             lever = np.cross(pose.axes[:, 0, 0], axis) @ normal
             elastic = max((slopes * depth - intercepts).max(), 0.0)
             stiffness = slopes[np.argmax(slopes * depth - intercepts)] if elastic > 0.0 else 0.0
             return max(elastic + loss_s * stiffness * lever * speed, 0.0), lever
 
-        def rates(t, y):
+        def rates(time, y):
             force, lever = contact_at(*y)
-            torque = self.STIFFNESS * (rate * t - y[0]) - self.DAMPING * y[1] - lever * force
+            torque = self.STIFFNESS * (rate * time - y[0]) - self.DAMPING * y[1] - lever * force
             return [y[1], torque / self.INERTIA]
 
         start = [-self.DAMPING / self.STIFFNESS * rate, rate]
         found = solve_ivp(rates, (0, 0.6), start, max_step=2e-4, rtol=1e-8, dense_output=True)
-        return np.array([contact_at(*found.sol(t))[0] for t in batch.t[:60]])
+        return np.array([contact_at(*found.sol(time))[0] for time in batch.t[:60]])
 
     @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
     def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
@@ -253,10 +244,9 @@ class TestInertia:
 
     def test_a_hit_has_short_steps_of_its_own(self, tmp_path):
         scene, h, loss_s = self.scene(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
-        kind, trials = next(iter(kinds(scene).items()))
-        plan = make_plan(scene, kind.effects)
-        plans = plan, replace(plan, pace=())
-        paced, plain = (run_batch(scene, tuple(trials), h, plan=one) for one in plans)
+        plan = make_plan(scene, specs_of(scene))
+        plans = plan, replace(plan, stages={**plan.stages, "pace": []})
+        paced, plain = (run(scene, h, plan=one) for one in plans)
         want = self.oracle(paced, loss_s)
         hit = slice(0, int(np.argmax(want)) + 4)
         apart = [np.abs(b.force[0, hit] - want[hit]).max() / want.max() for b in (paced, plain)]
@@ -265,25 +255,21 @@ class TestInertia:
         # It bounces, as it does by the equations.
         assert (paced.force[0, hit.stop : hit.stop + 3] == 0.0).all()
 
-    def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path):
+    def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path, monkeypatch):
         scene = self.scene(tmp_path, 0.01, loss_s=0.02)
-        kind, trials = next(iter(kinds(scene).items()))
-        plan = make_plan(scene, kind.effects)
-        state = begin(scene, plan, tuple(trials), 0.01, values_of(scene, tuple(trials)))
-        pace, tune, frame, step, sample = (plan.addresses(stage) for stage in RUN_STAGES)
-        steps, force = [], []
-        for _ in range(60):
-            set_paces(state.records, pace, tune)
-            steps.append(int(state.trial.steps[0]))
-            assert state.trial.h[0] == 0.01 / steps[-1]
-            for functions in (frame, *steps[-1] * [step], sample):
-                each(functions, state.trial.here)
-            force.append(state.trial.force[0])
-        hit = int(np.argmax(np.array(force) > 0.0))
+        steps, start_frames = [], engine.start_frames
+
+        def watched(t, starts):
+            start_frames(t, starts)
+            steps.append(int(t.steps[0]))
+            assert t.h[0] == 0.01 / steps[-1]
+
+        monkeypatch.setattr(engine, "start_frames", watched)
+        hit = int(np.argmax(run(scene).force[0, 1:] > 0.0))
         assert set(steps) == {1, FINER}
         assert set(steps[: hit - 2]) == {1}
         assert set(steps[hit : hit + 3]) == {FINER}
-        assert set(steps[hit + 15 :]) == {1}
+        assert set(steps[hit + 15 : 60]) == {1}
 
     def test_less_loss_bounces_longer(self, tmp_path):
         aloft = []
@@ -294,11 +280,6 @@ class TestInertia:
         assert aloft[1] == 0
 
 
-def pose_of(state, q):
-    """Of the arms at joint angles (n, 16)."""
-    return poses(state.scene.arm, q[:, : state.scene.arm.dof].T)
-
-
 class TestFriction:
     def test_a_sliding_skin_bears_less_by_the_arms_compliance(self):
         # Quasi-static and stiff: a = c_nn F + c_nt T with T = mu F, so F falls by
@@ -306,69 +287,67 @@ class TestFriction:
         mu = 0.4
         plain = run(make(one_object(width_m=0.05)))
         held = run(make(one_object(width_m=0.05, skin_friction=mu)))
-        shear = held.state.of(SHEAR)
+        shear = held.trials.own["friction"]
         force = held.force[0, -1]
         assert abs(shear.pull[0]) == pytest.approx(mu * force, rel=0.02)
-        c_nn, c_nt = held.state.trial.compliance[0, 0], shear.coupled[0, 0]
+        c_nn, c_nt = held.trials.compliance[0, 0], shear.coupled[0, 0]
         want = plain.force[0, -1] * c_nn / (c_nn + mu * np.sign(shear.pull[0]) * c_nt)
         assert force == pytest.approx(want, rel=0.05)
         assert force < 0.95 * plain.force[0, -1]
 
     def test_a_face_that_sticks_holds_the_skin_where_it_touched(self):
         held = run(make(one_object(width_m=0.05, skin_friction=5.0)))
-        shear = held.state.of(SHEAR)
+        shear = held.trials.own["friction"]
         assert abs(shear.pull[0]) < 5.0 * held.force[0, -1]
         # What the skin has moved along the face is the stretch of its own spring.
         assert abs(shear.stretch[0]) == pytest.approx(abs(shear.pull[0]) / 1e4, rel=0.05)
 
     def test_the_skin_moves_along_the_face_as_its_jacobian_says(self):
-        state = run(make(one_object(width_m=0.05, skin_friction=0.4))).state
-        t, along = state.trial, state.trial.along_face.T
-        skin = (t.point + RADIUS * t.normal - t.origin).T
-        local = np.einsum("ikn,in->kn", pose_of(state, t.q_frame).rotation, skin)
+        t = run(make(one_object(width_m=0.05, skin_friction=0.4))).trials
+        pose = t.kinematics.pose(t.q_frame)
+        local = np.einsum("kin,in->kn", pose.rotation, t.point + RADIUS * t.normal - pose.origin)
         for j in range(4):
             moved = []
             for turned in (-1e-6, 1e-6):
-                pose = pose_of(state, t.q_frame + turned * np.eye(16)[j])
-                point = pose.origin + np.einsum("ikn,kn->in", pose.rotation, local)
-                moved.append((point * along).sum(axis=0))
-            want = state.of(SHEAR).jacobian[:, j]
+                pose = t.kinematics.pose(t.q_frame + turned * np.eye(5)[j][:, None])
+                point = pose.origin + np.einsum("kin,kn->in", pose.rotation, local)
+                moved.append((point * t.along_face).sum(axis=0))
+            want = t.own["friction"].jacobian[j]
             np.testing.assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
 
     def test_a_face_that_sticks_pulls_as_the_skin_is_stretched_when_all_is_at_rest(self):
         stuck = make(one_object(width_m=0.05, skin_friction=5.0), "tilt", after_s=4.0)
-        shear = run(replace(stuck, travel_s=0.6)).state.of(SHEAR)
+        shear = run(replace(stuck, travel_s=0.6)).trials.own["friction"]
         assert (np.abs(shear.pull) > 0.5).all()
         np.testing.assert_allclose(1e4 * shear.stretch, shear.pull, rtol=1e-3)
 
     def test_what_is_soft_and_smooth_presses_along_the_forearms_own_normal(self):
         foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
-        t = (state := run(make(foam, "tilt")).state).trial
-        push = t.loads[:, 0] * t.normal.T + state.of(SHEAR).pull * t.along_face.T
-        forearm = t.rotation[:, :, 2].T
-        askew = (t.normal.T * forearm).sum(axis=0)
+        t = run(make(foam, "tilt")).trials
+        push = t.loads[0] * t.normal + t.own["friction"].pull * t.along_face
+        forearm = t.kinematics.pose(t.q_frame).rotation[2]
+        askew = (t.normal * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
-        np.testing.assert_allclose((push * forearm).sum(axis=0) / t.loads[:, 0], 0.0, atol=0.01)
+        np.testing.assert_allclose((push * forearm).sum(axis=0) / t.loads[0], 0.0, atol=0.01)
 
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
-        state, t = batch.state, batch.state.trial
-        push = t.loads[:, 0] * t.normal.T + state.of(SHEAR).pull * t.along_face.T
-        forearm = pose_of(state, t.q).rotation[:, 2]
-        own = t.normal.T - forearm * (t.normal.T * forearm).sum(axis=0)
+        t = batch.trials
+        push = t.loads[0] * t.normal + t.own["friction"].pull * t.along_face
+        forearm = t.kinematics.pose(t.q).rotation[2]
+        own = t.normal - forearm * (t.normal * forearm).sum(axis=0)
         own /= np.sqrt((own * own).sum(axis=0))
         np.testing.assert_allclose(batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3)
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         box = {"mass_kg": 0.05, "friction_static": 0.5, "friction_kinetic": 0.5, "width_m": 0.2}
         held = run(make(one_object(conditions=["movable"], skin_friction=0.5, **box)))
-        shear, mover = held.state.of(SHEAR), held.state.of(MOVER)
-        weigh = np.array([friction.weigh.address])
-        shear.pull = 5.0 / held.state.trial.along_face[:, 2]
-        each(weigh, held.state.trial.here)
+        shear, mover = held.trials.own["friction"], held.trials.own["sliding"]
+        shear.pull = 5.0 / held.trials.along_face[2]
+        friction.drag(held.trials, ALL)
         assert mover.weight.tolist() == [0.0, 0.0]
         shear.pull = -shear.pull
-        each(weigh, held.state.trial.here)
+        friction.drag(held.trials, ALL)
         np.testing.assert_allclose(mover.weight, 0.05 * GRAVITY + 5.0)
 
     def test_the_shear_presses_a_pushed_box_to_the_floor(self):
@@ -378,48 +357,47 @@ class TestFriction:
             for more in ({}, {"skin_friction": 0.5})
         )
         assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
-        shear, mover = held.state.of(SHEAR), held.state.of(MOVER)
+        shear, mover = held.trials.own["friction"], held.trials.own["sliding"]
         assert mover.weight[0] == pytest.approx(
-            GRAVITY - shear.pull[0] * held.state.trial.along_face[0, 2], rel=0.01
+            GRAVITY - shear.pull[0] * held.trials.along_face[2, 0], rel=0.01
         )
         assert held.force[0].max() > 1.2 * plain.force[0].max()
 
 
 class TestTilt:
     def test_depth_and_tilt_follow_the_joints_as_their_jacobians_say(self):
-        state = run(make(one_object(width_m=0.05), "tilt")).state
-        t, lever, pivot = state.trial, state.arrays["lever"], np.array([tilt.pivot.address])
-        each(pivot, t.here)
-        before, jacobian, middle = t.y_frame.copy(), t.jacobian.copy(), lever[:, 0].copy()
+        t = run(make(one_object(width_m=0.05), "tilt")).trials
+        tilt.locate(t, ALL)
+        before, jacobian = t.y_frame.copy(), t.jacobian.copy()
+        middle = t.own["tilt"].lever[0].copy()
         for j in range(4):
-            t.q[:, j] += 1e-6
-            each(pivot, t.here)
+            t.q[j] += 1e-6
+            tilt.locate(t, ALL)
             # The point of the forearm that is looked at moves along it; the Jacobian's does not.
             moved = t.y_frame - before
-            moved[:, 0] -= before[:, 1] * (middle - lever[:, 0])
-            np.testing.assert_allclose(moved / 1e-6, jacobian[:, :, j], atol=2e-5)
-            t.q[:, j] -= 1e-6
+            moved[0] -= before[1] * (middle - t.own["tilt"].lever[0])
+            np.testing.assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
+            t.q[j] -= 1e-6
 
     def test_what_has_been_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
         box = {"mass_kg": 0.3, "friction_static": 0.3, "friction_kinetic": 0.25, "width_m": 2.0}
         batch = run(make(one_object(conditions=["movable"], skin_friction=0.3, **box), "tilt"))
-        lever = batch.state.arrays["lever"]
+        lever = batch.trials.own["tilt"].lever
         assert (batch.traces["slide_m"][:, -1] > 0.2).all()
-        assert (lever[:, 0] == 0.0).all()  # as near to it as a row is
+        assert (lever[0] == 0.0).all()  # as near to it as a row is
 
     def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
         scene = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
-        t = run(scene, 0.0025).state.trial
-        turned = t.q - t.q_frame
-        moved = (t.jacobian * turned[:, None]).sum(axis=2)
+        t = run(scene, 0.0025).trials
+        moved = (t.jacobian * (t.q - t.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()
         np.testing.assert_allclose(t.depth, t.y_frame + moved, rtol=0.0, atol=1e-13)
 
     def test_the_skin_bears_what_goes_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05), "tilt"))
-        askew = batch.state.trial.depth[:, 1]
+        askew = batch.trials.depth[1]
         assert (np.abs(askew) > 0.1).all()
-        want = batch.state.trial.loads[:, 0] * np.cos(np.arcsin(askew))
+        want = batch.trials.loads[0] * np.cos(np.arcsin(askew))
         np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-12)
 
     def test_leaving_tilt_out_costs_a_part_of_a_fixed_boxs_force(self):

@@ -12,7 +12,7 @@ from train.crossval import leave_one_out
 from train.dataset import load_trials
 from train.simulate import scene as scenes
 from train.simulate.convergence import measure
-from train.simulate.run import kinds, steps, total_trials, write
+from train.simulate.run import kinds, total_trials, write
 from train.study.paper import difference
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
@@ -87,7 +87,6 @@ def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     # Three kinds stand for all here; --explain measures every one. The arm's inertia is left
     # out: how things bounce is another at each step.
     cody18 = replace(cody18, add=tuple(name for name in cody18.add if name != "inertia"))
-    step = steps(cody18)
-    for kind, trials in list(kinds(cody18).items())[2:10:3]:
-        found = measure(cody18, tuple(trials))
-        assert found.errors[found.steps_s.index(step[kind])] < 0.015
+    some = list(kinds(cody18).values())[2:10:3]
+    for specs, found in zip(some, measure(cody18, some), strict=True):
+        assert found.errors[found.steps_s.index(specs[0].step_s)] < 0.015

@@ -7,12 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from train.simulate.compiled import each
-from train.simulate.effects import stribeck
-from train.simulate.effects.tipping import TIPPING, topple
-from train.simulate.engine import run_batch
-from train.simulate.motion import GRAVITY, MOVER
-from train.simulate.run import kinds
+from tests.train.simulate.scenes import run
+from train.simulate.contact import GRAVITY
+from train.simulate.effects import sliding, stribeck, tipping
+from train.simulate.plan import ALL
 from train.simulate.scene import from_dict
 
 MU, MASS = 0.4, 1.0
@@ -38,7 +36,7 @@ def push(step_s=0.0025, **keys):
             "object": [box],
         }
     )
-    return run_batch(scene, tuple(next(iter(kinds(scene).values()))), step_s)
+    return run(scene, step_s)
 
 
 class TestTurning:
@@ -69,7 +67,7 @@ class TestTurning:
         aside, radius = 0.06, 0.12
         felt = 1.0 / (1.0 / MASS + aside**2 / (0.5 * MASS * radius**2))
         batch = push(aside_m=aside, foot_m=2.0 * radius)
-        assert batch.state.of(MOVER).inertia[0] == pytest.approx(felt, rel=1e-12)
+        assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
 
     def test_in_the_middle_it_is_as_if_it_could_not_turn(self):
         assert push(aside_m=0.0, foot_m=0.2).counts.tobytes() == push().counts.tobytes()
@@ -90,11 +88,12 @@ class TestSlope:
         assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.1)
 
     def test_friction_falls_with_the_square_of_the_speed(self):
-        state = push(friction_static=0.6, friction_kinetic=0.2, stribeck_m_s=0.05).state
-        mover = state.of(MOVER)
-        mover.speed = 0.1
-        each(np.array([stribeck.ease.address]), state.trial.here)
-        assert mover.kinetic[0] == pytest.approx(0.2 + 0.4 * math.exp(-4.0), rel=1e-12)
+        t = push(friction_static=0.6, friction_kinetic=0.2, stribeck_m_s=0.05).trials
+        mover = t.own["sliding"]
+        mover.speed[:] = 0.1
+        stribeck.drag(t, ALL)
+        friction = 0.2 + 0.4 * math.exp(-4.0)
+        assert mover.resist[0] == pytest.approx(friction * MASS * GRAVITY, rel=1e-12)
 
 
 class TestToppling:
@@ -102,13 +101,13 @@ class TestToppling:
         # m (b^2 + (2 h)^2) / 3 about an edge, felt at the height h.
         batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
         felt = 0.8 * (0.08**2 + 0.8**2) / 3.0 / 0.4**2
-        assert batch.state.of(MOVER).inertia[0] == pytest.approx(felt, rel=1e-12)
+        assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
 
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as it is.
         batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
-        own, mover = batch.state.of(TIPPING), batch.state.of(MOVER)
-        travel, lies = own.travel[0], own.lies[0]
+        own, mover = batch.trials.own["tipping"], batch.trials.own["sliding"]
+        travel, lies = own.travel[0], mover.lies[0]
         slide, force = batch.traces["slide_m"][0], batch.force[0]
         speed = np.gradient(slide, batch.t)
         free = (slide > 1.2 * travel) & (slide < 0.8 * lies) & (force == 0.0)
@@ -127,9 +126,10 @@ class TestToppling:
         assert (slide[np.argmax(fallen) :] == lies).all()
 
     def test_let_go_it_falls_back_onto_its_foot(self):
-        state = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4).state
-        mover = state.of(MOVER)
-        mover.slide, mover.speed, state.trial.y = 1e-6, 0.0, -0.1
-        each(np.array([topple.address]), state.trial.here)
+        t = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4).trials
+        mover = t.own["sliding"]
+        mover.slide[:], mover.speed[:], t.y[:] = 1e-6, 0.0, -0.1
+        tipping.drag(t, ALL)
+        sliding.press(t, ALL)
         assert (mover.slide.tolist(), mover.speed.tolist()) == ([0.0], [0.0])
-        assert (state.trial.loads == 0.0).all()
+        assert (t.loads == 0.0).all()

@@ -11,7 +11,6 @@ import pytest
 from edge.errors import InputError
 from edge.recording import load
 from train.__main__ import main
-from train.simulate import compiled
 from train.simulate import scene as scenes
 from train.simulate.run import (
     parts,
@@ -139,12 +138,6 @@ class TestCommand:
         assert "8/8" in err
         assert len(list(tmp_path.iterdir())) == 8
 
-    @pytest.mark.parametrize("fresh", [True, False])
-    def test_what_compiles_first_says_so(self, tmp_path, capsys, monkeypatch, fresh):
-        monkeypatch.setattr(compiled, "is_fresh", lambda function: fresh)
-        assert main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)]) == 0
-        assert ("compiling the simulator" in capsys.readouterr().err) is fresh
-
     def test_explain_tells_what_runs_why_and_at_what_cost(self, tmp_path, capsys):
         path = tmp_path / "one.toml"
         path.write_text(
@@ -239,13 +232,12 @@ def test_a_touch_whose_peak_is_the_onset_is_not_felt(demo):
     """A contact begins above it (`edge.touch.track`)."""
     from dataclasses import replace
 
-    trials, step_s = parts(demo)[0]
-    one = trials[:1]
-    ((_, trial),) = simulate_trials(demo, one, step_s)
+    one = parts(demo)[0][:1]
+    ((_, trial),) = simulate_trials(demo, one)
     peak = int(trial.frames.max())
     for onset, felt in ((peak - 1, True), (peak, False)):
         scene = replace(demo, skin=replace(demo.skin, onset_counts=onset))
-        assert [made.felt for made in simulate_part(scene, one, step_s, None)] == [felt]
+        assert [made.felt for made in simulate_part(scene, one, None)] == [felt]
 
 
 def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from edge.errors import InputError
 from edge.touch.arm import Chain
 from train.simulate import scene as scenes
-from train.simulate.arm import JOINTS
 from train.simulate.run import simulate
 from train.simulate.scene import CODY_DAMPING, CODY_STIFFNESS, from_dict
 from train.simulate.schema import EFFECTS
@@ -315,8 +314,8 @@ def test_an_arm_that_slides_is_refused(tmp_path):
         from_dict({**GOOD, "arm": arm}, str(tmp_path / "scene.toml"))
 
 
-@pytest.mark.parametrize("dof", [JOINTS, JOINTS + 1])
-def test_an_arm_of_more_joints_than_a_trials_record_has_room_for_is_refused(tmp_path, dof):
+def test_an_arm_may_have_many_joints(tmp_path):
+    dof = 17
     joints = "".join(
         f'[[joint]]\nname = "j{i}"\ntype = "revolute"\naxis = [0.0, 0.0, 1.0]\n'
         f"translate = [{0.02 * (i > 0)}, 0.0, 0.0]\n"
@@ -325,16 +324,10 @@ def test_an_arm_of_more_joints_than_a_trials_record_has_room_for_is_refused(tmp_
     (tmp_path / "arm.toml").write_text(f'base = "a"\ntip = "b"\n{joints}')
     gains = {"stiffness_nm_rad": [30.0] * dof, "damping_nms_rad": [0.5] * dof}
     motion = {"start_deg": [0.0] * dof, "rate_deg_s": [20.0, *[0.0] * (dof - 1)]}
-    arm = {"chain": "arm.toml", **gains}
     box = {"name": "box", "family": "rigid", "conditions": ["fixed"], "width_m": 0.03}
-    table = {"step_s": {"base": 0.01}, "arm": arm, "motion": motion, "object": [box]}
-    where = str(tmp_path / "scene.toml")
-    if dof <= JOINTS:
-        _, trial = next(simulate(from_dict(table, where)))
-        assert trial.joints.shape[1] == dof
-        return
-    with pytest.raises(InputError, match=r"arm\.chain: the arm has 17 joints .* at most 16"):
-        from_dict(table, where)
+    table = {"step_s": {"base": 0.01}, "arm": {"chain": "arm.toml", **gains}, "motion": motion}
+    _, trial = next(simulate(from_dict({**table, "object": [box]}, str(tmp_path / "scene.toml"))))
+    assert trial.joints.shape[1] == dof
 
 
 def test_an_arm_may_come_from_a_urdf(tmp_path):

@@ -11,10 +11,9 @@ from scipy.linalg import solve, toeplitz
 
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import contact
-from train.simulate.compiled import each
 from train.simulate.effects import cover, lateral
-from train.simulate.reader import Value
-from train.simulate.viscous import VISCOUS
+from train.simulate.plan import ALL
+from train.simulate.scene_model import Value
 
 RADIUS = 0.04604
 
@@ -43,7 +42,7 @@ class TestRelaxation:
         rng = np.random.default_rng(8)
         gaps = np.sort(rng.uniform(0.0, 0.02, (6, 40)), axis=0)
         gaps[0] = 0.0
-        _, gaps, slopes, intercepts = contact.sort_bed(gaps, np.full((6, 40), 300.0))
+        slopes, intercepts = contact.bed_law(gaps, np.full((6, 40), 300.0))
         rig = tools.Rig(
             h=0.01,
             arm_k=1e12,
@@ -64,7 +63,7 @@ class TestRelaxation:
         least = np.zeros(40)
         before = force = np.zeros(40)
         for place in np.vstack([np.linspace(0.0, 0.005, 50)[:, None] + np.zeros(40), depth]):
-            rig.state.trial.start[:, 0] = place
+            rig.trials.start[0] = place
             now = rig.run(1).force[0]
             assert (now >= 0.0).all()
             taken += 0.5 * (force + now) * (place - before)
@@ -85,8 +84,8 @@ class TestBed:
         stiffness = np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
         gaps = RADIUS * (1.0 - np.cos(away))
         gap = contact.curve_gap(z, curve or 1e6)
-        depths, loads = (depth - gap)[:, 0], np.zeros((rows, columns))
-        contact.spring_loads(depths, gaps, stiffness, np.ones(rows), loads)
+        springs = gaps[:, None], stiffness[:, None]
+        loads = contact.spring_loads(depth - gap, *springs, np.ones((rows, 1)))
         return loads.sum(), (loads > 0.0).sum() * pitch * row_pitch, rows * row_pitch
 
     @staticmethod
@@ -130,8 +129,8 @@ class TestBed:
             k = 2.0 ** rng.integers(-3, 30, 5)
             c = float(2.0 ** rng.integers(-12, 2))
             free = float(rng.integers(1, furthest)) / 1024.0
-            _, *law = contact.sort_bed(gaps[:, None], k[:, None])
-            force = contact.closed_form(*(part[:, 0] for part in law), free, c)
+            law = contact.bed_law(gaps[:, None], k[:, None])
+            force = contact.closed_form(gaps[:, None], *law, np.array([free]), np.array([c]))[0]
             best = Fraction(0)
             total_k = total_b = Fraction(0)
             for g, s in zip(gaps, k, strict=True):
@@ -183,7 +182,7 @@ class TestLateral:
         widths = np.array([layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)])
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
-        length = batch.state.skin.row_pitch_m * batch.state.arrays["weight"][0].sum()
+        length = batch.trials.skin.row_pitch_m * batch.trials.weight[:, 0].sum()
         assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
 
 
@@ -205,7 +204,7 @@ class TestAskew:
         covered, begins, ends = np.ones(4), np.array([0.0, 1, 1, 1]), np.array([1.0, 1, 1, 0])
 
         def askew(depth, weight):
-            return [lateral.askew_at(depth, weight, row, 0.5) for row in range(4)]
+            return lateral.askew(depth[:, None], weight[:, None], 0.5)[:, 0].tolist()
 
         assert askew(rising, covered) == askew(falling, covered) == [0.0] * 4
         assert (askew(rising, begins), askew(falling, begins)) == ([0.0] * 4, [0.0, 2.0, 0.0, 0.0])
@@ -221,19 +220,19 @@ class TestAskew:
     )
     def test_rows_bear_what_an_elastic_block_gives_them(self, degrees, force, depth_mm, peak, rows):
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
-        state = run(make(foam)).state
-        slope, pitch = np.tan(np.radians(degrees)), state.skin.row_pitch_m
+        t = run(make(foam)).trials
+        slope, pitch = np.tan(np.radians(degrees)), t.skin.row_pitch_m
         # The face covers the skin's rows but the first and the last.
         depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
-        state.arrays["weight"][:] = np.pad(np.ones(14), 1)
-        state.arrays["line_depth"][:], state.trial.force = depth, force
+        t.weight[:], t.line_depth[:] = np.pad(np.ones(14), 1)[:, None], depth[:, None]
+        t.force[:] = force
         # Half a column from the nearest on either side, as in the block's sum over taxels.
-        away = (np.arange(len(state.columns)) - len(state.columns) // 2 + 0.5) * 0.26166
-        radius = state.skin.radius_m
+        away = (np.arange(len(t.columns)) - len(t.columns) // 2 + 0.5) * 0.26166
+        radius = t.skin.radius_m
         gaps = lateral.touched_at(radius * (1.0 - np.cos(away)), radius, 0.1)
-        state.arrays["column_gaps"][:], state.of(lateral.LATERAL).nearest = gaps, gaps.min()
-        each(np.array([lateral.image.address]), state.trial.here)
-        image = state.arrays["image"][0]
+        t.column_gaps[:], t.own["lateral"].nearest[:] = gaps[:, None], gaps.min()
+        lateral.image(t, ALL)
+        image = t.image[..., 0]
         found = image.sum(axis=1)[1:7]
         assert found.sum() == pytest.approx(sum(rows), rel=0.06)
         assert found == pytest.approx(rows, abs=0.16 * max(rows))
@@ -253,7 +252,7 @@ def test_foam_pressed_flat_is_as_hard_as_the_skin():
 
 def test_a_sleeve_is_in_series_with_the_skin():
     covered = run(make(one_object(cover_n_m=2500.0)))
-    np.testing.assert_allclose(covered.state.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
+    np.testing.assert_allclose(covered.trials.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
 
 
 def test_a_sleeve_spreads_the_load_and_loses_none():
@@ -268,11 +267,11 @@ def test_a_sleeve_spreads_the_load_and_loses_none():
 
 
 def test_a_sleeve_gives_each_of_four_neighbours_its_part():
-    state = run(make(one_object(cover_n_m=2500.0, cover_spread=0.1))).state
-    image = state.arrays["image"][0]
-    image[:] = 0.0
-    image[5, 3] = 1.0
-    each(np.array([cover.spread.address]), state.trial.here[:1])
+    t = run(make(one_object(cover_n_m=2500.0, cover_spread=0.1))).trials
+    t.image[:] = 0.0
+    t.image[5, 3] = 1.0
+    cover.pass_on(t, ALL)
+    image = t.image[..., 0]
     want = np.zeros_like(image)
     want[5, 3], want[[4, 6], 3], want[5, [2, 4]] = 0.6, 0.1, 0.1
     np.testing.assert_allclose(image, want, atol=1e-15)
@@ -289,9 +288,10 @@ class TestBubbles:
     @pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
     def test_they_stiffen_by_the_gas_law(self, part):
         # f = k0 d / (1 - d / b), touched by its tangents at b / 2 and 3 b / 4.
-        bed, columns = (batch := self.wrap(pop_n=1e6)).state.bed, len(batch.state.reach)
-        one = slice(columns // 2, None, columns)  # of the middle column
-        touched, stiffness = bed.gaps[one, 0][:3], bed.stiffness[one, 0][:3]
+        t = self.wrap(pop_n=1e6).trials
+        bed, columns = t.own["pop"], len(t.reach)
+        middle = slice(columns // 2, None, columns)
+        touched, stiffness = bed.gaps[middle, 0][:3], bed.stiffness[middle, 0][:3]
         depth = part * self.HEIGHT
         force = (np.maximum(touched[0] + depth - touched, 0.0) * stiffness).sum()
         want = self.STIFFNESS * depth / (1.0 - part)
@@ -299,8 +299,8 @@ class TestBubbles:
 
     def test_burst_ones_leave_their_backing(self):
         batch = self.wrap(pop_n=0.5)
-        alive = batch.state.arrays["alive"]
-        alive = np.moveaxis(alive.reshape(*alive.shape[:2], 4, -1), 2, 0)
+        alive = batch.trials.own["pop"].alive
+        alive = alive.reshape(4, -1, *alive.shape[1:])
         burst = alive[3] == 1.0
         assert burst.any()
         assert not burst.all()
@@ -310,37 +310,37 @@ class TestBubbles:
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
 
     def test_the_bed_s_law_is_of_the_springs_that_are_left(self):
-        state = self.wrap(pop_n=0.5, width_m=0.05).state
-        alive, weight = state.arrays["alive"][0], state.arrays["weight"][0]
+        t = self.wrap(pop_n=0.5, width_m=0.05).trials
+        bubbles, weight = t.own["pop"], t.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
-        left = weight[:, None] * alive * state.arrays["stiffness"][0]
-        law = [state.arrays[name][0, -1] for name in ("slopes", "intercepts")]
-        want = [left.sum(), (left * state.arrays["gaps"][0]).sum()]
+        left = weight * bubbles.alive[..., 0] * bubbles.stiffness[:, :1]
+        law = [t.slopes[-1, 0], t.intercepts[-1, 0]]
+        gaps = t.line_gap[:, 0] + bubbles.gaps[:, :1]
+        want = [left.sum(), (left * gaps).sum()]
         assert law == pytest.approx(want, rel=1e-12)
 
 
 def test_stems_bent_too_far_have_slipped_off():
     batch = run(make(one_object(family="foliage", stem_slip_m=0.03, stem_spread_m=0.5)))
-    weight, line_gap = batch.state.arrays["weight"], batch.state.arrays["line_gap"]
-    bent = batch.state.trial.depth[:, :1] - line_gap
+    stems = batch.trials.own["stems"]
+    bent = batch.trials.depth[0] - stems.depth
     assert (bent > 0.03).any()
-    assert (weight[bent > 0.03] == 0.0).all()
-    assert (weight[bent <= 0.03] > 0.0).any()
+    assert (stems.stiffness[bent > 0.03] == 0.0).all()
+    assert (stems.stiffness[bent <= 0.03] > 0.0).any()
 
 
 def test_the_stems_that_are_held_bear_by_their_own_bends():
     keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
     batch = run(make(one_object(family="foliage", **keys)))
-    weight, line_gap = batch.state.arrays["weight"], batch.state.arrays["line_gap"]
-    assert (weight == 0.0).any()
-    bent = np.maximum(batch.state.trial.depth[:, :1] - line_gap, 0.0)
-    want = (weight * 15.0 * bent).sum(axis=1)
+    stems = batch.trials.own["stems"]
+    assert (stems.stiffness == 0.0).any()
+    bent = np.maximum(batch.trials.depth[0] - stems.depth, 0.0)
+    want = (stems.stiffness * bent).sum(axis=0)
     assert (want > 0.1).all()
     np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-9)
     # Between two rows, each stem's load is nearer to the one that it stands nearer to.
-    arrays, columns = batch.state.arrays, batch.state.columns.shape[0]
-    row = arrays["stem_taxel"] // columns + arrays["stem_part"]
-    middle = (row * weight * bent).sum(axis=1) / (weight * bent).sum(axis=1)
+    row = stems.taxel // len(batch.trials.columns) + stems.part
+    middle = (row * stems.stiffness * bent).sum(axis=0) / want
     seen = batch.counts[:, -1].sum(axis=2, dtype=float)
     found = (seen * np.arange(16)).sum(axis=1) / seen.sum(axis=1)
     np.testing.assert_allclose(found, middle, atol=0.01)
@@ -350,37 +350,33 @@ def test_stems_that_have_slipped_off_damp_no_more():
     keys = {"stem_slip_m": 0.02, "stem_spread_m": 0.02, "stem_damping": 1.0}
     batch = run(make(one_object(family="foliage", **keys)))
     assert (batch.force.max(axis=1) > 0.5).all()
-    assert (batch.state.arrays["weight"] == 0.0).all()
+    assert (batch.trials.own["stems"].stiffness == 0.0).all()
     assert (batch.force[:, -1] == 0.0).all()
 
 
 def test_no_row_that_the_face_does_not_cover_is_the_deepest():
     keys = {"family": "bubbles", "pop_n": 1e6, "bubble_n_m": 300.0, "bubble_m": 0.05}
     batch = run(make(one_object(width_m=0.02, **keys), "tilt"))
-    arrays = batch.state.arrays
-    covered, depth = arrays["weight"] > 0.0, arrays["line_depth"]
-    assert (np.where(covered, depth, 0.0).max(axis=1) < depth.max(axis=1)).all()
-    want = np.where(covered, depth, 0.0).max(axis=1)
+    covered, depth = batch.trials.weight > 0.0, batch.trials.line_depth
+    want = np.where(covered, depth, 0.0).max(axis=0)
+    assert (want < depth.max(axis=0)).all()
     np.testing.assert_array_equal(batch.traces["depth_m"][:, -1], want)
 
 
 def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
-    state = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).state
-    arrays, ratio = state.arrays, state.of(VISCOUS).ratio[:, None]
-    inside = np.maximum(arrays["line_depth"][:, :, None] - arrays["gaps"][:, None], 0.0)
-    elastic = arrays["weight"] * (inside * arrays["stiffness"][:, None]).sum(axis=2)
-    assert (np.ptp(elastic, axis=1) > 0.1).all()
-    np.testing.assert_allclose(arrays["out"], elastic, atol=1e-3)
-    np.testing.assert_allclose(arrays["viscous_given"], ratio * elastic, atol=1e-3)
+    t = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).trials
+    viscous = t.own["viscous"]
+    elastic = contact.spring_loads(t.line_depth, t.gaps, t.stiffness, t.weight).sum(axis=0)
+    assert (np.ptp(elastic, axis=0) > 0.1).all()
+    np.testing.assert_allclose(t.row_force, elastic, atol=1e-3)
+    np.testing.assert_allclose(viscous.given, viscous.ratio * elastic, atol=1e-3)
 
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_what_they_are_pressed():
     wrap = make(one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0)
-    batch = run(replace(wrap, travel_s=0.6))
-    arrays = batch.state.arrays
-    assert (np.ptp(arrays["alive"].sum(axis=2), axis=1) > 0.0).all()
-    inside = np.maximum(arrays["line_depth"][:, :, None] - arrays["gaps"][:, None], 0.0)
-    springs = inside * arrays["alive"] * arrays["stiffness"][:, None]
-    want = arrays["weight"] * springs.sum(axis=2)
-    np.testing.assert_allclose(arrays["out"], want, atol=1e-6)
+    t = run(replace(wrap, travel_s=0.6)).trials
+    bubbles = t.own["pop"]
+    assert (np.ptp(bubbles.alive.sum(axis=0), axis=0) > 0.0).all()
+    loads = contact.spring_loads(t.line_depth, bubbles.gaps, bubbles.stiffness, t.weight)
+    np.testing.assert_allclose(t.row_force, (loads * bubbles.alive).sum(axis=0), atol=1e-6)

@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from edge.errors import InputError
+from tests.train.simulate.scenes import run
 from train.simulate import run as running
-from train.simulate.engine import run_batch
-from train.simulate.run import kinds, simulate, write
+from train.simulate.run import simulate, write
 from train.simulate.scene import from_dict
 
 BOX = {
@@ -42,10 +42,6 @@ def scene(*objects, families=(), **rest):
             **rest,
         }
     )
-
-
-def run(one, step_s=0.01):
-    return run_batch(one, tuple(next(iter(kinds(one).values()))), step_s)
 
 
 class TestLabels:

@@ -1,6 +1,6 @@
-"""One module an effect; a scene that does not call for an effect never loads its module.
+"""One module for each effect; a scene that does not call for an effect never loads its module.
 
-Each has `add(build)`, which puts the effect's functions into the plan: those of the setup work on
-a whole batch in numpy, those of frames, steps and samples are compiled and work on one trial's
-record (`trial`), and those of the sensor and its clock on a few trials' frames at once.
+A module has functions named after the stages of `train.simulate.plan`. Those of the physics take
+the trials and the index of the trials concerned, `clock` and `sensor` take the readings of one
+trial.
 """

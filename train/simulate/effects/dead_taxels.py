@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from train.simulate import streams
-from train.simulate.plan import Build
 from train.simulate.readings import Readings
 
 
-def add(build: Build) -> None:
-    """Add it to the frames."""
-    settings = build.settings("dead_taxels")
-
-    def kill(readings: Readings) -> None:
-        """Zero where dead."""
-        trial = readings.trial
-        generator = streams.stream(readings.seed, "dead_taxels", trial.key, trial.number)
-        valid = generator.random(readings.shape) >= settings["part"]
-        readings.counts *= valid.reshape(-1)[readings.taxels]
-        if settings["known"]:
-            readings.valid = valid
-
-    build.read("sensor", 80, kill)
+def sensor(readings: Readings) -> None:
+    """Zero where dead."""
+    settings = readings.settings("dead_taxels")
+    valid = readings.stream("dead_taxels").random(readings.shape) >= settings["part"]
+    readings.counts *= valid.reshape(-1)[readings.taxels]
+    if settings["known"]:
+        readings.valid = valid

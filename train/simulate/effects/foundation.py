@@ -6,19 +6,12 @@ bears F/L = (4/3) (E/H) d sqrt(2 R d) (Winkler's foundation; Johnson, Contact Me
 
 from __future__ import annotations
 
-from train.simulate import base
-from train.simulate.plan import Build
-from train.simulate.state import State
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
-    """Put the foundation under the taxels."""
-    build.put("setup", base.SPRINGS + 5, soften)
-
-
-def soften(state: State) -> None:
+def soften(t: Trials, i: Index) -> None:
     """The foam's column in series with the skin's taxel."""
-    values, skin = state.values, state.skin
-    area = skin.row_pitch_m * skin.column_pitch_m
-    column = values["modulus_pa"] * area / values["depth_m"]
-    state.taxel_k = 1.0 / (1.0 / state.taxel_k + 1.0 / column)
+    area = t.skin.row_pitch_m * t.skin.column_pitch_m
+    column = pick(t.values["modulus_pa"], i) * area / pick(t.values["depth_m"], i)
+    t.taxel_k[i] = 1.0 / (1.0 / pick(t.taxel_k, i) + 1.0 / column)

@@ -12,134 +12,110 @@ normal: there the bound lies about that normal's part along the face.
 
 from __future__ import annotations
 
-import math
-from typing import Any
+from dataclasses import dataclass
 
-from numba import njit
+import numpy as np
+from numpy.typing import NDArray
 
-from train.simulate import base
-from train.simulate.arm import JOINTS
-from train.simulate.base_steps import crossed
-from train.simulate.compiled import vectors
-from train.simulate.motion import GRAVITY, mover_of
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import Part, compiled
-
-SHEAR = Part(
-    "friction",
-    # Newtons a metre of the skin along the face, its coefficient, the weight of what is pushed,
-    # and whether that fits itself to a forearm that lies askew.
-    "stiffness",
-    "friction",
-    "weight",
-    ("fits", "?"),
-    # Its stretch in metres, its pull in newtons: along the face, on the arm against its slip.
-    "stretch",
-    "pull",
-    # Of the skin's place along the face: its Jacobian, the joints before the step, metres a newton
-    # that it gives way for each load of the contact, and for one along the face.
-    *vectors(JOINTS, "jacobian", "before"),
-    *vectors(2, "coupled"),
-    "give",
-)
-"""The skin's stretch along the face."""
-shear_of = SHEAR.of
+from train.simulate.arm import Array, cross, dot
+from train.simulate.contact import GRAVITY, total
+from train.simulate.plan import ALL, Index, settings
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
-    """Let the face hold the skin."""
-    stiffness = build.settings("friction")["shear_n_m"]
-    fits = "tilt" in build.effects and "foundation" in build.effects
+@dataclass
+class Shear:
+    """The skin's stretch along the face.
 
-    def rest(state: State) -> None:
-        """Nothing is held yet."""
-        own = state.begin(SHEAR, stiffness=stiffness, fits=fits)
-        own.friction = state.values["skin_friction"]
-        if "sliding" in build.effects:
-            own.weight = state.values["mass_kg"] * GRAVITY
+    Attributes:
+        stiffness: newtons a metre of the skin along the face.
+        fits: (n,) whether what is pushed fits itself to a forearm that lies askew.
+        stretch, pull: (n,) metres, and newtons along the face on the arm against its slip.
+        jacobian: (dof, n) of the skin's place along the face.
+        coupled: (2, n) metres that it gives way for each load of the contact.
+        give: (n,) metres for each newton along the face.
+        before: (dof, n) the joints before the step.
+    """
 
-    build.put("setup", base.ORDER + 5, rest)
-    if "sliding" in build.effects:
-        build.put("step", base.PREDICT + 11, weigh)
-    if "tilt" in build.effects:
-        build.put("sample", base.BEAR + 2, lean_on)
-    build.put("frame", base.LOCATE + 5, touch)
-    build.put("step", base.PREDICT + 5, hold)
-    build.put("step", base.SETTLE + 6, slip)
+    stiffness: float
+    fits: NDArray[np.bool_]
+    stretch: Array
+    pull: Array
+    jacobian: Array
+    coupled: Array
+    give: Array
+    before: Array
 
 
-@njit(error_model="numpy")
-def bounds(t: Any) -> tuple[float, float]:
-    """The least and the most pull that the load of now can hold."""
-    own = shear_of(t)
-    most = own.friction * t.loads[0]
-    if not own.fits:
-        return -most, most
-    tilt = t.y_frame[1]
-    normal = -t.loads[0] * tilt / math.sqrt(1.0 - tilt * tilt)
+def stand(t: Trials, i: Index) -> None:
+    """Nothing is held yet."""
+    n = t.n
+    t.own["friction"] = Shear(
+        stiffness=settings(t.scene, "friction")["shear_n_m"],
+        fits=t.plan.also("tilt", ALL) & t.plan.also("foundation", ALL),
+        stretch=np.zeros(n),
+        pull=np.zeros(n),
+        jacobian=np.zeros_like(t.q),
+        coupled=np.zeros((2, n)),
+        give=np.zeros(n),
+        before=np.zeros_like(t.q),
+    )
+
+
+def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
+    """The lower and the upper pull that the load of now can hold."""
+    force, fits = pick(t.loads[0], i), pick(t.own["friction"].fits, i)
+    most, tilt = pick(t.values["skin_friction"], i) * force, pick(t.y_frame[1], i)
+    normal = np.where(fits, -force * tilt / np.sqrt(1.0 - tilt * tilt), 0.0)
     return normal - most, normal + most
 
 
-@compiled
-def touch(t: Any) -> None:
+def reach_along(t: Trials, i: Index) -> None:
     """How the skin at the contact moves along the face with the joints."""
-    own = shear_of(t)
-    own.give, own.coupled[0], own.coupled[1] = 0.0, 0.0, 0.0
-    for j in range(t.joints):
-        lever = 0.0
-        turned = crossed(t.along_face, t.axes, j)
-        for i in range(3):
-            skin = t.point[i] + t.skin_radius_m * t.normal[i]
-            lever += (skin - t.origins[i, j]) * turned[i]
-        given = t.give[j] * lever
-        own.jacobian[j] = lever
-        own.give += lever * given
-        own.coupled[0] += t.jacobian[0, j] * given
-        own.coupled[1] += t.jacobian[1, j] * given
+    own = t.own["friction"]
+    skin = pick(t.point, i) + t.skin.radius_m * pick(t.normal, i)
+    turned = cross(pick(t.along_face, i)[:, None], pick(t.axes, i))
+    lever = dot(skin[:, None] - pick(t.origins, i), turned)
+    given = pick(t.give, i) * lever
+    own.jacobian[:, i], own.give[i] = lever, total(lever * given)
+    own.coupled[:, i] = total(pick(t.jacobian, i) * given[:, None])
 
 
-@compiled
-def hold(t: Any) -> None:
+def predict(t: Trials, i: Index) -> None:
     """The pull with which the step begins, and what it does to arm and contact."""
-    own = shear_of(t)
-    drawn = 0.0
-    for j in range(t.joints):
-        own.before[j] = t.q[j]
-        drawn += own.jacobian[j] * (t.q_free[j] - t.q[j])
-    drawn -= own.coupled[0] * t.loads[0]
-    drawn -= own.coupled[1] * t.loads[1]
-    stuck = own.stiffness * (own.stretch + drawn) / (1.0 + own.stiffness * own.give)
-    least, most = bounds(t)
-    own.pull = min(max(stuck, least), most)
-    for j in range(t.joints):
-        t.q_free[j] -= t.give[j] * own.jacobian[j] * own.pull
-    t.y[0] -= own.coupled[0] * own.pull
-    t.y[1] -= own.coupled[1] * own.pull
+    own = t.own["friction"]
+    q, q_free, loads = pick(t.q, i), pick(t.q_free, i), pick(t.loads, i)
+    jacobian, coupled = pick(own.jacobian, i), pick(own.coupled, i)
+    drawn = total(jacobian * (q_free - q)) - coupled[0] * loads[0] - coupled[1] * loads[1]
+    stuck = own.stiffness * (pick(own.stretch, i) + drawn)
+    stuck = stuck / (1.0 + own.stiffness * pick(own.give, i))
+    pull = np.clip(stuck, *bounds(t, i))
+    own.before[:, i], own.pull[i] = q, pull
+    t.q_free[:, i] = q_free - pick(t.give, i) * jacobian * pull
+    t.y[:, i] = pick(t.y, i) - coupled * pull
 
 
-@compiled
-def slip(t: Any) -> None:
-    """The stretch as the step has left it; more than friction holds has slipped."""
-    own = shear_of(t)
-    moved = 0.0
-    for j in range(t.joints):
-        moved += own.jacobian[j] * (t.q[j] - own.before[j])
-    least, most = bounds(t)
-    own.stretch = min(max(own.stretch + moved, least / own.stiffness), most / own.stiffness)
-
-
-@compiled
-def weigh(t: Any) -> None:
+def drag(t: Trials, i: Index) -> None:
     """The shear on its face presses what slides to the floor, or lifts it."""
-    own = shear_of(t)
-    mover_of(t).weight = max(own.weight - own.pull * t.along_face[2], 0.0)
+    i = np.arange(t.n)[i][t.plan.also("sliding", i)]
+    if i.size:
+        lifts = pick(t.own["friction"].pull, i) * pick(t.along_face[2], i)
+        weight = pick(t.values["mass_kg"], i) * GRAVITY
+        t.own["sliding"].weight[i] = np.maximum(weight - lifts, 0.0)
 
 
-@compiled
-def lean_on(t: Any) -> None:
+def settle(t: Trials, i: Index) -> None:
+    """The stretch as the step has left it; more than friction holds has slipped."""
+    own = t.own["friction"]
+    moved = total(pick(own.jacobian, i) * (pick(t.q, i) - pick(own.before, i)))
+    low, high = bounds(t, i)
+    stretch = pick(own.stretch, i) + moved
+    own.stretch[i] = np.clip(stretch, low / own.stiffness, high / own.stiffness)
+
+
+def lean(t: Trials, i: Index) -> None:
     """Askew, the skin bears a part of the shear along its own normal."""
-    if t.force > 0.0:
-        t.force = max(t.force - shear_of(t).pull * t.depth[1], 0.0)
-    else:
-        t.force = 0.0
+    i = np.arange(t.n)[i][t.plan.also("tilt", i)]
+    force, pull = pick(t.force, i), pick(t.own["friction"].pull, i)
+    leant = np.maximum(force - pull * pick(t.depth[1], i), 0.0)
+    t.force[i] = np.where(force > 0.0, leant, 0.0)

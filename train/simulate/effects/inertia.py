@@ -3,7 +3,7 @@
 Each joint obeys I q'' + d q' + k (q - q_eq) = -J^T F, by backward Euler in closed form: inertia
 adds I / h^2 to what holds a joint, and its speed to where the joint would be without load. How
 high the arm bounces is the skin's own loss, a dashpot of `loss_s` times its stiffness beside each
-taxel's spring (Kelvin and Voigt): a mass m on a stiffness K then has the damping ratio
+taxel's spring (Kelvin and Voigt; `viscous`): a mass m on a stiffness K then has the damping ratio
 loss_s sqrt(K / m) / 2. Inertia between joints is left out.
 
 A rigid thing is hit for less than a frame, and only short steps show that; Newmark's rules of
@@ -14,125 +14,99 @@ touch is near and for a while after each jolt, and as long as the scene says els
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
 
-from numba import njit
+import numpy as np
+from numpy.typing import NDArray
 
-from train.simulate import base, viscous
-from train.simulate.arm import JOINTS
-from train.simulate.compiled import integers, vector, vectors
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import Part, compiled
+from train.simulate.arm import Array
+from train.simulate.contact import total
+from train.simulate.plan import Index, settings
+from train.simulate.trials import Trials, pick
 
 FINER = 8
 """Times as many steps as usual has a frame near a jolt."""
 JOLT = 0.1
-"""What the force's change from frame to frame differs by from the one before, as a part of the peak
-so far: the arm has been hit, or let go of."""
+"""Change of the force's slope from frame to frame, as a part of the peak so far, that makes a jolt:
+the arm has been hit, or let go of."""
 LASTS_S = 0.02
 """Seconds for which steps stay short after it."""
 NEAR = 1.5
 """Frames that a touch is away, at the speed of the last."""
 
-MOMENTUM = Part(
-    "inertia",
-    # Of each joint: its moment of inertia, its speed, what that counts for in a step (I / h), and
-    # where it was before it.
-    *vectors(JOINTS, "inertia", "speed", "weight", "before"),
-    # How many steps a frame usually has, and for how many more frames it has finer ones; what was
-    # seen of the frames before: the depth, the force, its change and its peak.
-    *integers("usual", "left"),
-    *("depth", "force", "change", "peak"),
-)
-"""The arm's motion, and how finely it is followed."""
-momentum_of = MOMENTUM.of
+
+@dataclass
+class Momentum:
+    """The arm's motion, and how finely it is followed.
+
+    Attributes:
+        inertia: (dof, 1) kg m^2 of each joint.
+        speed, before: (dof, n) rad/s, and the joint angles before the step.
+        weight: (dof, n) I / h.
+        left: (n,) frames that will still have finer steps.
+        depth, force, change, peak: (n,) seen of the frames before.
+    """
+
+    inertia: Array
+    speed: Array
+    before: Array
+    weight: Array
+    left: NDArray[np.int64]
+    depth: Array
+    force: Array
+    change: Array
+    peak: Array
 
 
-def add(build: Build) -> None:
-    """Give the arm its inertia, and the skin its loss."""
-    loss_s = build.settings("inertia")["loss_s"]
-
-    def damp(state: State) -> None:
-        """The dashpot beside the skin's springs."""
-        state.of(viscous.VISCOUS).loss_s = loss_s
-
-    build.put("setup", base.SWING + 1, gather)
-    build.put("setup", base.HAND_OVER + 1, set_pace)
-    build.put("pace", 0, pace)
-    build.put("tune", base.LOCATE + 1, tune)
-    build.put("step", base.PREDICT + 2, coast)
-    build.put("step", base.SETTLE + 5, move)
-    viscous.add(build)
-    build.put("setup", viscous.RANK + 2, damp)
-
-
-def gather(state: State) -> None:
+def swing(t: Trials, i: Index) -> None:
     """The joints move at the equilibrium point's speed."""
-    inertia = state.scene.inertia
-    own = state.begin(MOMENTUM)
-    own.inertia[:, : len(inertia)] = inertia
-    own.speed[:, : len(inertia)] = state.rate.T
+    t.own["inertia"] = Momentum(
+        inertia=np.array(t.scene.inertia)[:, None],
+        speed=np.repeat(t.rate, t.n, axis=1),
+        before=np.zeros_like(t.q),
+        weight=np.zeros_like(t.q),
+        left=np.zeros(t.n, dtype=np.int64),
+        **dict(zip(("depth", "force", "change", "peak"), np.zeros((4, t.n)), strict=True)),
+    )
 
 
-def set_pace(state: State) -> None:
-    """Steps of the scene's length, to begin with."""
-    state.of(MOMENTUM).usual = state.trial.steps
+def stand(t: Trials, i: Index) -> None:
+    """The dashpot beside the skin's springs."""
+    t.own["viscous"].loss_s[i] = settings(t.scene, "inertia")["loss_s"]
 
 
-@njit(error_model="numpy")
-def inside(t: Any) -> float:
-    """How far the face's deepest line is inside the skin; where none is, the nearest, below 0."""
-    weight, line_depth = vector(t.weight, t.lines), vector(t.line_depth, t.lines)
-    depth = -math.inf
-    for line in range(t.lines):
-        if weight[line] > 0.0:
-            depth = max(depth, line_depth[line])
-    return depth
-
-
-@compiled
-def pace(t: Any) -> None:
+def pace(t: Trials, i: Index) -> None:
     """Shorter steps where a touch is near, and for a while after a jolt."""
-    own, depth = momentum_of(t), inside(t)
-    closing, change = max(depth - own.depth, 0.0), t.force - own.force
-    own.peak = max(own.peak, t.force)
-    if abs(change - own.change) > JOLT * own.peak:
-        own.left = math.ceil(LASTS_S * t.rate_hz)
-    near = t.force == 0.0 and depth + NEAR * closing > 0.0
-    own.depth, own.force, own.change = depth, t.force, change
-    t.steps = FINER * own.usual if near or own.left > 0 else own.usual
-    own.left = max(own.left - 1, 0)
+    own, depth, force = t.own["inertia"], pick(t.inside, i), pick(t.force, i)
+    closing = np.maximum(depth - pick(own.depth, i), 0.0)
+    change, peak = force - pick(own.force, i), np.maximum(pick(own.peak, i), force)
+    jolts = np.abs(change - pick(own.change, i)) > JOLT * peak
+    left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(own.left, i))
+    near = (force == 0.0) & (depth + NEAR * closing > 0.0)
+    own.depth[i], own.force[i], own.change[i], own.peak[i] = depth, force, change, peak
+    t.steps[i] = np.where(near | (left > 0), FINER, 1) * pick(t.usual, i)
+    own.left[i] = np.maximum(left - 1, 0)
 
 
-@compiled
-def tune(t: Any) -> None:
-    """What holds each joint in a step of this length."""
-    own = momentum_of(t)
-    for j in range(t.joints):
-        own.weight[j] = own.inertia[j] / t.h
-        t.held[j] += own.weight[j] / t.h
-        t.give[j] = 1.0 / (t.held[j] + t.joint_k[j])
+def tune(t: Trials, i: Index) -> None:
+    """Inertia holds each joint in a step, too."""
+    own, h = t.own["inertia"], pick(t.h, i)
+    weight = own.inertia / h
+    held = pick(t.held, i) + weight / h
+    own.weight[:, i], t.held[:, i] = weight, held
+    t.give[:, i] = 1.0 / (held + t.joint_k)
 
 
-@compiled
-def coast(t: Any) -> None:
+def predict(t: Trials, i: Index) -> None:
     """Where the arm would be without load, with its speed."""
-    own = momentum_of(t)
-    first, second = 0.0, 0.0
-    for j in range(t.joints):
-        further = own.weight[j] * own.speed[j] * t.give[j]
-        own.before[j] = t.q[j]
-        t.q_free[j] += further
-        first += t.jacobian[0, j] * further
-        second += t.jacobian[1, j] * further
-    t.y[0] += first
-    t.y[1] += second
+    own = t.own["inertia"]
+    further = pick(own.weight, i) * pick(own.speed, i) * pick(t.give, i)
+    own.before[:, i] = pick(t.q, i)
+    t.q_free[:, i] = pick(t.q_free, i) + further
+    t.y[:, i] = pick(t.y, i) + total(pick(t.jacobian, i) * further[:, None])
 
 
-@compiled
-def move(t: Any) -> None:
+def settle(t: Trials, i: Index) -> None:
     """The speed with which the step ended."""
-    own = momentum_of(t)
-    for j in range(t.joints):
-        own.speed[j] = (t.q[j] - own.before[j]) / t.h
+    own = t.own["inertia"]
+    own.speed[:, i] = (pick(t.q, i) - pick(own.before, i)) / pick(t.h, i)

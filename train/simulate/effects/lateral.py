@@ -18,36 +18,26 @@ and piecewise linear. The pressure is close to a half ellipse at any a / H up to
 
 from __future__ import annotations
 
-import math
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from train.simulate import base, base_steps
-from train.simulate.compiled import Array, integers, matrix, vector
-from train.simulate.contact import share_out
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import Part, compiled
+from train.simulate.arm import Array
+from train.simulate.contact import share_out, total
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 MARGIN = 0.19
 """What the flat strip bears beyond the foundation under it, as a width over H."""
 SPREAD = 0.55
 """The same of the load at first touch, which goes with a^2 as on a half space."""
 
-ROOM = ("borne", "wide", "ellipse", "askew")
-LATERAL = Part("lateral", "depth_m", "nearest", *integers(*ROOM))
-"""The layer's thickness and the depth at which its first column is touched, in metres; room for
-four numbers a row."""
-lateral_of = LATERAL.of
 
+@dataclass
+class Lateral:
+    """Metres of depth at which a layer's first column is touched, (n,)."""
 
-def add(build: Build) -> None:
-    """Let the columns feel each other."""
-    build.put("setup", base.WINDOW + 5, narrow)
-    build.put("setup", base.BED + 3, margin)
-    build.replace(base_steps.image, image)
+    nearest: Array
 
 
 def delay(x: Array, depth: Array) -> Array:
@@ -64,50 +54,38 @@ def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
     return gaps + delay(np.sqrt(near * (2.0 * radius - near)), depth) / radius
 
 
-def narrow(state: State) -> None:
+def widen(t: Trials, i: Index) -> None:
     """Columns are touched later."""
-    depth = state.values["depth_m"]
-    state.column_gaps = touched_at(state.column_gaps, state.skin.radius_m, depth)
-    none = np.zeros((state.skin.rows, state.n))
-    state.begin(
-        LATERAL,
-        depth_m=depth,
-        nearest=state.column_gaps.min(axis=0),
-        **{name: state.lend(f"lateral_{name}", none) for name in ROOM},
-    )
+    gaps = touched_at(pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i))
+    t.column_gaps[:, i] = gaps
+    if "lateral" not in t.own:
+        t.own["lateral"] = Lateral(np.zeros(t.n))
+    t.own["lateral"].nearest[i] = gaps.min(axis=0)
 
 
-def margin(state: State) -> None:
-    """A spring more in the middle, touched first, for the foam beside the contact."""
-    bed = state.bed
-    middle = len(bed.gaps) // 2
-    width = 2.0 * MARGIN * state.values["depth_m"] / state.skin.column_pitch_m
-    more = state.taxel_k * width * bed.stiffness.max(axis=0).astype(bool)
-    bed.gaps = np.insert(bed.gaps, middle, 0.0, axis=0)
-    bed.stiffness = np.insert(bed.stiffness, middle, more, axis=0)
+def fill(t: Trials, i: Index) -> None:
+    """One more spring a row, touched first, for the foam beside the contact."""
+    width = 2.0 * MARGIN * pick(t.values["depth_m"], i) / t.skin.column_pitch_m
+    more = pick(t.taxel_k, i) * width * pick(t.reach, i).any(axis=0)
+    t.add_springs(i, np.zeros((1, len(more))), more[None])
 
 
-@njit(error_model="numpy")
-def askew_at(depth: Array, weight: Array, row: int, pitch_m: float) -> float:
-    """How steeply the forearm dips into the face's ends in a row, as far as these lie there.
+def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
+    """(rows, n) how steeply the forearm dips into the face's ends, as far as these lie in a row.
 
-    A face that covers the skin's first or last row whole goes on beyond the skin.
+    A face that covers all of the skin's first or last row goes on beyond the skin.
     """
-    last, askew = len(depth) - 1, 0.0
-    if row < last:
-        before = weight[row - 1] if row > 0 else math.floor(weight[0])
-        falls = max(-(depth[row + 1] - depth[row]) / pitch_m, 0.0)
-        askew += max(weight[row] - before, 0.0) * falls
-    if row > 0:
-        after = weight[row + 1] if row < last else math.floor(weight[last])
-        rises = max((depth[row] - depth[row - 1]) / pitch_m, 0.0)
-        askew += max(weight[row] - after, 0.0) * rises
-    return askew
+    rises = np.diff(depth, axis=0) / pitch_m
+    before = np.concatenate([np.floor(weight[:1]), weight[:-1]])
+    after = np.concatenate([weight[1:], np.floor(weight[-1:])])
+    out = np.zeros_like(depth)
+    out[:-1] += np.maximum(weight - before, 0.0)[:-1] * np.maximum(-rises, 0.0)
+    out[1:] += np.maximum(weight - after, 0.0)[1:] * np.maximum(rises, 0.0)
+    return out
 
 
-@njit(error_model="numpy")
-def share_rows(t: Any, borne: Array, wide: Array) -> None:
-    """What each row bears, up to a factor, `wide` columns (rows,) of it: into `borne` (rows,).
+def row_loads(t: Trials, i: Index, wide: Array) -> Array:
+    """What each row bears, up to a factor, with `wide` columns (rows, n) of it in touch.
 
     Across the forearm a row bears as a layer does; along it the rows feel each other as a
     stretched foundation does whose length is the margin (Pasternak's; Kerr, J. Applied Mechanics
@@ -116,50 +94,33 @@ def share_rows(t: Any, borne: Array, wide: Array) -> None:
     hardly touched. Against an elastic block by finite elements, askew by 10 and 17 degrees, the
     highest load of a taxel is within 10 %.
     """
-    depth, weight = vector(t.line_depth, t.rows), vector(t.weight, t.rows)
-    gaps, stiffness = vector(t.gaps, t.springs), vector(t.stiffness, t.springs)
-    own, all_askew = lateral_of(t), 0.0
-    margin, askew = MARGIN * own.depth_m, vector(own.askew, t.rows)
-    for row in range(t.rows):
-        whole = 0.0
-        for s in range(t.springs if depth[row] > 0.0 else 0):
-            inside = depth[row] - gaps[s]
-            if inside > 0.0:
-                whole += inside * stiffness[s]
-        borne[row] = whole * weight[row]
-        askew[row] = askew_at(depth, weight, row, t.row_pitch_m)
-        all_askew += askew[row]
-    least = margin * all_askew
-    if not least > 0.0:
-        return
-    edge = t.taxel_k * margin * margin / t.row_pitch_m
-    for row in range(t.rows):
-        touched = min(max(depth[row] / least - 0.5, 0.0), 1.0)
-        borne[row] = borne[row] * touched + edge * askew[row] * wide[row]
+    depth, weight = pick(t.line_depth, i), pick(t.weight, i)
+    gaps, stiffness = pick(t.gaps, i), pick(t.stiffness, i)
+    touched = (gaps < depth.max(axis=0)).any(axis=1)
+    inside = np.maximum(depth - gaps[touched][:, None], 0.0)
+    pressed = total(inside * stiffness[touched][:, None]) if touched.any() else 0.0
+    borne = np.where(depth > 0.0, pressed, 0.0) * weight
+    margin, ends = MARGIN * pick(t.values["depth_m"], i), askew(depth, weight, t.skin.row_pitch_m)
+    slight = margin * total(ends)
+    dips = slight > 0.0
+    if dips.any():
+        edge = pick(t.taxel_k, i) * margin * margin / t.skin.row_pitch_m
+        part = np.clip(depth / np.where(dips, slight, 1.0) - 0.5, 0.0, 1.0)
+        borne = np.where(dips, borne * part + edge * ends * wide, borne)
+    return np.asarray(borne)
 
 
-@compiled
-def image(t: Any) -> None:
+def image(t: Trials, i: Index) -> None:
     """The force shared out among the rows as each bears, and within a row as a half ellipse: as
     the root of each column's depth past its touch."""
-    own = lateral_of(t)
-    depth, gaps = vector(t.line_depth, t.rows), vector(t.column_gaps, t.columns)
-    loads, reach = matrix(t.image, t.rows, t.columns), vector(t.reach, t.columns)
-    borne, wide = vector(own.borne, t.rows), vector(own.wide, t.rows)
-    ellipse = vector(own.ellipse, t.rows)
-    for row in range(t.rows):
-        wide[row] = ellipse[row] = 0.0
-        loads[row, :] = 0.0
-        for column in range(t.columns if depth[row] > 0.0 else 0):
-            # A touch so slight that it falls between the columns is the nearest one's.
-            inside = depth[row] - (gaps[column] - own.nearest)
-            if inside > 0.0:
-                loads[row, column] = math.sqrt(inside) * reach[column]
-                wide[row] += reach[column]
-                ellipse[row] += loads[row, column]
-    share_rows(t, borne, wide)
-    for row in range(t.rows):
-        part = borne[row] / (ellipse[row] if ellipse[row] > 0.0 else 1.0)
-        for column in range(t.columns):
-            loads[row, column] *= part
-    share_out(t.force, loads)
+    depth, reach = pick(t.line_depth, i), pick(t.reach, i)
+    # A touch so slight that it falls between the columns is the nearest one's.
+    gaps = pick(t.column_gaps, i) - pick(t.own["lateral"].nearest, i)
+    inside = np.where(depth > 0.0, depth - gaps[:, None], 0.0)
+    touched = inside > 0.0
+    loads = np.sqrt(np.where(touched, inside, 0.0)) * reach[:, None]
+    borne = row_loads(t, i, total(touched * reach[:, None]))
+    ellipse = total(loads)
+    loads *= borne / np.where(ellipse > 0.0, ellipse, 1.0)
+    share_out(pick(t.force, i), loads)
+    t.image[:, :, i] = loads.swapaxes(0, 1)

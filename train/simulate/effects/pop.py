@@ -7,18 +7,16 @@ A burst bubble leaves the hard backing, b further on.
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-from train.simulate import base, base_steps
-from train.simulate.base_steps import bed_loads, lay_law
-from train.simulate.compiled import indices, integers, matrix, vector
-from train.simulate.contact import share_out
-from train.simulate.plan import Build
-from train.simulate.state import Bed, State
-from train.simulate.trial import Part, compiled
+from train.simulate import base
+from train.simulate.arm import Array
+from train.simulate.contact import share_out, spring_loads, total
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 SLOPES = (1.0, 4.0, 16.0)
 """Slopes of the tangents, as multiples of k0."""
@@ -26,111 +24,88 @@ BREAKS = (1.0 / 3.0, 2.0 / 3.0)
 """Depths at which they cross, as multiples of b."""
 SEGMENTS = len(SLOPES) + 1
 
-POP = Part("pop", "pop_n", *integers("order", "bears", "loads"))
-"""The newtons that burst a bubble; of all rows' springs: which is the first, second and so on by
-its gap, if that is asked for, and room for two numbers."""
-pop_of = POP.of
+
+@dataclass
+class Bubbles:
+    """Columns of bubbles, and of the backing under each.
+
+    Attributes:
+        first: the place of their springs in `Trials.gaps`, segment by segment.
+        gaps, stiffness: (S, n) of these springs.
+        alive: (S, rows, n) 1 where one is left, 0 where it is gone.
+    """
+
+    first: int
+    gaps: Array
+    stiffness: Array
+    alive: Array
 
 
-def add(build: Build) -> None:
-    """Bubbles between skin and backing."""
-    build.put("setup", base.BED + 5, inflate)
-    build.put("setup", base.BED + 6, begin)
-    if "tilt" not in build.effects:
-        build.replace(base.order_bed, order)
-    build.replace(base_steps.image, image)
-    build.put("sample", base.IMAGE + 20, burst)
-
-
-def inflate(state: State) -> None:
+def lay(t: Trials, i: Index) -> None:
     """Each column becomes four springs: three tangents, and the backing for after the burst."""
-    values, skin = state.values, state.taxel_k
+    values, skin = {k: pick(v, i) for k, v in t.values.items()}, pick(t.taxel_k, i)
     k0, height = values["bubble_n_m"], values["bubble_m"]
     slopes = [1.0 / (1.0 / skin + 1.0 / (k0 * s)) for s in SLOPES]
     first = k0 * height * BREAKS[0] / slopes[0]
     second = first + k0 * SLOPES[1] * height * (BREAKS[1] - BREAKS[0]) / slopes[1]
-    gaps, reach = state.column_gaps, state.reach
-    state.bed = Bed(
-        gaps=np.concatenate([gaps, gaps + first, gaps + second, gaps + height]),
-        stiffness=np.concatenate(
-            [
-                reach * slopes[0],
-                reach * (slopes[1] - slopes[0]),
-                reach * (slopes[2] - slopes[1]),
-                reach * skin,
-            ]
-        ),
-        weight=state.bed.weight,
-        line_gap=state.bed.line_gap,
+    gaps, reach = pick(t.column_gaps, i), pick(t.reach, i)
+    gaps = np.concatenate([gaps, gaps + first, gaps + second, gaps + height])
+    steeper = (slopes[0], slopes[1] - slopes[0], slopes[2] - slopes[1], skin)
+    stiffness = np.concatenate([reach * k for k in steeper])
+    base.lay_rows(t, i)
+    own = t.own["pop"] = Bubbles(
+        len(t.gaps), *[*np.zeros((2, len(gaps), t.n)), np.zeros((len(gaps), t.rows, t.n))]
     )
+    own.gaps[:, i], own.stiffness[:, i] = gaps, stiffness
+    own.alive[: -len(reach)] = 1.0
+    t.add_springs(i, gaps, stiffness)
 
 
-def begin(state: State) -> None:
+def law(t: Trials, i: Index) -> None:
+    """The law of the springs that are left, of a forearm that does not pivot."""
+    own, trials = t.own["pop"], np.arange(t.n)[i]
+    alive, weight = pick(own.alive, trials), pick(t.weight, trials)
+    gaps = pick(t.line_gap, trials) + pick(own.gaps, trials)[:, None]
+    stiffness = weight * (pick(own.stiffness, trials)[:, None] * alive)
+    t.obey(trials, gaps.reshape(-1, len(trials)), stiffness.reshape(-1, len(trials)))
+
+
+def stand(t: Trials, i: Index) -> None:
     """Every bubble is whole."""
-    springs, n = state.bed.gaps.shape
-    alive = np.ones((len(state.bed.weight), springs, n))
-    alive[:, springs // SEGMENTS * (SEGMENTS - 1) :] = 0.0
-    state.records["alive"] = state.lend("alive", alive)
-    loads = state.lend("pop_loads", alive)
-    state.begin(POP, pop_n=state.values["pop_n"], loads=loads)
+    change(t, np.arange(t.n)[i])
 
 
-def order(state: State) -> None:
-    """The bed's law, and room for what it becomes as bubbles burst."""
-    bed, own = state.bed, state.of(POP)
-    alive = np.moveaxis(state.arrays["alive"], 0, -1)
-    gaps = (bed.line_gap[:, None] + np.broadcast_to(bed.gaps, alive.shape)).reshape(-1, state.n)
-    stiffness = bed.weight[:, None] * (bed.stiffness[None] * alive)
-    own.order = state.lend("pop_order", state.obey(gaps, stiffness.reshape(-1, state.n)))
-    own.bears = state.lend("pop_bears", np.zeros_like(gaps))
+def change(t: Trials, trials: NDArray[np.intp]) -> None:
+    """Give the solver the springs that are left."""
+    own, tilted = t.own["pop"], t.plan.also("tilt", trials)
+    if tilted.any():
+        pivots = trials[tilted]
+        t.own["tilt"].keep_alive(pivots, own.first, own.alive.take(pivots, -1))
+    if not tilted.all():
+        law(t, trials[~tilted])
 
 
-@njit(error_model="numpy")
-def law(t: Any) -> None:
-    """The law of the springs that are there; a pivoting forearm's solver asks the rows instead."""
-    own = pop_of(t)
-    if own.order == 0:
-        return
-    weight, stiffness = vector(t.weight, t.rows), vector(t.stiffness, t.springs)
-    alive, order = matrix(t.alive, t.rows, t.springs), indices(own.order, t.law_lines)
-    bears = vector(own.bears, t.law_lines)
-    for e in range(t.law_lines):
-        row, spring = order[e] // t.springs, order[e] % t.springs
-        bears[e] = weight[row] * (stiffness[spring] * alive[row, spring])
-    lay_law(t, own.bears, t.slopes, t.intercepts)
-
-
-@compiled
-def image(t: Any) -> None:
+def image(t: Trials, i: Index) -> None:
     """The force shared out among springs, then the four springs of each taxel together."""
-    own = pop_of(t)
-    loads, alive = matrix(own.loads, t.rows, t.springs), matrix(t.alive, t.rows, t.springs)
-    seen = matrix(t.image, t.rows, t.columns)
-    bed_loads(t, t.springs, loads)
-    for row in range(t.rows):
-        for s in range(t.springs):
-            loads[row, s] *= alive[row, s]
-    share_out(t.force, loads)
-    for row in range(t.rows):
-        for column in range(t.columns):
-            whole = 0.0
-            for s in range(column, t.springs, t.columns):
-                whole += loads[row, s]
-            seen[row, column] = whole
+    own = t.own["pop"]
+    loads = spring_loads(
+        pick(t.line_depth, i), pick(own.gaps, i), pick(own.stiffness, i), pick(t.weight, i)
+    )
+    loads *= pick(own.alive, i)
+    share_out(pick(t.force, i), loads)
+    by_segment = loads.reshape(SEGMENTS, -1, *loads.shape[1:])
+    t.image[:, :, i] = total(by_segment).swapaxes(0, 1)
 
 
-@compiled
-def burst(t: Any) -> None:
+def pass_on(t: Trials, i: Index) -> None:
     """Bubbles under more than they hold are gone from the next frame on, and leave the backing."""
-    own, seen = pop_of(t), matrix(t.image, t.rows, t.columns)
-    alive, gone = matrix(t.alive, t.rows, t.springs), False
-    for row in range(t.rows):
-        for column in range(t.columns):
-            if seen[row, column] > own.pop_n:
-                gone = True
-                backing = t.springs - t.columns + column
-                for s in range(column, backing, t.columns):
-                    alive[row, s] = 0.0
-                alive[row, backing] = 1.0
-    if gone:
-        law(t)
+    own = t.own["pop"]
+    burst = (pick(t.image, i) > pick(t.values["pop_n"], i)).swapaxes(0, 1)
+    at = np.flatnonzero(burst.any(axis=(0, 1)))
+    if not at.size:
+        return
+    trials, gone = np.arange(t.n)[i][at], burst.take(at, -1)
+    alive = own.alive.take(trials, -1).reshape(SEGMENTS, *gone.shape)
+    alive[:-1][:, gone], alive[-1][gone] = 0.0, 1.0
+    own.alive[:, :, trials] = alive.reshape(-1, *gone.shape[1:])
+    change(t, trials)

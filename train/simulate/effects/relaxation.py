@@ -1,20 +1,14 @@
 """Standard linear solid: beside the spring a second one, k1 = ratio * k, that a dashpot empties
-within its time."""
+within its time (`viscous`)."""
 
 from __future__ import annotations
 
-from train.simulate import viscous
-from train.simulate.plan import Build
-from train.simulate.state import State
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
-    """Let the elastic answer relax."""
-    viscous.add(build)
-    build.put("setup", viscous.RANK + 1, relax)
-
-
-def relax(state: State) -> None:
+def stand(t: Trials, i: Index) -> None:
     """The second spring and its dashpot are the contact's Maxwell element."""
-    own = state.of(viscous.VISCOUS)
-    own.ratio, own.relax_s = state.values["relax_ratio"], state.values["relax_s"]
+    viscous = t.own["viscous"]
+    viscous.ratio[i] = pick(t.values["relax_ratio"], i)
+    viscous.relax_s[i] = pick(t.values["relax_s"], i)

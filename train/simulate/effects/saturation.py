@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.plan import Build
 from train.simulate.readings import Readings
 
 
-def add(build: Build) -> None:
-    """Add it to the frames."""
-    scale = build.scene.skin.counts_per_newton or 1.0
-    limit = np.float32(build.settings("saturation")["newton"] * scale)
-
-    def clip(readings: Readings) -> None:
-        """At most the limit."""
-        np.minimum(readings.counts, limit, out=readings.counts)
-
-    build.read("sensor", 50, clip)
+def sensor(readings: Readings) -> None:
+    """At most the limit."""
+    scale = readings.scene.skin.counts_per_newton or 1.0
+    limit = np.float32(readings.settings("saturation")["newton"] * scale)
+    np.minimum(readings.counts, limit, out=readings.counts)

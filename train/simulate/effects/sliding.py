@@ -1,57 +1,113 @@
-"""An object on the floor: it sticks while the push is at most mu_s m g, then drags mu_k m g."""
+"""An object on the floor: it sticks while the push is at most mu_s m g, then drags mu_k m g.
+
+One step: stick first; where the push is more than that holds, move; stop at rest, exactly.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
-from train.simulate import base, base_steps
-from train.simulate.base_steps import press_at_rest
-from train.simulate.motion import GRAVITY, MOVER, advance, give_way, mover_of
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import compiled
+import numpy as np
+from numpy.typing import NDArray
 
-
-def add(build: Build) -> None:
-    """Let the object move."""
-    build.put("setup", base.ORDER + 10, stand)
-    build.put("step", base.PREDICT + 10, withdraw)
-    build.replace(base_steps.press, slip)
-    build.trace("slide_m", MOVER, "slide")
+from train.simulate.arm import Array
+from train.simulate.contact import GRAVITY
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def stand(state: State) -> None:
-    """At rest, with what holds it and what drags on it."""
-    values = state.values
-    state.begin(
-        MOVER,
-        inertia=values["mass_kg"],
-        static=values["friction_static"],
-        kinetic=values["friction_kinetic"],
+@dataclass
+class Mover:
+    """An object that can move along the push.
+
+    Attributes:
+        inertia: (n,) kilograms, as the contact feels it.
+        static, kinetic: (n,) the coefficients of its friction on the floor.
+        weight: (n,) newtons with which it stands there.
+        hold, resist: (n,) newtons that hold it, and that resist its motion.
+        leans: (n,) whether it leans: then it moves either way, until it stands or lies.
+        lies: (n,) metres that it has moved when it lies.
+        speed, slide: (n,) m/s, and metres that it has moved.
+    """
+
+    inertia: Array
+    static: Array
+    kinetic: Array
+    weight: Array
+    hold: Array
+    resist: Array
+    leans: NDArray[np.bool_]
+    lies: Array
+    speed: Array
+    slide: Array
+
+
+TRACES = {"slide_m": "slide"}
+
+
+def stand(t: Trials, i: Index) -> None:
+    """At rest, with what holds it and what resists its motion."""
+    values, zeros = t.values, np.zeros((4, t.n))
+    t.own["sliding"] = Mover(
+        inertia=values["mass_kg"].copy(),
+        static=values["friction_static"].copy(),
+        kinetic=values["friction_kinetic"].copy(),
         weight=values["mass_kg"] * GRAVITY,
+        hold=zeros[0],
+        resist=zeros[1],
+        leans=np.zeros(t.n, dtype=bool),
+        lies=np.full(t.n, np.inf),
+        speed=zeros[2],
+        slide=zeros[3],
     )
 
 
-@compiled
-def withdraw(t: Any) -> None:
+def predict(t: Trials, i: Index) -> None:
     """The object is where it has moved to."""
-    t.y[0] -= mover_of(t).slide
+    t.y[0, i] = pick(t.y[0], i) - pick(t.own["sliding"].slide, i)
 
 
-@compiled
-def slip(t: Any) -> None:
-    """Stick first; where the push is more than that holds, slide; stop at rest, exactly."""
-    mover = mover_of(t)
-    drag, speed = mover.kinetic * mover.weight, 0.0
-    if mover.speed > 0.0:
-        speed = give_way(t, drag)
-        if not speed > 0.0:
-            press_at_rest(t)
-    else:
-        press_at_rest(t)
-        if t.loads[0] > mover.static * mover.weight:
-            speed = give_way(t, drag)
-    if speed > 0.0:
-        advance(t, speed)
-    else:
-        mover.speed = 0.0
+def drag(t: Trials, i: Index) -> None:
+    """Coulomb's friction."""
+    mover = t.own["sliding"]
+    weight = pick(mover.weight, i)
+    mover.hold[i] = pick(mover.static, i) * weight
+    mover.resist[i] = pick(mover.kinetic, i) * weight
+
+
+def press(t: Trials, i: Index) -> None:
+    """The loads of a contact whose object may move, and its motion.
+
+    Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is a further
+    compliance h^2/m and a shift, so its solver holds.
+    """
+    mover: Mover = t.own["sliding"]
+    h, speed, resist = pick(t.h, i), pick(mover.speed, i), pick(mover.resist, i)
+    slide, leans = pick(mover.slide, i), pick(mover.leans, i)
+    y, c = pick(t.y[0], i), pick(t.compliance[0], i)
+    gain = h / pick(mover.inertia, i)
+    soft = gain * h
+    y_moving = y - h * speed + soft * resist
+    moving = leans | (speed > 0.0)
+    loads = t.ask(i, np.where(moving, y_moving, y), np.where(moving, c + soft, c))
+    after = np.where(moving, speed + gain * (loads[0] - resist), 0.0)
+    ends, lies = slide + h * after, pick(mover.lies, i)
+    lands = leans & ((ends <= 0.0) | (ends >= lies))
+    goes = moving & (leans | (after > 0.0)) & ~lands
+    stops = moving & ~goes
+    again = (stops | (~moving & (loads[0] > pick(mover.hold, i)))).nonzero()[0]
+    if again.size:
+        # What comes to rest is asked once more at rest, and what sets off as it moves.
+        rests = stops[again]
+        shift = np.where(rests, y[again], y_moving[again])
+        second = t.ask(np.arange(t.n)[i][again], shift, (c + np.where(stops, 0.0, soft))[again])
+        off = np.where(rests, 0.0, gain[again] * (second[0] - resist[again]))
+        right = rests | (off > 0.0)
+        loads[:, again[right]], after[again] = second[:, right], off
+        goes[again] = off > 0.0
+    after = np.where(goes, after, 0.0)
+    step = h * after
+    mover.speed[i] = after
+    mover.slide[i] = np.where(lands, np.clip(ends, 0.0, lies), slide) + step
+    t.y[0, i] = y - step
+    t.loads[:, i] = loads

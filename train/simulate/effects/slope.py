@@ -5,20 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate import base
-from train.simulate.motion import MOVER
-from train.simulate.plan import Build
-from train.simulate.state import State
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
-    """Tilt the table."""
-    build.put("setup", base.ORDER + 11, lean)
-
-
-def lean(state: State) -> None:
-    """The slope as a coefficient of friction more; a thing does not set off by itself."""
-    angle = np.radians(state.values["slope_deg"])
-    mover = state.of(MOVER)
-    mover.static = np.maximum(mover.static * np.cos(angle) + np.sin(angle), 0.0)
-    mover.kinetic = np.maximum(mover.kinetic * np.cos(angle) + np.sin(angle), 0.0)
+def stand(t: Trials, i: Index) -> None:
+    """The slope as a change of the coefficients; a thing does not set off by itself."""
+    mover, angle = t.own["sliding"], np.radians(pick(t.values["slope_deg"], i))
+    for friction in (mover.static, mover.kinetic):
+        friction[i] = np.maximum(pick(friction, i) * np.cos(angle) + np.sin(angle), 0.0)

@@ -3,155 +3,137 @@ number here), damp, and slip off the forearm once bent too far, for good."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-from train.simulate import base, base_steps, streams
-from train.simulate.base_steps import lay_law
-from train.simulate.compiled import indices, integers, vector
-from train.simulate.plan import Build
-from train.simulate.state import Bed, State
-from train.simulate.trial import Part, compiled
-
-STEMS = Part(
-    "stems",
-    *("slip_m", "drag"),
-    *integers("taxel", "following", "part", "order", "damping"),
-    *integers("slopes", "intercepts", "sorted", "loads"),
-)
-"""The bend in metres at which a stem slips off; N s/m of all that bend; of each stem: the positions
-in the window's image of the two rows it lies between, and the part of its load that the second
-bears; which stem is the first, second and so on by depth; N s/m, 0 once it has slipped off; the law
-of those still held, without damping; room for two numbers."""
-stems_of = STEMS.of
+from train.simulate import streams
+from train.simulate.arm import Array
+from train.simulate.base import FAR_M
+from train.simulate.contact import bed_law, total
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
+@dataclass
+class Stems:
+    """Where stems stand and what they do; a trial of fewer has some of no stiffness.
+
+    Attributes:
+        depth, stiffness: (stems, n) metres at which each is met, newtons a metre, 0 once it has
+            slipped off.
+        damping: (stems, n) N s/m of each, 0 once it has slipped off.
+        taxel, part: (stems, n) the place in the window's image of the first of the two rows that a
+            stem lies between, and the part of its load that the second bears.
+        order: (stems, n) which is the first, second and so on by depth.
+        slopes, intercepts: (stems, n) the law of those still held, without damping.
+        drag: (n,) N s/m of all that bend.
+    """
+
+    depth: Array
+    stiffness: Array
+    damping: Array
+    taxel: NDArray[np.intp]
+    part: Array
+    order: NDArray[np.intp]
+    slopes: Array
+    intercepts: Array
+    drag: Array
+
+
+def lay(t: Trials, i: Index) -> None:
     """Stems in place of the bed's rows."""
-    build.replace(base.lay_bed, plant)
-    build.replace(base.order_bed, stand)
-    build.replace(base_steps.image, draw)
-    build.put("tune", base.ORDER, damp)
-    build.put("step", base.SETTLE + 10, bend)
-
-
-def plant(state: State) -> None:
-    """Where the stems stand: (stems, n) depths, rows, columns and stiffnesses."""
-    values = state.values
-    counts = values["stem_count"].astype(np.int64)
-    n, rows = state.n, state.skin.rows
-    shape = (int(counts.max()), n)
-    # Where a plant has fewer stems than its neighbours in the batch, the others weigh nothing.
-    depth, along, around, stiffness = np.ones(shape), *(np.zeros(shape) for _ in range(3))
-    for i, (trial, count) in enumerate(zip(state.trials, counts, strict=True)):
-        generator = streams.stream(state.scene.seed, "stems", trial.key, trial.number)
-        depth[:count, i] = generator.random(count)
-        along[:count, i] = generator.random(count)
-        around[:count, i] = generator.integers(-1, 2, count)
-        stiffness[:count, i] = np.exp(0.3 * generator.standard_normal(count))
+    trials, scene, values = np.arange(t.n)[i], t.scene, t.values
+    counts = values["stem_count"][trials].astype(np.int64)
+    shape = (int(counts.max()), t.n)
+    depth, along, around, stiffness = np.ones(shape), *np.zeros((3, *shape))
+    for trial, count in zip(trials.tolist(), counts.tolist(), strict=True):
+        spec = t.specs[trial]
+        generator = streams.stream(scene.seed, "stems", spec.key, spec.number)
+        depth[:count, trial] = generator.random(count)
+        along[:count, trial] = generator.random(count)
+        around[:count, trial] = generator.integers(-1, 2, count)
+        deviation = values["stem_deviation"][trial]
+        stiffness[:count, trial] = np.exp(deviation * generator.standard_normal(count))
     depth -= depth.min(axis=0)
-    state.bed = Bed(
-        gaps=np.zeros((1, n)),
-        stiffness=values["stem_n_m"][None],
-        weight=stiffness,
-        line_gap=depth * values["stem_spread_m"],
-    )
-    half = 0.5 * np.minimum(values["width_m"], rows * state.skin.row_pitch_m)
-    middle = (state.row_z[0] - state.z) / state.skin.row_pitch_m
-    reach = half / state.skin.row_pitch_m
-    row = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(rows - 1.001, 0.0))
-    window = state.columns.shape[0]
-    column = (window // 2 + around).astype(np.int64)
-    low = np.floor(row).astype(np.int64)
-    taxel = low * window + column
-    beside = window if rows > 1 else 0
-    state.begin(
-        STEMS,
-        taxel=state.lend("stem_taxel", taxel),
-        following=state.lend("stem_following", taxel + beside),
-        part=state.lend("stem_part", row - low),
+    stiffness = np.where(stiffness > 0.0, stiffness * values["stem_n_m"], 0.0)
+    row = t.row_z[0] - t.z, 0.5 * np.minimum(values["width_m"], t.rows * t.skin.row_pitch_m)
+    middle, reach = row[0] / t.skin.row_pitch_m, row[1] / t.skin.row_pitch_m
+    place = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(t.rows - 1.001, 0.0))
+    low, window = np.floor(place), len(t.columns)
+    damping = 2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])
+    t.own["stems"] = Stems(
+        depth=depth * values["stem_spread_m"],
+        stiffness=stiffness,
+        damping=np.where(stiffness > 0.0, damping, 0.0),
+        taxel=(low * window + (window // 2 + around)).astype(np.intp),
+        part=place - low,
+        order=np.zeros(shape, dtype=np.intp),
+        slopes=np.zeros(shape),
+        intercepts=np.zeros(shape),
+        drag=np.zeros(t.n),
     )
 
 
-def stand(state: State) -> None:
-    """The stems by depth, and what each damps: 2 zeta sqrt(k m)."""
-    values, bed, own = state.values, state.bed, state.of(STEMS)
-    stiffness = bed.weight * bed.stiffness
-    damping = (2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])) * (
-        bed.weight > 0.0
-    )
-    own.slip_m = values["stem_slip_m"]
-    own.order = state.lend("stem_order", state.obey(bed.line_gap, stiffness))
-    own.damping = state.lend("stem_damping", damping)
-    own.slopes = state.lend("stem_slopes", state.arrays["slopes"].T)
-    own.intercepts = state.lend("stem_intercepts", state.arrays["intercepts"].T)
-    own.sorted = state.lend("stem_sorted", stiffness)
-    own.loads = state.lend("stem_loads", stiffness)
+def law(t: Trials, i: Index) -> None:
+    """The law of the stems by depth."""
+    own = t.own["stems"]
+    own.order[:, i] = t.obey(i, pick(own.depth, i), pick(own.stiffness, i))
+    let_go(t, i)
 
 
-@njit(error_model="numpy")
-def law(t: Any) -> None:
-    """Slopes and intercepts of the stems that are still held."""
-    own, stiffness = stems_of(t), vector(t.stiffness, 1)[0]
-    order, weight = indices(own.order, t.lines), vector(t.weight, t.lines)
-    in_order = vector(own.sorted, t.lines)
-    for s in range(t.lines):
-        in_order[s] = weight[order[s]] * stiffness
-    lay_law(t, own.sorted, own.slopes, own.intercepts)
+def let_go(t: Trials, i: Index) -> None:
+    """The law of the stems that are still held."""
+    own, order = t.own["stems"], pick(t.own["stems"].order, i)
+    gaps, stiffness = (np.take_along_axis(pick(a, i), order, 0) for a in (own.depth, own.stiffness))
+    own.slopes[:, i], own.intercepts[:, i] = bed_law(gaps, stiffness)
 
 
-@njit(error_model="numpy")
-def lay(t: Any) -> None:
+def tune(t: Trials, i: Index) -> None:
     """The law of the next step: of those still held, and implicitly of what damps those that
     bend."""
-    own = stems_of(t)
-    drag = own.drag / t.h
-    slopes, intercepts = vector(t.slopes, t.lines), vector(t.intercepts, t.lines)
-    held_slopes, held_intercepts = vector(own.slopes, t.lines), vector(own.intercepts, t.lines)
-    for s in range(t.lines):
-        slopes[s] = held_slopes[s] + drag
-        intercepts[s] = held_intercepts[s] + drag * t.depth[0]
+    own = t.own["stems"]
+    drag, stems = pick(own.drag, i) / pick(t.h, i), len(own.depth)
+    t.slopes[:stems, i] = pick(own.slopes, i) + drag
+    t.intercepts[:stems, i] = pick(own.intercepts, i) + drag * pick(t.depth[0], i)
 
 
-@compiled
-def damp(t: Any) -> None:
-    """The law in steps of this length."""
-    lay(t)
-
-
-@compiled
-def bend(t: Any) -> None:
+def settle(t: Trials, i: Index) -> None:
     """Let go of stems bent too far; the others damp the next step."""
-    own = stems_of(t)
-    weight, line_gap = vector(t.weight, t.lines), vector(t.line_gap, t.lines)
-    damping = vector(own.damping, t.lines)
-    gone, own.drag = False, 0.0
-    for stem in range(t.lines):
-        bent = t.depth[0] - line_gap[stem]
-        if bent > own.slip_m and weight[stem] > 0.0:
-            gone, weight[stem], damping[stem] = True, 0.0, 0.0
-        if bent > 0.0:
-            own.drag += damping[stem]
-    if gone:
-        law(t)
-    lay(t)
+    own = t.own["stems"]
+    bent = pick(t.depth[0], i) - pick(own.depth, i)
+    slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(own.stiffness, i) > 0.0)
+    at = slips.any(axis=0).nonzero()[0]
+    if at.size:
+        trials, held = np.arange(t.n)[i][at], ~slips.take(at, -1)
+        own.stiffness[:, trials] *= held
+        own.damping[:, trials] *= held
+        let_go(t, trials)
+    own.drag[i] = total(np.where(bent > 0.0, pick(own.damping, i), 0.0))
+    tune(t, i)
 
 
-@compiled
-def draw(t: Any) -> None:
+def bear(t: Trials, i: Index) -> None:
+    """The force that the skin bears, and how far the first stem is bent."""
+    own, depth = t.own["stems"], pick(t.depth[0], i)
+    held, bent = pick(own.stiffness, i) > 0.0, depth - pick(own.depth, i)
+    t.force[i] = pick(t.loads[0], i)
+    t.deepest[i] = np.where(held, bent, 0.0).max(axis=0)
+    t.inside[i] = np.where(held, bent, FAR_M).max(axis=0)
+
+
+def image(t: Trials, i: Index) -> None:
     """Each stem's load on the two rows it lies between."""
-    own, stiffness = stems_of(t), vector(t.stiffness, 1)[0]
-    weight, line_gap = vector(t.weight, t.lines), vector(t.line_gap, t.lines)
-    taxel, following = indices(own.taxel, t.lines), indices(own.following, t.lines)
-    part, loads = vector(own.part, t.lines), vector(own.loads, t.lines)
-    image, whole = vector(t.image, t.rows * t.columns), 0.0
-    for stem in range(t.lines):
-        loads[stem] = max(t.depth[0] - line_gap[stem], 0.0) * weight[stem] * stiffness
-        whole += loads[stem]
-    image[:] = 0.0
-    for stem in range(t.lines):
-        load = loads[stem] * (t.force / (whole if whole > 0.0 else 1.0))
-        image[taxel[stem]] += load * (1.0 - part[stem])
-        image[following[stem]] += load * part[stem]
+    own, m = t.own["stems"], len(np.arange(t.n)[i])
+    bent = np.maximum(pick(t.depth[0], i) - pick(own.depth, i), 0.0)
+    loads = bent * pick(own.stiffness, i)
+    borne = total(loads)
+    loads = loads * (pick(t.force, i) / np.where(borne > 0.0, borne, 1.0))
+    image, part, every = np.zeros((t.image[..., 0].size, m)), pick(own.part, i), np.arange(m)
+    beside = len(t.columns) if t.rows > 1 else 0
+    shares = zip(pick(own.taxel, i), loads * (1.0 - part), loads * part, strict=True)
+    for taxel, first, second in shares:
+        image[taxel, every] += first
+        image[taxel + beside, every] += second
+    t.image[:, :, i] = image.reshape(*t.image.shape[:2], m)

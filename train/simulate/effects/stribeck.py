@@ -1,37 +1,18 @@
-"""Stribeck's law: friction falls from mu_s to mu_k as the object gathers speed."""
+"""Stribeck's law: friction falls from mu_s to mu_k as the object gathers speed,
+mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), taken at the speed before the step."""
 
 from __future__ import annotations
 
-import math
-from typing import Any
+import numpy as np
 
-from train.simulate import base
-from train.simulate.motion import MOVER, mover_of
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import Part, compiled
-
-STRIBECK = Part("stribeck", "static", "kinetic", "speed")
-"""The coefficients between which friction falls, and the speed in m/s at which it has fallen."""
-stribeck_of = STRIBECK.of
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
-    """Set the drag before each step's motion."""
-    build.put("setup", base.ORDER + 15, begin)
-    build.put("step", base.PREDICT + 12, ease)
-
-
-def begin(state: State) -> None:
-    """At rest."""
-    mover = state.of(MOVER)
-    speed = state.values["stribeck_m_s"]
-    state.begin(STRIBECK, static=mover.static, kinetic=mover.kinetic, speed=speed)
-
-
-@compiled
-def ease(t: Any) -> None:
-    """mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), at the speed before the step."""
-    own, mover = stribeck_of(t), mover_of(t)
-    part = mover.speed / own.speed
-    mover.kinetic = own.kinetic + (own.static - own.kinetic) * math.exp(-(part * part))
+def drag(t: Trials, i: Index) -> None:
+    """The friction of now."""
+    mover = t.own["sliding"]
+    static, kinetic = pick(mover.static, i), pick(mover.kinetic, i)
+    part = pick(mover.speed, i) / pick(t.values["stribeck_m_s"], i)
+    now = kinetic + (static - kinetic) * np.exp(-(part * part))
+    mover.resist[i] = now * pick(mover.weight, i)

@@ -6,129 +6,160 @@ Rows then press to different depths, a + lever * tilt, and the loads are a force
 
 from __future__ import annotations
 
-import math
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from train.simulate import base, base_steps
-from train.simulate.base_steps import crossed, deepest, pose
-from train.simulate.compiled import vector
-from train.simulate.contact import by_depth, covered, curve_gap
-from train.simulate.pivot_solver import GUARDED_ROUNDS, PIVOT, pivot_of, search
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import compiled
+from train.simulate import base
+from train.simulate.arm import Array, cross, dot
+from train.simulate.contact import by_depth, covered, curve_gap, total
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, search
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
-
-def add(build: Build) -> None:
-    """Take the place of the base's geometry, solver and line depths."""
-    bursts = "pop" in build.effects
-
-    def upright(state: State) -> None:
-        """No load yet."""
-        column, gaps, stiffness = by_depth(state.bed.gaps, state.bed.stiffness)
-        none = np.zeros((state.skin.rows, state.n))
-        state.trial.coordinates = 2
-        state.begin(
-            PIVOT,
-            springs=len(gaps),
-            gaps=state.lend("pivot_gaps", gaps),
-            stiffness=state.lend("pivot_stiffness", stiffness),
-            column=state.lend("pivot_column", column),
-            alive=state.trial.alive,
-            bursts=bursts,
-            rows=state.skin.rows,
-            **{name: state.lend(name, none) for name in ("lever", "held", "out")},
-            gain=1.0,
-            guarded_rounds=GUARDED_ROUNDS,
-        )
-
-    def lay(state: State) -> None:
-        """The rows are those of the bed."""
-        own = state.of(PIVOT)
-        own.weight, own.line_gap = state.trial.weight, state.trial.line_gap
-
-    build.replace(base.order_bed, upright)
-    build.replace(base_steps.locate, pivot)
-    build.replace(base_steps.bear, bear)
-    build.put("setup", base.HAND_OVER + 2, lay)
-    build.put("step", base.SETTLE + 20, remember)
-    build.wrap(solve)
+ALIKE = 16
+"""Trials whose rows have as many springs, up to a multiple of this, are solved as one array."""
 
 
-@compiled
-def pivot(t: Any) -> None:
-    """Depth and tilt against the object's face at the frame's joint angles, with their
-    Jacobians; which rows the face covers, and their levers about its middle."""
-    pose(t)
-    own = pivot_of(t)
-    row_z, lever = vector(t.row_z, t.rows), vector(own.lever, t.rows)
-    weight, line_gap = vector(t.weight, t.rows), vector(t.line_gap, t.rows)
-    radius, turned = t.skin_radius_m, t.rotation
-    z, tilt, from_middle, across = 0.0, 0.0, 0.0, 0.0
-    for i in range(3):
-        away = t.origin[i] - t.face[i]
-        z -= away * turned[i, 2]
-        tilt += t.normal[i] * turned[i, 2]
-        from_middle += away * t.along_face[i]
-        across += turned[i, 2] * t.along_face[i]
-    z = min(max(z, row_z[t.rows - 1]), row_z[0])
-    upright = math.sqrt(1.0 - tilt * tilt)
-    for row in range(t.rows):
-        on_face = from_middle + row_z[row] * across
-        weight[row] = covered(on_face, t.width_m, t.row_pitch_m)
-        line_gap[row] = curve_gap(on_face, t.face_radius_m)
-        lever[row] = row_z[row] - z
-    depth = 0.0
-    for i in range(3):
-        t.point[i] = t.origin[i] + turned[i, 2] * z
-        depth += (t.origin[i] - t.face[i] + turned[i, 2] * z) * t.normal[i]
-    t.compliance[0], t.compliance[1], t.compliance[2] = 0.0, 0.0, 0.0
-    for j in range(t.joints):
-        push, turn = 0.0, 0.0
-        cross = crossed(t.normal, t.axes, j)
-        for i in range(3):
-            turn += turned[i, 2] * cross[i]
-            push += (t.point[i] - t.origins[i, j]) * cross[i]
-        push -= radius * tilt / upright * turn
-        t.jacobian[0, j], t.jacobian[1, j] = push, turn
-        t.compliance[0] += push * push * t.give[j]
-        t.compliance[1] += push * turn * t.give[j]
-        t.compliance[2] += turn * turn * t.give[j]
-        t.q_frame[j] = t.q[j]
-    t.y_frame[0], t.y_frame[1] = depth + radius * upright, tilt
+@dataclass
+class Group:
+    """Trials whose rows have about as many springs.
+
+    Attributes:
+        trials: (m,) which they are.
+        springs: in the order of their depth.
+        order: (S, m) which of `Trials.gaps` each is.
+        intact: (S, m) newtons a metre, as long as none is gone.
+    """
+
+    trials: NDArray[np.intp]
+    springs: Springs
+    order: NDArray[np.intp]
+    intact: Array
 
 
-@compiled
-def bear(t: Any) -> None:
-    """The force that the skin bears, which is what of the push goes along its own normal, and each
-    line's depth."""
-    tilt = t.depth[1]
-    t.force = t.loads[0] * math.sqrt(max(1.0 - tilt * tilt, 0.0))
-    lever = vector(pivot_of(t).lever, t.rows)
-    line_depth, line_gap = vector(t.line_depth, t.rows), vector(t.line_gap, t.rows)
-    for row in range(t.rows):
-        line_depth[row] = t.depth[0] + lever[row] * tilt - line_gap[row]
-    deepest(t)
+@dataclass
+class Tilt:
+    """A pivoting forearm's contact.
+
+    Attributes:
+        lever: (rows, n) metres of each row from the contact's middle.
+        guess, settled: (2, n) the loads that the next search begins with, and the last step's.
+        groups: the beds' springs.
+    """
+
+    lever: Array
+    guess: Array
+    settled: Array
+    groups: list[Group] = field(default_factory=list)
+
+    def keep_alive(self, trials: NDArray[np.intp], first: int, alive: Array) -> None:
+        """Leave some trials those springs alone that are still there.
+
+        Args:
+            trials: (m,) which, in ascending order.
+            first: the place in `Trials.gaps` of the springs that may be gone.
+            alive: (S, rows, m) 1 where one is left, 0 where it is gone.
+        """
+        for group in self.groups:
+            mine = np.isin(trials, group.trials).nonzero()[0]
+            if not mine.size:
+                continue
+            at, old = np.searchsorted(group.trials, trials[mine]), group.springs
+            same = old.stiffness.shape[1] == 1
+            stiffness = np.repeat(old.stiffness, alive.shape[1] if same else 1, axis=1)
+            which = group.order.take(at, -1)[:, None] - first
+            left = np.take_along_axis(alive.take(mine, -1), which, axis=0)
+            stiffness[:, :, at] = group.intact.take(at, -1)[:, None] * left
+            group.springs = Springs(old.at, old.gaps, stiffness, old.nearest)
 
 
-@compiled
-def remember(t: Any) -> None:
-    """The next step's loads will go on as these did."""
-    own = pivot_of(t)
-    for i in range(2):
-        own.guess[i] = 2.0 * t.loads[i] - own.settled[i]
-        own.settled[i] = t.loads[i]
+def law(t: Trials, i: Index) -> None:
+    """Each row's springs, in the order of their depth."""
+    own = t.own["tilt"] = Tilt(np.zeros((t.rows, t.n)), *np.zeros((2, 2, t.n)))
+    trials = np.arange(t.n)[i]
+    order, gaps, stiffness = by_depth(pick(t.gaps, i), pick(t.stiffness, i))
+    counts = np.isfinite(gaps).sum(axis=0)
+    sizes = -(-counts // ALIKE)
+    for size in np.unique(sizes):
+        at = (sizes == size).nonzero()[0]
+        deep = int(counts[at].max())
+        some, k = gaps[:deep].take(at, -1), stiffness[:deep].take(at, -1)
+        springs = Springs(trials[at], some[:, None], k[:, None], some.min(axis=1))
+        own.groups.append(Group(trials[at], springs, order[:deep].take(at, -1), k))
 
 
-@compiled
-def solve(t: Any) -> None:
+def locate(t: Trials, i: Index) -> None:
+    """Depth and tilt against the object's face at the frame's joint angles, with their Jacobians;
+    which rows the face covers, and their levers about its middle."""
+    q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
+    along_face, radius = pick(t.along_face, i), t.skin.radius_m
+    pose = t.kinematics.pose(q)
+    along, away = pose.rotation[2], pose.origin - face
+    tilt = dot(normal, along)
+    z = np.clip(-dot(away, along), t.row_z[-1], t.row_z[0])
+    on_face = dot(away, along_face) + t.row_z * dot(along, along_face)
+    t.weight[:, i] = covered(on_face, pick(t.values["width_m"], i), t.skin.row_pitch_m)
+    t.line_gap[:, i] = curve_gap(on_face, pick(t.values["radius_m"], i))
+    t.own["tilt"].lever[:, i] = t.row_z - z
+    point, upright = pose.origin + along * z, np.sqrt(1.0 - tilt * tilt)
+    crossed = cross(normal[:, None], pose.axes)
+    turn = dot(along[:, None], crossed)
+    push = dot(point[:, None] - pose.origins, crossed) - radius * tilt / upright * turn
+    jacobian = np.stack([push, turn], axis=1)
+    given = jacobian * pick(t.give, i)[:, None]
+    t.jacobian[:, :, i] = jacobian
+    t.compliance[:2, i] = total(push[:, None] * given)
+    t.compliance[2, i] = total(turn * given[:, 1])
+    t.y_frame[0, i] = dot(point - face, normal) + radius * upright
+    t.y_frame[1, i] = tilt
+    base.keep_pose(t, i, q, point, pose.axes, pose.origins)
+
+
+def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
-    own = pivot_of(t)
-    own.free0, own.free1 = t.free[0], t.free[1]
-    own.c00, own.c01, own.c11 = t.c[0], t.c[1], t.c[2]
-    search(own)
-    t.found[0], t.found[1] = own.force, own.moment
-    if own.lost:
-        t.lost = 1.0
+    own, viscous = t.own["tilt"], t.own.get("viscous")
+    trials = np.arange(t.n)[i]
+    place = np.full(t.n, -1)
+    place[trials] = np.arange(len(trials))
+    springs = []
+    for group in own.groups:
+        at = place[group.trials]
+        mine = (at >= 0).nonzero()[0]
+        if mine.size == len(at):
+            found = group.springs
+            springs.append(Springs(at, found.gaps, found.stiffness, found.nearest))
+        elif mine.size:
+            parts = (group.springs.gaps.take(mine, -1), group.springs.stiffness.take(mine, -1))
+            springs.append(Springs(at[mine], *parts, group.springs.nearest))
+    pivots = Pivots(
+        springs,
+        pick(t.weight, i),
+        pick(t.line_gap, i),
+        pick(own.lever, i),
+        1.0 if viscous is None else pick(viscous.gain, i),
+        0.0 if viscous is None else pick(viscous.load, i),
+        np.stack([y, pick(t.y[1], i)]),
+        np.stack([c, pick(t.compliance[1], i), pick(t.compliance[2], i)]),
+    )
+    found = search(pivots, pick(own.guess, i), GUARDED_ROUNDS)
+    t.row_force[:, i] = found.rows
+    t.lost[i] |= found.lost
+    return found.loads
+
+
+def settle(t: Trials, i: Index) -> None:
+    """The next step's loads will go on as these did."""
+    own, loads = t.own["tilt"], pick(t.loads, i)
+    own.guess[:, i] = 2.0 * loads - pick(own.settled, i)
+    own.settled[:, i] = loads
+
+
+def bear(t: Trials, i: Index) -> None:
+    """The force that the skin bears, which is the push's part along its own normal, and each row's
+    depth."""
+    tilt = pick(t.depth[1], i)
+    t.force[i] = pick(t.loads[0], i) * np.sqrt(np.maximum(1.0 - tilt * tilt, 0.0))
+    depth = pick(t.depth[0], i) + pick(t.own["tilt"].lever, i) * tilt - pick(t.line_gap, i)
+    base.keep_depth(t, i, depth, pick(t.weight, i))

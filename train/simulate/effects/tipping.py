@@ -10,74 +10,50 @@ makes no energy) and the rest implicitly.
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from train.simulate import base
-from train.simulate.base_steps import press_at_rest
-from train.simulate.effects import sliding
-from train.simulate.motion import GRAVITY, MOVER, advance, give_way, mover_of
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import Part, compiled
-
-TIPPING = Part("tipping", ("tips", "?"), "force", "travel", "lies")
-"""Whether the trial's object tips, the push that starts it, the travel until it falls, and the
-travel until it lies."""
-tipping_of = TIPPING.of
+from train.simulate.arm import Array
+from train.simulate.contact import GRAVITY
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 
-def add(build: Build) -> None:
-    """Let the object tip where that takes less."""
-    build.put("setup", base.ORDER + 20, balance)
-    build.replace(sliding.slip, topple)
+@dataclass
+class Tipping:
+    """Whether each object tips (n,), the push that starts it in newtons (n,), and the metres of
+    travel until it falls (n,)."""
+
+    tips: NDArray[np.bool_]
+    force: Array
+    travel: Array
 
 
-def balance(state: State) -> None:
+def stand(t: Trials, i: Index) -> None:
     """Which objects tip, at what push, and how far until they fall.
 
     The object is taken for a box twice as high as the contact: its moment of inertia about the
     edge is m (base^2 + 4 height^2) / 3, felt at the contact as that over height^2.
     """
-    values, mover = state.values, state.of(MOVER)
-    foot, height = values["base_m"], values["height_m"]
-    own = state.begin(
-        TIPPING,
-        tips=mover.static > foot / (2.0 * height),
-        force=values["mass_kg"] * GRAVITY * foot / (2.0 * height),
+    mover, mass = t.own["sliding"], t.values["mass_kg"]
+    foot, height = t.values["base_m"], t.values["height_m"]
+    own = t.own["tipping"] = Tipping(
+        tips=t.plan.calls["tipping"] & (mover.static > foot / (2.0 * height)),
+        force=mass * GRAVITY * foot / (2.0 * height),
         travel=height * np.arctan2(foot, 2.0 * height),
-        lies=0.5 * math.pi * height,
     )
-    turned = values["mass_kg"] * (foot * foot / (height * height) + 4.0) / 3.0
+    turned = mass * (foot * foot / (height * height) + 4.0) / 3.0
     mover.inertia = np.where(own.tips, turned, mover.inertia)
+    mover.lies = np.where(own.tips, 0.5 * math.pi * height, mover.lies)
 
 
-@compiled
-def topple(t: Any) -> None:
-    """As `sliding.slip`, but a leaning object moves either way and rests on its foot alone."""
-    own, mover = tipping_of(t), mover_of(t)
-    leans = own.tips and mover.slide > 0.0
-    hold, drag = mover.static * mover.weight, mover.kinetic * mover.weight
-    if own.tips:
-        hold, drag = own.force, own.force * (1.0 - mover.slide / own.travel)
-    moving = leans or mover.speed > 0.0
-    if not moving:
-        press_at_rest(t)
-        moving = t.loads[0] > hold
-    speed, moves, rests_at = 0.0, False, mover.slide
-    if moving:
-        speed = give_way(t, drag)
-        moves = leans or speed > 0.0
-        if leans:
-            ends = mover.slide + t.h * speed
-            if ends <= 0.0:
-                moves, rests_at = False, 0.0
-            elif ends >= own.lies:
-                moves, rests_at = False, own.lies
-    if moves:
-        advance(t, speed)
-    else:
-        if leans or mover.speed > 0.0:
-            press_at_rest(t)
-        mover.speed, mover.slide = 0.0, rests_at
+def drag(t: Trials, i: Index) -> None:
+    """What holds a thing that tips is its weight's lever alone."""
+    own, mover = t.own["tipping"], t.own["sliding"]
+    tips, force, slide = pick(own.tips, i), pick(own.force, i), pick(mover.slide, i)
+    mover.leans[i] = tips & (slide > 0.0)
+    mover.hold[i] = np.where(tips, force, pick(mover.hold, i))
+    leaning = force * (1.0 - slide / pick(own.travel, i))
+    mover.resist[i] = np.where(tips, leaning, pick(mover.resist, i))

@@ -11,71 +11,58 @@ do the columns of the forearm that touch it.
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate import base
-from train.simulate.compiled import integers, matrix
-from train.simulate.motion import MOVER, mover_of
-from train.simulate.plan import Build
-from train.simulate.state import State
-from train.simulate.trial import Part, compiled
+from train.simulate.arm import Array
+from train.simulate.plan import Index
+from train.simulate.trials import Trials, pick
 
 LEVER = 2.0 / 3.0
-"""Of a disc's radius: what its friction's moment is over its friction."""
-
-TURNING = Part("turning", "per_metre", "columns_per_radian", "turned", *integers("moved"))
-"""Radians for each metre that it moves at the contact; columns of the whole skin in a radian;
-radians that it has turned; room for an image."""
-turning_of = TURNING.of
+"""Of a disc's radius: the moment of its friction for each newton of it."""
+TRACES = {"turn_rad": "turned"}
 
 
-def add(build: Build) -> None:
-    """Let it turn."""
-    build.put("setup", base.ORDER + 12, balance)
-    build.put("sample", base.IMAGE + 25, follow)
-    build.trace("turn_rad", TURNING, "turned")
+@dataclass
+class Turning:
+    """Radians for each metre that an object moves at the contact, and radians turned; (n,)."""
+
+    per_metre: Array
+    turned: Array
 
 
-def balance(state: State) -> None:
+def stand(t: Trials, i: Index) -> None:
     """What an off-centre push finds of friction and of mass."""
-    aside, radius = state.values["aside_m"], 0.5 * state.values["foot_m"]
+    aside, radius = pick(t.values["aside_m"], i), 0.5 * pick(t.values["foot_m"], i)
     lever = LEVER * radius
-    away = aside * aside / (lever * lever)
-    mover = state.of(MOVER)
-    easier = 1.0 / np.sqrt(1.0 + away)
-    mover.static = mover.static * easier
-    mover.kinetic = mover.kinetic * easier
+    mover, easier = t.own["sliding"], 1.0 / np.sqrt(1.0 + aside * aside / (lever * lever))
+    mover.static[i] = pick(mover.static, i) * easier
+    mover.kinetic[i] = pick(mover.kinetic, i) * easier
     # A disc's own moment of inertia is m R^2 / 2.
-    mover.inertia = mover.inertia / (1.0 + 2.0 * aside * aside / (radius * radius))
-    state.begin(
-        TURNING,
-        per_metre=aside / (lever * lever + aside * aside),
-        columns_per_radian=state.skin.cols / (2.0 * math.pi),
-        moved=state.lend("turned", np.zeros((state.skin.rows, *state.columns.shape))),
-    )
+    heavier = 1.0 + 2.0 * aside * aside / (radius * radius)
+    mover.inertia[i] = pick(mover.inertia, i) / heavier
+    own = t.own["turning"] = Turning(*np.zeros((2, t.n)))
+    own.per_metre[i] = aside / (lever * lever + aside * aside)
 
 
-@compiled
-def follow(t: Any) -> None:
-    """The image moves around the forearm with the face; a load between two columns is theirs in
-    parts, and one beyond the window is its last column's."""
-    own = turning_of(t)
-    own.turned = own.per_metre * mover_of(t).slide
-    columns = own.turned * own.columns_per_radian
-    if columns == 0.0:
+def pass_on(t: Trials, i: Index) -> None:
+    """The image moves around the forearm with the face; a load between two columns is shared by
+    them, and one beyond the window is its last column's."""
+    own = t.own["turning"]
+    turned = pick(own.per_metre, i) * pick(t.own["sliding"].slide, i)
+    own.turned[i] = turned
+    columns = turned * (t.skin.cols / (2.0 * math.pi))
+    some = (columns != 0.0).nonzero()[0]
+    if not some.size:
         return
-    whole = math.floor(columns)
-    part, further = columns - whole, int(whole)
-    image, moved = matrix(t.image, t.rows, t.columns), matrix(own.moved, t.rows, t.columns)
-    moved[:] = 0.0
-    for beyond in range(2):
-        share = part if beyond else 1.0 - part
-        for row in range(t.rows):
-            for column in range(t.columns):
-                load = image[row, column]
-                if load > 0.0:
-                    to = min(max(column + further + beyond, 0), t.columns - 1)
-                    moved[row, to] += load * share
-    image[:] = moved
+    further = np.floor(columns[some])
+    part, trials, last = columns[some] - further, np.arange(t.n)[i][some], len(t.columns) - 1
+    image = t.image.take(trials, -1)
+    moved, every = np.zeros_like(image), np.arange(len(some))
+    for beyond, share in ((0, 1.0 - part), (1, part)):
+        shared = image * share
+        for column in range(last + 1):
+            to = np.clip(column + beyond + further, 0, last).astype(np.intp)
+            moved[:, to, every] += shared[:, column]
+    t.image[:, :, trials] = moved
