@@ -121,9 +121,7 @@ def anew(context: Context, scenes: Mapping[str, Scene]) -> dict[str, list[Featur
         shown = next(iter(group.values()))
         for trials in parts(shown, jobs=BATCHES):
             drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
-            cases.append(
-                (group, drawn, set(wanted), data.layout, data.tracking, data.chain)
-            )
+            cases.append((group, drawn, set(wanted), data.layout, data.tracking, data.chain))
     merged: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
     for answer in context.map("simulated again", measured, cases):
         for name, contacts in answer.items():
