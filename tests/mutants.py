@@ -59,7 +59,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="mutants", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--count", type=int, default=200, help="mutants to draw (%(default)s)")
     parser.add_argument("--seed", type=int, default=2012, help="of the draw (%(default)s)")
-    parser.add_argument("--minutes", type=float, default=10.0, help="at most (%(default)s)")
+    parser.add_argument("--minutes", type=float, default=15.0, help="at most (%(default)s)")
     parser.add_argument("--only", default="", help="draw from mutants whose name contains this")
     arguments = parser.parse_args()
     generate()
