@@ -167,7 +167,10 @@ class AD7147(Chip):
         """Read all taxels, and once more where the last byte is 0xFF.
 
         Such a byte may be a value, or a transfer that broke off before it; the words carry no
-        check that could tell.
+        check that could tell. A burst during which a conversion ends mixes words of two
+        conversions, each of them a value of its own. Reading the status first would not prevent
+        that, since a conversion may end after it. That a single word is never mixed is assumed;
+        the data sheet does not say.
         """
         self.bus.transfer(self.frame)
         if self.frame.buffer[-1] == 0xFF:

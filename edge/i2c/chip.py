@@ -10,6 +10,7 @@ import random
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,6 +158,11 @@ class ChipSpec:
         return f"{way}address {self.address:#04x}"
 
     @property
+    def channel_route(self) -> tuple[int | None, int | None]:
+        """Mux and channel; chips with the same ones need one selection."""
+        return self.mux, self.channel
+
+    @property
     def highest(self) -> int:
         """The largest raw value that is not saturated."""
         return self.kind.highest(self)
@@ -166,7 +172,7 @@ class ChipSpec:
         """Bytes of one reading."""
         return self.kind.frame_bytes(self)
 
-    @property
+    @cached_property
     def frame_bits(self) -> int:
         """Bits on the wire of one reading, `[write pointer][read frame]`."""
         pointer = write(self.address, bytes(self.kind.pointer_bytes))

@@ -104,7 +104,7 @@ class Skin:
         self.file, self.layout = file, file.layout
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
-        self.scheduler = ReadScheduler.of(file) if file.reading.region_of_interest else None
+        self.scheduler = ReadScheduler(file) if file.reading.region_of_interest else None
         threshold = file.layout.threshold_counts
         self.touch_counts = threshold if touch_counts is None else min(threshold, touch_counts)
         self.oldest_s = self.period_s * (OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES)

@@ -10,7 +10,7 @@ from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
-from edge.skin.read_scheduler import SELECT_BITS, VERIFY_BITS, ReadScheduler, spread_by
+from edge.skin.read_scheduler import SELECT_BITS, VERIFY_BITS, ReadScheduler, with_neighbours
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker
@@ -23,7 +23,7 @@ SCHEDULED = replace(ONE, reading=replace(ONE.reading, region_of_interest=True))
 
 @pytest.fixture
 def scheduler():
-    return ReadScheduler.of(ONE)
+    return ReadScheduler(ONE)
 
 
 def touched(*places):
@@ -84,7 +84,7 @@ def test_a_contact_larger_than_the_wire_is_read_in_turn(scheduler):
 
 def test_a_wire_too_slow_for_one_chip_still_reads_one():
     slow = replace(ONE, buses=(replace(ONE.buses[0], clock_hz=10_000),))
-    scheduler = ReadScheduler.of(slow)
+    scheduler = ReadScheduler(slow)
     seen = [scheduler.plan(None)[0] for _ in range(32)]
     assert sorted(i for chips in seen for i in chips) == list(range(32))
 
@@ -94,7 +94,7 @@ def test_a_wire_too_slow_for_one_chip_still_reads_one():
 )
 def test_reading_a_mux_back_is_paid_for_where_it_is_done(verify, bits):
     file = replace(ONE, reading=replace(ONE.reading, verify_mux=verify))
-    assert [budget.select for budget in ReadScheduler.of(file)._budgets] == [bits]
+    assert ReadScheduler(file).select_bits == bits
 
 
 def test_every_plan_fits_the_period():
@@ -135,8 +135,8 @@ def test_a_taxel_keeps_its_value_and_its_own_time_until_it_is_read_again():
 def test_masks_grow_across_the_seam_only_where_there_is_one():
     mask = np.zeros((1, 3, 4), dtype=bool)
     mask[0, 1, 0] = True
-    assert spread_by(mask, 1, True)[0].astype(int).tolist() == [[1, 1, 0, 1]] * 3
-    assert spread_by(mask, 1, False)[0].astype(int).tolist() == [[1, 1, 0, 0]] * 3
+    assert with_neighbours(mask, True)[0].astype(int).tolist() == [[1, 1, 0, 1]] * 3
+    assert with_neighbours(mask, False)[0].astype(int).tolist() == [[1, 1, 0, 0]] * 3
 
 
 def felt(file, recording, info):
