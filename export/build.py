@@ -53,11 +53,11 @@ class Builder:
     def by_decision_point_small(self, values: Sequence[Any]) -> str:
         """As `by_decision_point`, stored in float32 where that holds all values exactly.
 
-        A single value stays float64: to convert it in each decision would take longer.
+        A single value is converted when the model is loaded, and costs a decision nothing.
         """
         with np.errstate(over="ignore"):
             small = [np.asarray(value).astype(np.float32) for value in values]
-        if len(values) == 1 or not np.array_equal(small, values):
+        if not all(map(np.array_equal, small, values)):
             return self.by_decision_point(values)
         return self.node("Cast", [self.by_decision_point(small, np.float32)], to=TensorProto.DOUBLE)
 

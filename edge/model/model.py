@@ -82,8 +82,8 @@ class Model:
         # One thread is fastest for models of this size.
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 3
-        # The exported graph has nothing left to optimise, and the board's memory is dear.
-        options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_DISABLE_ALL
+        # Converts the constants that are stored in float32 once; there is no more to optimise.
+        options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
         options.enable_cpu_mem_arena = False
         try:
             # By its name: from bytes, it would hold the file in memory twice, and keep one.

@@ -44,6 +44,22 @@ def test_rows_beyond_the_recorded_ones_are_like_them_and_the_same_every_time():
     assert len(np.unique(more, axis=0)) == 12
 
 
+def test_prices_are_medians_in_microseconds(monkeypatch):
+    """A clock that a decision puts forward by what it costs, every fourth time by ten times that."""
+    now, calls = 0, 0
+
+    def decision(ns):
+        def decide():
+            nonlocal now, calls
+            calls += 1
+            now += ns * (10 if calls % 4 == 0 else 1)
+
+        return decide
+
+    monkeypatch.setattr(measured.time, "perf_counter_ns", lambda: now)
+    assert measured.medians_us([decision(1500), decision(64000)], 60) == [1.5, 64.0]
+
+
 def test_the_report_sets_accuracy_beside_the_price(written, recordings):
     dataset = load_trials([recordings], horizon_s=1.2)
     measured = SimpleNamespace(
