@@ -45,7 +45,7 @@ def test_rows_beyond_the_recorded_ones_are_like_them_and_the_same_every_time():
 
 
 def test_prices_are_medians_in_microseconds(monkeypatch):
-    """A clock that a decision puts forward by what it costs, every fourth time by ten times that."""
+    """Each decision puts the clock forward by its cost, every fourth time by ten times that."""
     now, calls = 0, 0
 
     def decision(ns):

@@ -87,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     seeds = range(arguments.first, arguments.first + arguments.sets)
     total = Judgement()
-    with ProcessPoolExecutor(arguments.jobs, threadpool_limits, initargs=(1,)) as pool:
+    with ProcessPoolExecutor(arguments.jobs, initializer=threadpool_limits, initargs=(1,)) as pool:
         for family in (family for family in FAMILIES if arguments.only in family):
             run = pool.map(single, [(family, seed) for seed in seeds], chunksize=20)
             sets = list(tqdm(run, total=len(seeds), desc=family, leave=False))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -78,39 +77,6 @@ def duplicates(draw: np.random.Generator) -> Hard:
     return Hard(X, labels(draw, len(X)), queries, choice(draw, len(X), scaling))
 
 
-def spheres(draw: np.random.Generator) -> Hard:
-    """Rows equally far from the query: one step with its signs and columns changed."""
-    n = 2 * int(draw.integers(4, 20))
-    used = int(draw.integers(2, 7))
-    step = draw.integers(1, 100, used) * 2.0 ** draw.integers(-10, 11)
-    X = np.zeros((n, WIDTH))
-    for i in range(0, n, 2):
-        X[i, draw.choice(WIDTH, used, replace=False)] = step * draw.choice([-1.0, 1.0], used)
-        X[i + 1] = -X[i]
-    queries = np.zeros((QUERIES, WIDTH))  # the middle of the sphere, and rows near it
-    queries[1::2] = X[draw.integers(0, n, len(queries[1::2]))] * 2.0 ** -draw.integers(1, 30)
-    return Hard(X, labels(draw, n), queries, choice(draw, n))
-
-
-def permutations(draw: np.random.Generator) -> Hard:
-    """Equal distances whose squares are the same numbers in another order: a sum that rounds
-    depends on it. Every sign of every order of three numbers, so that components lie along the
-    columns; a few rows further out tell the columns apart."""
-    columns = draw.choice(WIDTH, 3, replace=False)
-    step = draw.normal(size=3) * 10.0 ** draw.uniform(-6.0, 6.0)
-    signs = np.array(list(itertools.product([-1.0, 1.0], repeat=3)))
-    orders = np.array(list(itertools.permutations(step)))
-    points = (orders[:, None] * signs).reshape(-1, 3)
-    far = np.diag(np.abs(step).max() * np.array([4.0, 6.0, 9.0]))
-    points = np.concatenate([points[draw.permutation(len(points))], far, -far])
-    X, queries = np.zeros((len(points), WIDTH)), np.zeros((QUERIES, WIDTH))
-    X[:, columns] = points
-    # On the diagonal, where the orders of one sign are equally far, and in the middle of all.
-    away = step[0] * draw.normal(size=(QUERIES - 1, 1))
-    queries[1:, columns] = draw.choice([-1.0, 1.0], 3) * away
-    return Hard(X, labels(draw, len(X)), queries, choice(draw, len(X)))
-
-
 def near_duplicates(draw: np.random.Generator) -> Hard:
     """Rows that differ in a part of 1e-1 to 1e-15 of themselves."""
     n, base = int(draw.integers(8, 40)), typical(draw, 3)
@@ -142,18 +108,6 @@ def scales(draw: np.random.Generator) -> Hard:
     return Hard(X, labels(draw, n), draw.normal(size=(QUERIES, WIDTH)) * size, choice(draw, n))
 
 
-def bisectors(draw: np.random.Generator) -> Hard:
-    """Queries midway between two rows, and off the middle by 1e-1 to 1e-16 of the way."""
-    n = int(draw.integers(8, 40))
-    X = typical(draw, n)
-    a, b = X[draw.integers(0, n, QUERIES)], X[draw.integers(0, n, QUERIES)]
-    way = 0.5 + draw.choice([-1.0, 0.0, 1.0], (QUERIES, 1)) * 10.0 ** -draw.uniform(
-        1.0, 16.0, (QUERIES, 1)
-    )
-    scaling = str(draw.choice(["none", "III", "IV"]))
-    return Hard(X, labels(draw, n), a + way * (b - a), choice(draw, n, scaling))
-
-
 def discriminants(draw: np.random.Generator) -> Hard:
     """Classes told apart by a projection that is made for them, with ties of equal rows."""
     n = int(draw.integers(20, 60))
@@ -173,17 +127,8 @@ def outside(draw: np.random.Generator) -> Hard:
     return replace(hard, queries=hard.queries + away * typical(draw, QUERIES))
 
 
-def limits(draw: np.random.Generator) -> Hard:
-    """Spreads near the smallest and the largest that are taken, 1e-30 and 1e100."""
-    n = int(draw.integers(8, 40))
-    size = float(draw.choice([1e-29, 1e97])) * 10.0 ** draw.uniform(-1.0, 1.0)
-    X = np.repeat(draw.normal(size=((n + 1) // 2, WIDTH)) * size, 2, axis=0)[:n]
-    X[::2] *= 1.0 + 10.0 ** -draw.uniform(6.0, 16.0) * draw.normal(size=X[::2].shape)
-    return Hard(X, labels(draw, n), X[:QUERIES] + 0.1 * size, choice(draw, n))
-
-
 def columns(draw: np.random.Generator) -> Hard:
-    """Up to 600 values a trial, from 129 on with fewer bits for each weight."""
+    """Up to 600 values a trial."""
     n, width = int(draw.integers(8, 14)), 3 * int(draw.integers(30, 200))
     X = draw.gamma(2.0, size=(n, width)) * (1.0 + draw.choice([0.0, 1e9]))
     X[1::2] = X[::2][: n // 2] * (1.0 + 10.0 ** -draw.uniform(1.0, 15.0))
@@ -203,17 +148,6 @@ def dominated(draw: np.random.Generator) -> Hard:
     return Hard(X, labels(draw, n), queries, choice(draw, n, scaling))
 
 
-def lines(draw: np.random.Generator) -> Hard:
-    """Rows on one line, in steps that are equal or nearly so; queries on the line."""
-    n = int(draw.integers(8, 40))
-    start = typical(draw, 1) * 10.0 ** draw.uniform(0.0, 8.0)
-    step = draw.normal(size=WIDTH) * 10.0 ** draw.uniform(-6.0, 3.0)
-    at = draw.integers(-6, 7, (n, 1)) + draw.choice([0.0, 1e-14, 1e-9]) * draw.normal(size=(n, 1))
-    queries = start + 0.5 * draw.integers(-12, 13, (QUERIES, 1)) * step
-    scaling = str(draw.choice(["none", "I", "II", "III", "IV", "V"]))
-    return Hard(start + at * step, labels(draw, n), queries, choice(draw, n, scaling))
-
-
 def denormals(draw: np.random.Generator) -> Hard:
     """Columns of a few of the smallest numbers that there are, beside ordinary ones."""
     n = int(draw.integers(8, 40))
@@ -229,8 +163,8 @@ def denormals(draw: np.random.Generator) -> Hard:
 FAMILIES: dict[str, Callable[[np.random.Generator], Hard]] = {
     family.__name__: family
     for family in (
-        contacts, lattices, duplicates, spheres, permutations, near_duplicates, offsets, scales,
-        bisectors, discriminants, outside, limits, columns, dominated, lines, denormals,
+        contacts, lattices, duplicates, near_duplicates, offsets, scales, discriminants, outside,
+        columns, dominated, denormals,
     )
 }  # fmt: skip
 

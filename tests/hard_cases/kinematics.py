@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -13,10 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from edge.runtime.joint_stream import Joints
 from edge.touch.arm import Chain, Joint
-from edge.touch.frame import Frame
-from edge.touch.track import ContactTracker, TrackSettings
 from tests.hard_cases.cases import Case
-from tests.hard_cases.frames import FOREARM, SEEDS, taxels
+from tests.hard_cases.frames import SEEDS
 
 
 def limits_usual() -> str:
@@ -112,21 +109,6 @@ def line_error(angle: float, step: float) -> float:
     return float(np.abs(turn.pose(seen) - turn.pose([angle + 0.5 * step])).max())
 
 
-def moved_error(seed: int) -> float:
-    """Motion of a region that stays in the world while the link turns under it by 2 pi."""
-    layout = replace(FOREARM, radius_m=None, pitch_m=0.01)
-    tracker = ContactTracker(
-        layout, TrackSettings(debounce=1), chain=Chain([Joint("j", (0.0, 0.0, 1.0))])
-    )
-    angle = float(np.random.default_rng(seed).uniform(-3, 3))
-    contact = None
-    for i in range(3):
-        joints = np.array([angle + 2.0 * math.pi * i])
-        (contact,) = tracker.push(Frame(0.01 * i, taxels((3, 7)), joints=joints)) or [contact]
-    assert contact is not None
-    return float(np.abs(contact.series().motion).max())
-
-
 CASES = [
     Case(
         "kinematics",
@@ -173,16 +155,5 @@ CASES = [
         [{"angle": math.pi - 0.001, "step": 0.002}],
         {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
         wrapped_usual,
-    ),
-    Case(
-        "kinematics",
-        "a link that turns by 2 pi between frames",
-        "nothing moves",
-        "metres of motion",
-        1e-15,
-        moved_error,
-        [{"seed": 0}],
-        {"seed": SEEDS},
-        "does not apply: it follows no region",
     ),
 ]

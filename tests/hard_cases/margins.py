@@ -1,18 +1,12 @@
-"""How far the cliff is: the first value of a case's parameter that fails, found by search, beside
-where recordings lie; and what the guards cost.
-
-`python -m tests.hard_cases.margins FOLDER...` measures where the recordings of folders lie.
-"""
+"""Where each case begins to fail, found by search, beside where recordings lie; and what the guards
+cost."""
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,8 +29,6 @@ from tests.hard_cases.models import (
     session,
     usual_pipeline,
 )
-from train.dataset import load_trials
-from train.projection import Projection
 
 
 @dataclass(frozen=True)
@@ -121,11 +113,8 @@ LADDERS: dict[str, Ladder] = {
     "features: jitter, duplicates and gaps in time": Ladder(
         "shortest step, s", decades(-3, -16), seeded("shortest", seed=0), "step"
     ),
-    "features: random frames with dead taxels, to full scale": Ladder(
+    "features: regions of hard and of random frames, to full scale": Ladder(
         "counts", [255, 4095, 16383, 65535], seeded("peak", density=0.6, seed=0), "counts"
-    ),
-    "features: saturation: full scale in every taxel": Ladder(
-        "counts", [255, 4095, 16383, 65535], seeded("value"), "counts"
     ),
     "kinematics: orthonormal over a million steps": Ladder(
         "radians a step", decades(0, 18, 1), seeded("reach", steps=2000)
@@ -135,9 +124,6 @@ LADDERS: dict[str, Ladder] = {
     ),
     "kinematics: joint angles at their limits, wrapped by 2 pi": Ladder(
         "turns", [10, 10**3, 10**5, 10**7, 10**9], seeded("turns", seed=0)
-    ),
-    "simulator: taxel forces on a bed of 1e15 N/m": Ladder(
-        "N/m", decades(6, 30, 1), seeded("stiff", seed=0)
     ),
     "simulator: energy of a push, 1e-3 to 1e15 N/m, 1e-9 to 1e9 kg": Ladder(
         "s a step", decades(-3, 3, 1), seeded("h", mu=0.5, steps=30)
@@ -227,68 +213,7 @@ LIE = {
     "columns": "120 and 120 (the paper's features)",
     "cut": "0.03 and 0.02",
 }
-"""Where recordings lie: the SDH-2 grasps and the simulated `cody18`, as `main` printed it."""
-
-
-@dataclass
-class Lies:
-    """Where the recordings of a set lie on the scales of the hard cases.
-
-    Attributes:
-        gap: smallest part of the rows' size by which two of the six nearest trials differ.
-        ties: pairs among them that are exactly equally far.
-        offset: largest mean of a column over its deviation.
-        scale: largest and smallest deviation of a column.
-        far: largest distance to the nearest other trial, over the set's size.
-        counts: largest count.
-        taxels: rows and columns.
-        clock: largest time.
-        step: shortest and longest step in time.
-        rows: trials.
-        cut: smallest relative gap of two eigenvalues that follow each other.
-    """
-
-    gap: float = math.inf
-    ties: int = 0
-    offset: float = 0.0
-    scale: tuple[float, float] = (0.0, 0.0)
-    far: float = 0.0
-    counts: int = 0
-    taxels: tuple[int, int] = (0, 0)
-    clock: float = 0.0
-    step: tuple[float, float] = (math.inf, 0.0)
-    rows: int = 0
-    cut: float = math.inf
-
-
-def measured(folder: Path) -> Lies:
-    """Where a folder of recordings lies: leave-one-out in 20 components of scaling III."""
-    data = load_trials(sorted(folder.glob("*.npz")), progress=False)
-    X = data.features()
-    out = Lies(rows=len(X))
-    spread = X.std(axis=0)
-    moving = spread > 0.0
-    out.offset = float((np.abs(X.mean(axis=0))[moving] / spread[moving]).max())
-    out.scale = float(spread.max()), float(spread[moving].min())
-    projection = Projection("III", 20).fit(X)
-    out.cut = projection.gap_
-    z = projection.transform(X)
-    size = float(np.sqrt((z**2).sum(axis=1)).max())
-    for i, point in enumerate(z):
-        near = np.sort(np.sqrt(((np.delete(z, i, axis=0) - point) ** 2).sum(axis=1)))[:6]
-        gaps = np.diff(near) / size
-        out.ties += int((gaps == 0.0).sum())
-        out.gap = min(out.gap, float(gaps[gaps > 0.0].min()))
-        out.far = max(out.far, float(near[0]) / size)
-    for trial in data.trials:
-        recording = trial.recording
-        steps = np.diff(recording.t)
-        out.counts = max(out.counts, int(recording.frames.max()))
-        out.taxels = recording.frames.shape[1], recording.frames.shape[2]
-        out.clock = max(out.clock, float(np.abs(recording.t).max()))
-        steps = steps[steps > 0.0]
-        out.step = min(out.step[0], float(steps.min())), max(out.step[1], float(steps.max()))
-    return out
+"""Where the SDH-2 grasps and the simulated `cody18` lie, in 20 components of scaling III."""
 
 
 @cache
@@ -346,18 +271,3 @@ PRICED_AS = {
 def price(case: Case) -> str:
     """What the guard of a case costs: its own figure where it has one, else its group's."""
     return case.cost() or prices().get(PRICED_AS.get(case.key, case.group), "")
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print where the recordings of each folder lie."""
-    parser = argparse.ArgumentParser(prog="margins", description=__doc__)
-    parser.add_argument("folder", type=Path, nargs="+")
-    for folder in parser.parse_args(argv).folder:
-        print(f"{folder.name}:")
-        for name, value in vars(measured(folder)).items():
-            print(f"  {name:<8} {value}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -236,7 +236,9 @@ CASES = [
         refused_error,
         [{"scale": 1e-40}, {"scale": 1e105}],
         {"scale": st.one_of(powers_of_ten(-300, -34), powers_of_ten(102, 300))},
-        lambda: usual_neighbours(*scaled_data(2.0**349, 0)),
+        lambda: (
+            f"fitted and converted without a word; {usual_neighbours(*scaled_data(2.0**349, 0))}"
+        ),
     ),
     Case(
         "neighbours",

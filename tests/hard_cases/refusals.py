@@ -1,4 +1,4 @@
-"""What is not finite, or out of range, is refused wherever it can enter."""
+"""Numbers that are not finite are refused wherever frames, angles and vectors enter."""
 
 from __future__ import annotations
 
@@ -11,23 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
-from edge.model.info import ModelInfo
-from edge.recording import Recording, load, save
-from edge.runtime import touch_map as touchmap
+from edge.recording import Recording, save
 from edge.runtime.joint_stream import Joints
-from edge.skin import file as skinfile
 from edge.touch.arm import Chain, Joint
-from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
-from tests.hard_cases.frames import FOREARM, flicker_frames, series_of, taxels
+from tests.hard_cases.frames import FOREARM, taxels
 from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline
 from train.crossval import leave_one_out
-from train.importers.csv_frames import trials
 from train.pipeline import Choice, ContactClassifier
-from train.simulate.scene import from_dict
 
 BAD = (float("nan"), float("inf"), float("-inf"))
 
@@ -38,15 +32,6 @@ def recording(bad: float, key: str) -> None:
     trial = Recording(t, np.zeros((3, 4, 4), np.uint16), joints, None, {})
     with tempfile.TemporaryDirectory() as folder:
         save(Path(folder) / "x.npz", trial)
-
-
-def stored(bad: float, key: str) -> None:
-    arrays = {"t": np.arange(3.0), "frames": np.zeros((3, 4, 4), np.uint16)}
-    arrays["joints"] = np.zeros((3, 5))
-    arrays[key].reshape(-1)[2] = bad
-    with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder) / "x.npz", meta=np.array("{}"), **arrays)
-        load(Path(folder) / "x.npz")
 
 
 def frame(bad: float, what: str) -> None:
@@ -97,62 +82,9 @@ def left_out(bad: float) -> None:
     leave_one_out(X, labels_for(X))
 
 
-def window(bad: float) -> None:
-    feature_vector(series_of(flicker_frames(0)), bad)
-
-
-def metadata(bad: float) -> None:
-    text = small_model().model.info.to_json().replace('"window_s": 1.2', f'"window_s": {bad}')
-    ModelInfo.from_json(text.replace("nan", "NaN").replace("inf", "Infinity"), "model.onnx")
-
-
-def touch_map(bad: float, key: str) -> None:
-    head = {"event": "map", "frame": "skin", "unit": "metre", "tasks": ["t"]}
-    touch = {
-        "event": "decision",
-        "contact": 1,
-        "task": "t",
-        "onset_s": bad if key == "onset_s" else 1.0,
-        "place": [0.0, bad if key == "place" else 0.0, 0.0],
-        "label": "a",
-        "confidence": bad if key == "confidence" else 1.0,
-    }
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "map.jsonl"
-        path.write_text(f"{json.dumps(head)}\n{json.dumps(touch)}\n")
-        list(touchmap.TouchMap(path))
-
-
-def csv_frames(bad: float, named: bool) -> None:
-    """A folder of frames, whose times are bad in their names or by their rate."""
-    with tempfile.TemporaryDirectory() as folder:
-        trial = Path(folder) / "trial"
-        trial.mkdir()
-        for name in ("0.0", f"{bad}") if named else ("a", "b"):
-            (trial / f"{name}.csv").write_text("1,2\n3,4\n")
-        if not named:
-            (Path(folder) / "skin.json").write_text(json.dumps({"rate_hz": bad}))
-        list(trials(Path(folder)))
-
-
-def calibration(bad: float) -> None:
-    text = skinfile.shipped().read_text()
-    still = "\n".join("  [" + ", ".join(["0"] * 24) + "]," for _ in range(16))
-    noise = still.replace("0", str(bad), 1)
-    table = f"[calibration]\nbaseline = [\n{still}\n]\nnoise = [\n{noise}\n]\n"
-    skinfile.parse(f"{text}\n{table}", "skin.toml")
-
-
-def scene(bad: float) -> None:
-    thing = {"name": "x", "family": "rigid", "conditions": ["movable"], "mass_kg": bad}
-    from_dict({"object": [{**thing, "friction_static": 0.5, "friction_kinetic": 0.4}]})
-
-
 ENTRIES: dict[str, Callable[[float], object]] = {
     "a recording's times, written": lambda bad: recording(bad, "t"),
     "a recording's joint angles, written": lambda bad: recording(bad, "joints"),
-    "a recording's times, read": lambda bad: stored(bad, "t"),
-    "a recording's joint angles, read": lambda bad: stored(bad, "joints"),
     "a frame's time": lambda bad: frame(bad, "t"),
     "a frame's chip times": lambda bad: frame(bad, "times"),
     "a frame's joint angles": lambda bad: frame(bad, "joints"),
@@ -163,19 +95,10 @@ ENTRIES: dict[str, Callable[[float], object]] = {
         {"rows": 2, "cols": 2, "counts_per_newton": bad}
     ),
     "a skin's pitch": lambda bad: SkinLayout.from_dict({"rows": 2, "cols": 2, "pitch_m": bad}),
-    "a window": window,
     "a feature vector": vector,
     "the graph": graph,
     "a training vector": fit,
     "leave-one-out": left_out,
-    "a model's metadata": metadata,
-    "a scene's mass": scene,
-    "a map's place": lambda bad: touch_map(bad, "place"),
-    "a map's time": lambda bad: touch_map(bad, "onset_s"),
-    "a map's confidence": lambda bad: touch_map(bad, "confidence"),
-    "the names of CSV frames": lambda bad: csv_frames(bad, named=True),
-    "the rate of CSV frames": lambda bad: csv_frames(bad, named=False),
-    "a calibration's noise": calibration,
 }
 
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from tests.hard_cases.cases import Case
 from tests.train.simulate.conftest import Rig
-from tests.train.simulate.test_pivot_solver import tilt_cases, tilt_error, tilt_loads
 from tests.train.simulate.test_simulate_stability import (
     SPEED,
     cases,
@@ -17,7 +16,6 @@ from tests.train.simulate.test_simulate_stability import (
     ledger,
     lugre,
     naive_push,
-    taxel_forces,
 )
 
 SEEDS = st.integers(0, 10**6)
@@ -56,11 +54,6 @@ def grid_error(steps: int) -> float:
     return judged(*cases(), steps)
 
 
-def around_error(stiffness: float, mass: float, h: float, mu: float) -> float:
-    one = [np.array([10.0**stiffness]), np.array([10.0**mass]), np.array([10.0**h])]
-    return judged(*one, np.array([mu]), 60)
-
-
 def energy_error(h: float, mu: float, steps: int) -> float:
     """Largest part of the energy at hand that a step made out of nothing, 1e-3 to 1e15 N/m."""
     stiffness, mass = (a.ravel() for a in np.meshgrid(10.0 ** np.arange(-3, 16), SOME_MASSES))
@@ -85,43 +78,6 @@ def grid_usual() -> str:
     shares = ", ".join(f"{scheme} {n}" for scheme, n in usable.items())
     grown = lugre(0.01, explicit=True)
     return f"usable of 16 cases at 10 ms: {shares}; explicit LuGre grows to {grown:.0e}"
-
-
-def between_usual() -> str:
-    usable = [s for s in ("explicit", "semi-implicit", "rk4") if naive_push(s, 1e15, 1e-9, h=0.2)]
-    return f"usable at 1e15 N/m, 1e-9 kg, 0.2 s: {', '.join(usable) or 'none'} of three schemes"
-
-
-def tilt_worst(seed: int, count: int) -> float:
-    beds, free, c = tilt_cases(count, seed)
-    return float(tilt_error(beds, free, c, tilt_loads(beds, free, c)).max())
-
-
-def tilt_usual() -> str:
-    beds, free, c = tilt_cases(4000, 1)
-    left = tilt_error(beds, free, c, tilt_loads(beds, free, c, guarded_rounds=0))
-    return (
-        f"Newton without its line search: {(left > 1e-6).sum()} of 4000 wrong, {left.max():.0e} m"
-    )
-
-
-def shared_error(stiff: float, seed: int) -> float:
-    """Taxel forces that do not add up to the contact's, on a bed as stiff as `stiff` N/m."""
-    rng = np.random.default_rng(seed)
-    gaps = np.sort(rng.uniform(0.0, 1e-3, (7, 50)), axis=0)
-    gaps[0] = 0.0
-    k = np.full((7, 50), stiff)
-    force, naive, shared = taxel_forces(Rig, gaps, k, 30)
-    held = naive > 0.0
-    return float(np.abs(shared[held] / force[held] - 1.0).max(initial=0.0))
-
-
-def shared_usual() -> str:
-    gaps = np.zeros((7, 1))
-    gaps[1:] = 5e-4
-    force, naive, _ = taxel_forces(Rig, gaps, np.full((7, 1), 1e15), 30)
-    off = abs(float(naive[0] / force[0]) - 1.0)
-    return f"stiffness times depth at 1e15 N/m: off by {off:.1e}"
 
 
 CASES = [
@@ -150,45 +106,5 @@ CASES = [
         },
         energy_usual,
         examples=4,
-    ),
-    Case(
-        "simulator",
-        "between the grid's points",
-        "force, stick, energy ledger",
-        "cases with a complaint",
-        0,
-        around_error,
-        [{"stiffness": 15.0, "mass": -9.0, "h": -0.7, "mu": 1.0}],
-        {
-            "stiffness": st.floats(-3, 15),
-            "mass": st.floats(-9, 9),
-            "h": st.floats(-3, -0.7),
-            "mu": st.floats(0.05, 1.0),
-        },
-        between_usual,
-    ),
-    Case(
-        "simulator",
-        "tilt on beds up to 1e12 N/m",
-        "the one minimum of a convex energy",
-        "metres from it",
-        1e-9,
-        tilt_worst,
-        [{"seed": 1, "count": 1000}],
-        {"seed": SEEDS, "count": st.just(200)},
-        tilt_usual,
-        examples=5,
-    ),
-    Case(
-        "simulator",
-        "taxel forces on a bed of 1e15 N/m",
-        "they add up to the contact's force",
-        "relative error",
-        1e-14,
-        shared_error,
-        [{"stiff": 1e15, "seed": 0}],
-        {"stiff": st.floats(2, 15).map(lambda e: 10.0**e), "seed": SEEDS},
-        shared_usual,
-        examples=6,
     ),
 ]
