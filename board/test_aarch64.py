@@ -88,7 +88,6 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
 
 
 def test_the_hard_cases_have_the_same_answers(python):
-    """`make hard-cases` adds these answers to its table."""
     assert hard_golden.main(["--out", str(HARD)]) == 0
     machine, shares = elsewhere.ask(HARD, [str(python)])
     assert machine["machine"] == "aarch64"
