@@ -21,6 +21,7 @@ from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, taxels
 from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline
 from train.crossval import leave_one_out
+from train.importers.csv_frames import trials
 from train.pipeline import Choice, ContactClassifier
 
 BAD = (float("nan"), float("inf"), float("-inf"))
@@ -82,6 +83,16 @@ def left_out(bad: float) -> None:
     leave_one_out(X, labels_for(X))
 
 
+def csv_frames(bad: float) -> None:
+    """A folder of frames whose times are bad in their names."""
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / "trial"
+        trial.mkdir()
+        for name in ("0.0", f"{bad}"):
+            (trial / f"{name}.csv").write_text("1,2\n3,4\n")
+        list(trials(Path(folder)))
+
+
 ENTRIES: dict[str, Callable[[float], object]] = {
     "a recording's times, written": lambda bad: recording(bad, "t"),
     "a recording's joint angles, written": lambda bad: recording(bad, "joints"),
@@ -99,6 +110,7 @@ ENTRIES: dict[str, Callable[[float], object]] = {
     "the graph": graph,
     "a training vector": fit,
     "leave-one-out": left_out,
+    "the names of CSV frames": csv_frames,
 }
 
 
