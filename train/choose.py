@@ -103,7 +103,7 @@ def candidates(
     """Every candidate; arguments you pass are held fixed.
 
     Features of several units need scaling by Method IV. Principal components of the paper's three
-    features are tried with more scalings and numbers where you ask for these features alone; beside
+    features are tried with more scalings and numbers where you ask for these features only. Beside
     other candidates the best of so many settings would win by chance. Methods II and III are left
     out, as Method I and no scaling have the same neighbours.
     """
@@ -149,12 +149,12 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
     """
     pairs: dict[str, tuple[str, str]] = {}
     for task, labels in y.items():
-        parts = [
+        factors = [
             other
             for other in y
             if other != task and _determines(labels, y[other]) and not _determines(y[other], labels)
         ]
-        for a, b in combinations(parts, 2):
+        for a, b in combinations(factors, 2):
             joined = np.char.add(np.char.add(y[a], "\0"), y[b])
             if task not in pairs and _determines(joined, labels):
                 pairs[task] = (a, b)
@@ -250,8 +250,8 @@ class Choosing:
         self._grouped: set[str] = set()
         if groups is not None:
             self._grouped = {t for t in y if t != leave_out and groupable(y[t], groups)}
-            many = GROUP_FOLDS if len(groups) <= FEW else 10
-            self._group_folds = group_folds(groups, QUICK_FOLDS if quick else many)
+            count = QUICK_FOLDS if quick else GROUP_FOLDS if len(groups) <= FEW else 10
+            self._group_folds = group_folds(groups, count)
 
     def _tables(self, window_s: float, nested: bool, what: str) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where there are any.

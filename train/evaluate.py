@@ -375,8 +375,8 @@ def evaluate(
         )
         for test in tests
     )
-    parts = Parallel(n_jobs=jobs, return_as="generator")(work)
-    bar = tqdm(parts, total=len(pairs), desc=progress, unit=" fits", disable=progress is None)
+    results = Parallel(n_jobs=jobs, return_as="generator")(work)
+    bar = tqdm(results, total=len(pairs), desc=progress, unit=" fits", disable=progress is None)
     choices = {
         task: [
             choice
@@ -387,8 +387,8 @@ def evaluate(
         for task in classes
     }
     right = {task: np.zeros((count, len(choices[task]), len(X)), dtype=bool) for task in classes}
-    for (i, j), test, part in zip(pairs, tests, bar, strict=True):
-        for task, answers in part.items():
+    for (i, j), test, result in zip(pairs, tests, bar, strict=True):
+        for task, answers in result.items():
             # For fold i these are answers to fold j, and the other way round.
             for without, tested in {(i, j), (j, i)}:
                 own = folds[test] == tested

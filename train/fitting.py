@@ -219,7 +219,7 @@ def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
 
 
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
-    """Warnings where the first frame tells labels, or where most recordings begin in contact."""
+    """Warnings where the first frame gives labels away, or most recordings begin in contact."""
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):
         return [

@@ -1,4 +1,4 @@
-"""Ready-made settings for `make export FRONT=`: points that trade accuracy against time."""
+"""Ready-made settings for `make export FRONT=`, which trade accuracy against time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = ("fast", "balanced", "accurate")
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A setting to export with, and what it gave where it was measured.
+    """Settings to export with, and their measured time and accuracy.
 
     Attributes:
         window_s: seconds from onset that a decision waits for.
@@ -36,12 +36,12 @@ class OperatingPoint:
 
 @dataclass(frozen=True)
 class ParetoFront:
-    """Operating points of one task, none of which another beats in both time and accuracy.
+    """Operating points of one task; no point beats another in both time and accuracy.
 
     Attributes:
         task: whose accuracy it is.
         points: the fastest first, each more accurate than those before it.
-        digest: SHA-256 over the recordings that they were measured on; empty where not known.
+        digest: SHA-256 over the recordings they were measured on; empty where unknown.
     """
 
     task: str
@@ -55,7 +55,7 @@ class ParetoFront:
         Raises:
             InputError: the file cannot be read, or is not a front.json.
         """
-        with json_file(path, "a front.json", "make one with `make tradeoff`") as found:
+        with json_file(path, "a front.json", "make one with `make tradeoff`") as content:
             points = [
                 OperatingPoint(
                     window_s=float(point["window_s"]),
@@ -64,15 +64,15 @@ class ParetoFront:
                     milliseconds=float(point["milliseconds"]),
                     accuracy=float(point["accuracy"]),
                 )
-                for point in found["points"]
+                for point in content["points"]
             ]
-            task, digest = str(found["task"]), str(found.get("data_digest", ""))
+            task, digest = str(content["task"]), str(content.get("data_digest", ""))
         if not points or not all(point.scaling in SCALINGS for point in points):
             raise InputError(f"{path}: has no point to choose from; make one with `make tradeoff`")
         return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)), digest)
 
     def pick(self, wanted: str) -> OperatingPoint:
-        """The point that is asked for.
+        """The operating point that a user wishes for.
 
         Args:
             wanted: `fast` (the fastest), `accurate` (the most accurate), `balanced` (the most
@@ -81,7 +81,7 @@ class ParetoFront:
                 reaches that accuracy).
 
         Raises:
-            InputError: it is none of them, or no point is so fast or so accurate.
+            InputError: `wanted` has another form, or no point is so fast or so accurate.
         """
         first, last = self.points[0], self.points[-1]
         if wanted == "fast":

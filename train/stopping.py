@@ -283,14 +283,14 @@ class SequentialClassifier:
         self.decision_points_ = _models(X[..., self.columns_], y, self.choices, kept, own_widths)
         self.n_features_in_ = len(self.columns_)
         work = (delayed(self._fold)(X, y, folds == k, chosen[k]) for k in range(count))
-        parts = Parallel(n_jobs=self.jobs)(work)
+        by_fold = Parallel(n_jobs=self.jobs)(work)
         self.held_out_ = {}
         for task in self.choices:
             named = np.empty((len(X), n), dtype=y[task].dtype)
             margins, distances = np.empty(named.shape), np.empty(named.shape)
-            for k, part in enumerate(parts):
+            for k, answers_of in enumerate(by_fold):
                 own = folds == k
-                named[:, own], margins[:, own], distances[:, own] = part[task]
+                named[:, own], margins[:, own], distances[:, own] = answers_of[task]
             self.held_out_[task] = HeldOut(named == y[task], margins, distances)
         most = finest({task: y[task] for task in self.choices})
         self.novelty_ = novelty(most, self.held_out_[most].distances)

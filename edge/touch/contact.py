@@ -1,4 +1,4 @@
-"""One contact: what is measured on it frame by frame, and the series that features are made of."""
+"""One contact: its measurements frame by frame, and the series that features are made of."""
 
 from __future__ import annotations
 

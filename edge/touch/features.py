@@ -120,7 +120,7 @@ def feature_vector(
 
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
-    """Features of equal kind are worked out as the rows of one array; a wide one stands alone."""
+    """Features of equal kind are the rows of one array; each wide feature is its own kind."""
     name = feature.name if feature.wide else ""
     return name, feature.samples, feature.transforms, feature.summary
 

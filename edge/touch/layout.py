@@ -15,7 +15,7 @@ from edge.config import ConfigTable
 from edge.errors import InputError
 
 RELEASE_S = 0.3
-"""Seconds: an arm that bounces off a rigid thing comes back sooner, a second tap later."""
+"""Seconds. An arm that bounces off a rigid thing comes back sooner; a second tap comes later."""
 LONGEST_RELEASE_S = 60.0
 
 
@@ -45,9 +45,9 @@ class SkinLayout:
     onset_counts: int | None = None
     """A contact begins when its region's peak is above this; `threshold_counts` where None."""
     dead: tuple[int, ...] = ()
-    """Flat indices (row * cols + col) of taxels that are known never to be read."""
+    """Flat indices (row * cols + col) of taxels that can never be read."""
     release_s: float = RELEASE_S
-    """A contact ends when nothing of it has been above the threshold for so long."""
+    """Seconds without any taxel above the threshold after which a contact ends."""
 
     def __post_init__(self) -> None:
         if not (1 <= self.rows <= 1024 and 1 <= self.cols <= 1024):
@@ -149,7 +149,7 @@ class SkinLayout:
 
     @classmethod
     def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> SkinLayout:
-        """Read the `skin` object of metadata; keys it does not know are left alone.
+        """Read the `skin` object of metadata; unknown keys are ignored.
 
         Raises:
             InputError: a value is missing or makes no sense; `where` names the file.
@@ -181,9 +181,9 @@ class SkinLayout:
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
-    """The device's geometry and scale with the model's rules for a contact, in its counts.
+    """The device's geometry and scale with the model's thresholds, in the device's counts.
 
-    The taxels known to be dead are the model's: what else the device lacks is missing.
+    The dead taxels are the model's; any other taxel that the device cannot read counts as missing.
 
     Raises:
         InputError: the device is another skin than the model's.
