@@ -1,0 +1,91 @@
+"""The first screen: one line a task, and a slider that moves the time of the decision."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping
+
+from train.evaluate import Result
+from train.report.score import interval
+
+FIRST_S = 1.0
+"""The time that is shown first, and without a script."""
+STYLE = """<style>
+.slider { max-width: 52rem; } .slider input { width: 100%; } .slider td { white-space: nowrap; }
+.slider table { font-size: 15px; width: 100%; } .slider svg { width: 100%; height: 3rem;
+  overflow: visible; }
+.slider td:last-child { width: 55%; } .slider .share { font-weight: 600; }
+.slider polyline { fill: none; stroke: #1f5fa8; stroke-width: 2;
+  vector-effect: non-scaling-stroke; }
+.slider polygon { fill: #1f5fa8; opacity: .18; } .slider line { stroke: var(--ink);
+  stroke-width: 2; vector-effect: non-scaling-stroke; }
+@media (prefers-color-scheme: dark) { .slider polyline { stroke: #8ab8f0; }
+  .slider polygon { fill: #8ab8f0; } }
+</style>"""
+SCRIPT = """<script>
+const box = document.querySelector('.slider'), data = JSON.parse(box.dataset.answers);
+const input = box.querySelector('input');
+function show() {
+  const at = +input.value, wait = data.windows[at];
+  box.querySelectorAll('.wait').forEach(e => e.textContent = wait);
+  data.tasks.forEach((rows, i) => {
+    const row = box.querySelectorAll('tr')[i], x = 100 * wait / data.windows.at(-1);
+    row.querySelector('.share').textContent = rows[at][0];
+    row.querySelector('.interval').textContent = rows[at][1];
+    row.querySelector('line').setAttribute('x1', x);
+    row.querySelector('line').setAttribute('x2', x);
+  });
+}
+input.addEventListener('input', show);
+input.parentElement.hidden = false;
+show();
+</script>"""
+
+
+def slider(answers: Mapping[str, Mapping[float, Result]]) -> str:
+    """The HTML of the first screen.
+
+    Without a script the curves stand still, and the lines show the accuracy after `FIRST_S`.
+
+    Args:
+        answers: {task: {window: result}}, with the same rising windows for every task.
+    """
+    windows = list(next(iter(answers.values())))
+    first = min(range(len(windows)), key=lambda i: abs(windows[i] - FIRST_S))
+    shown = {
+        task: [(f"{100 * r.accuracy:.0f} %", f"({interval(r)})") for r in results.values()]
+        for task, results in answers.items()
+    }
+    lines = "".join(
+        f'<tr><td>{html.escape(task)}</td><td class="share">{shown[task][first][0]}</td>'
+        f'<td class="interval">{shown[task][first][1]}</td><td>{_curve(results, first)}</td></tr>'
+        for task, results in answers.items()
+    )
+    data = json.dumps({"windows": windows, "tasks": list(shown.values())})
+    wait = f'<span class="wait">{windows[first]:g}</span>'
+    return (
+        f'{STYLE}<div class="slider" data-answers="{html.escape(data)}">'
+        f"<p>Wait <b>{wait} s</b> from first contact, and this share of the decisions is right "
+        f"(95 % interval):</p>"
+        f'<label hidden><input type="range" min="0" max="{len(windows) - 1}" value="{first}" '
+        f'aria-label="seconds to wait"></label><table>{lines}</table>'
+        f"<p><code>make export EXPORT='--window {wait}'</code></p></div>{SCRIPT}"
+    )
+
+
+def _curve(results: Mapping[float, Result], first: int) -> str:
+    """A task's accuracy against time, with its band and a line at the time that is shown."""
+    x = [100 * window / max(results) for window in results]
+
+    def points(heights: list[float], x: list[float] = x) -> str:
+        return " ".join(f"{a:.1f},{100 - 100 * b:.1f}" for a, b in zip(x, heights, strict=True))
+
+    low, high = (list(ends) for ends in zip(*(r.interval for r in results.values()), strict=True))
+    return (
+        '<svg viewBox="0 0 100 100" preserveAspectRatio="none" role="img" '
+        'aria-label="accuracy, 0 to 100 %, against time">'
+        f'<polygon points="{points(low)} {points(high[::-1], x[::-1])}"/>'
+        f'<polyline points="{points([r.accuracy for r in results.values()])}"/>'
+        f'<line x1="{x[first]:.1f}" x2="{x[first]:.1f}" y1="0" y2="100"/></svg>'
+    )
