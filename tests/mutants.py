@@ -9,6 +9,7 @@ mutant that no test noticed. Results are kept in `mutants/`: what was tried is n
 from __future__ import annotations
 
 import argparse
+import shutil
 import signal
 import subprocess
 import sys
@@ -37,6 +38,8 @@ def generate() -> None:
     Raises:
         SystemExit: a test fails on the unchanged code.
     """
+    # mutmut copies tests anew, but leaves those that were deleted here since.
+    shutil.rmtree("mutants/tests", ignore_errors=True)
     done = subprocess.run(
         [*MUTMUT, "run", "no such mutant"], capture_output=True, text=True, check=False
     )
