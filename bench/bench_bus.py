@@ -116,13 +116,13 @@ def keep_period(seconds: float) -> dict:
 
 def bench_overhead_of_software(note):
     """An upper bound: one after another, the buses take more time than side by side."""
-    parts = inside()
-    ours = parts["buses"] + parts["frame"]
+    times = inside()
+    ours = times["buses"] + times["frame"]
     note(f"the wire's {WIRE_S * 1e6:.0f} us at 400 kHz", ours / WIRE_S * 1e-6, "at most 0.02")
-    note("reading with list(msg) and shifts", parts["buses"] / parts["plainly"], "-")
-    note("us: chips of three buses", parts["buses"], "-")
-    note("us: bytes to frame", parts["frame"], "-")
-    note("us: both, in threads that fight for one lock", parts["threads"], "-")
+    note("reading with list(msg) and shifts", times["buses"] / times["plainly"], "-")
+    note("us: chips of three buses", times["buses"], "-")
+    note("us: bytes to frame", times["frame"], "-")
+    note("us: both, in threads that fight for one lock", times["threads"], "-")
 
 
 def bench_bits_on_the_wire(note):

@@ -271,8 +271,8 @@ def play(
 
 def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
     """Bits on the wire of each bus for so many frames, counted while the drivers send them."""
-    whole = replace(file, reading=replace(file.reading, region_of_interest=False))
-    with still(whole) as skin:
+    every_chip = replace(file, reading=replace(file.reading, region_of_interest=False))
+    with still(every_chip) as skin:
         buses = [reader.bus for reader in skin.readers]
         before = [bus.bits for bus in buses]  # type: ignore[attr-defined]
         for _ in range(frames):

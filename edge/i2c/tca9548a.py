@@ -61,7 +61,7 @@ class TCA9548A:
         self.selected: int | None = None
         """The connected channel; None where unknown or none."""
         self._select = [bus.prepare(write(address, [1 << n])) for n in range(CHANNELS)]
-        self._none = bus.prepare(write(address, [0]))
+        self._all_off = bus.prepare(write(address, [0]))
         self._control = bus.prepare(read(address, 1))
         self._beside = beside
         self._open: bool | None = None
@@ -79,7 +79,7 @@ class TCA9548A:
         Raises:
             BusError: it failed.
         """
-        self._set(self._none, 0)
+        self._set(self._all_off, 0)
         self._open = False
 
     def select(self, n: int) -> None:

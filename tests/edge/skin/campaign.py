@@ -232,20 +232,20 @@ def scripts():
     first = cody.buses[0].device
     lasting = {"during": (BEGIN_S, END_S)}
     chip = {"bus": first, "mux": 0x70, "channel": 1, "address": 0x2D, **lasting}
-    one = {"touched": lambda chip, bus: (bus, chip.channel, chip.address) == (first, 1, 0x2D)}
+    one_chip = {"touched": lambda chip, bus: (bus, chip.channel, chip.address) == (first, 1, 0x2D)}
     on_first = {"touched": lambda chip, bus: bus == first}
-    yield "NACK on one chip", cody, [Fault(**chip)], one
+    yield "NACK on one chip", cody, [Fault(**chip)], one_chip
     yield "NACK on one mux", cody, [Fault(bus=first, address=0x70, **lasting)], on_first
     yield "NACK on all", cody, [Fault(**lasting)], {}
     for code in (errno.EIO, errno.EAGAIN, errno.ETIMEDOUT):
-        yield f"{errno.errorcode[code]} on one chip", cody, [Fault(code=code, **chip)], one
+        yield f"{errno.errorcode[code]} on one chip", cody, [Fault(code=code, **chip)], one_chip
     for code in (errno.EIO, errno.ETIMEDOUT, errno.ENODEV):
         fault = Fault(code=code, bus=first, **lasting)
         yield f"{errno.errorcode[code]} on one bus", cody, [fault], on_first
     yield "ENODEV on all buses", cody, [Fault(code=errno.ENODEV, **lasting)], {}
     short = {"during": (BEGIN_S, BEGIN_S + 0.011)}
     ends = {"end_s": BEGIN_S + 0.011}
-    yield "a chip resets", cody, [Fault("reset", **{**chip, **short})], {**one, **ends}
+    yield "a chip resets", cody, [Fault("reset", **{**chip, **short})], {**one_chip, **ends}
     yield "an MPR121 resets", pad, [Fault("reset", address=0x5B, channel=1, **short)], ends
     wrong = [Fault("misroute", address=0x70, rate=0.1, **lasting)]
     yield "a wrong mux channel, 10 % of selections", cody, wrong, {}
@@ -255,7 +255,7 @@ def scripts():
     yield "bit flips in 2 % of reads, AD7147 *", cody, flip, {}
     yield "the same, MPR121 *", pad, flip, {}
     yield "the same, block (CRC)", SKINS["block"], flip, {}
-    yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)], one
+    yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)], one_chip
     for rate in (0.001, 0.01, 0.1):
         for name, codes in (("random errors", CODES[:4]), ("without timeouts", CODES[:2])):
             faults = [Fault(code=code, rate=rate / len(codes), **lasting) for code in codes]
