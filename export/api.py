@@ -1,4 +1,4 @@
-"""What `train.fit` gives to files, and to a table that a person reads."""
+"""Files of a fitted model, and a report of the fit that a person reads."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ from train.stopping import SequentialClassifier
 MISSING_SHARE = 0.02
 """Recordings without a contact above which the thresholds deserve a warning."""
 LEAK = 0.5
-"""Share of labels known before the touch, above which a model knows the place, not the object."""
+"""Share of labels known before the touch, above which a model recognises the place, not the
+object."""
 NAMED = 3
-"""Files that a sentence names before it counts the rest."""
+"""Files that a sentence names; the rest are counted."""
 CALLS = 60
 
 
@@ -44,7 +45,7 @@ def save(path: str | os.PathLike[str], fitted: Fitted) -> int:
 
     Args:
         path: of the model, such as `build/model.onnx`.
-        fitted: what `train.fit` gave.
+        fitted: the result of `train.fit`.
 
     Raises:
         InputError: the files cannot be written.
@@ -82,7 +83,7 @@ def describe(
     Args:
         dataset: measured for the features of the model.
         classifier: fitted on it.
-        chosen: what its accuracy is; a task that lacks an entry has none, 0.
+        chosen: of each task, for its accuracy; 0 for a task that has no entry.
         window_s: of the full decision.
         samples: values of a feature.
         sequential: of which `classifier` is the last.
@@ -131,11 +132,11 @@ def _labels(dataset: DataSet, task: str) -> set[str]:
 
 
 def report(fitted: Fitted, prices: Sequence[tuple[float, float]] | None = None) -> str:
-    """What was chosen among, what was chosen, and what a user should know, in lines."""
+    """The candidates, the choice of each task, notes and warnings, in lines."""
     lines = [*_table(fitted, prices), ""]
-    for task, one in fitted.chosen.items():
-        lines.append(f"{task}: {_told(one)}")
-        lines.append(f"  {_described(one.choice, fitted)}")
+    for task, chosen in fitted.chosen.items():
+        lines.append(f"{task}: {_accuracy(chosen)}")
+        lines.append(f"  {_described(chosen.choice, fitted)}")
     dataset = fitted.dataset
     lines += ["", ", ".join(f"{name} in {unit}" for name, unit in dataset.units.items())]
     if any(measures.feature(name).moves for name in dataset.names):
@@ -143,15 +144,13 @@ def report(fitted: Fitted, prices: Sequence[tuple[float, float]] | None = None) 
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
 
 
-def _told(one: Chosen) -> str:
-    """The accuracy, as a user reads it."""
-    numbers = f"{_percent(one.accuracy)} of {one.accuracy.total} trials, nested"
-    if one.left_out == TRIAL:
+def _accuracy(chosen: Chosen) -> str:
+    """The accuracy of a task, as a user reads it."""
+    numbers = f"{_percent(chosen.accuracy)} of {chosen.accuracy.total} trials, nested"
+    if chosen.left_out == TRIAL:
         return numbers
-    return (
-        f"trial left out {one.by_trial.accuracy:.1%}, {one.left_out} left out "
-        f"{_percent(one.accuracy)} of {one.accuracy.total} trials, nested"
-    )
+    left_out = f"{chosen.left_out} left out {numbers}"
+    return f"trial left out {chosen.by_trial.accuracy:.1%}, {left_out}"
 
 
 def _percent(result: Result) -> str:
@@ -169,56 +168,55 @@ def _described(choice: Choice, fitted: Fitted) -> str:
 
 
 def _name(choice: Choice, candidates: Sequence[Candidate]) -> str:
-    for one in candidates:
-        if any(grid.features == choice.features for grid in one.grids):
-            return one.name
+    for candidate in candidates:
+        if any(grid.features == choice.features for grid in candidate.grids):
+            return candidate.name
     return " ".join(choice.features)
 
 
 def _table(fitted: Fitted, prices: Sequence[tuple[float, float]] | None) -> list[str]:
-    """A row a candidate: nested accuracy of its own numbers, and its price; `*` where chosen."""
+    """A row for each candidate: the nested accuracy of its own numbers, and its price."""
     tasks = list(fitted.chosen)
-    wide = max(len(one.name) for one in fitted.candidates)
+    wide = max(len(candidate.name) for candidate in fitted.candidates)
     head = f"{'features':<{wide}}  how"
     head += "".join(f"  {task:>22}" for task in tasks)
     if prices is not None:
         head += "  us a decision      kB"
     lines = [head]
-    for i, one in enumerate(fitted.candidates):
-        line = f"{one.name:<{wide}}  {one.projection}"
+    for i, candidate in enumerate(fitted.candidates):
+        line = f"{candidate.name:<{wide}}  {candidate.projection}"
+        own = {(grid.features, grid.projection) for grid in candidate.grids}
         for chosen in fitted.chosen.values():
-            mine = (chosen.choice.features, chosen.choice.projection)
-            star = "*" if mine in {(g.features, g.projection) for g in one.grids} else " "
+            star = "*" if (chosen.choice.features, chosen.choice.projection) in own else " "
             line += f"  {_percent(chosen.candidates[i]):>21}{star}"
         if prices is not None:
             line += f"  {prices[i][0]:>13.0f}  {prices[i][1]:>6.0f}"
         lines.append(line)
-    return lines
+    return [*lines, "* chosen for the task"]
 
 
 def warnings(fitted: Fitted) -> list[str]:
-    """Sentences on what flatters or spoils a model."""
+    """Sentences on data that flatter or spoil a model."""
     dataset, lines = fitted.dataset, []
     some = [path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()]
     if some:
         share = len(some) / (len(dataset.trials) + len(dataset.untouched))
         lines.append(
-            f"{'warning: ' if share > MISSING_SHARE else ''}{len(some)} recordings have no contact "
-            f"above {dataset.layout.onset} counts and count as wrong: {_files(some)}"
+            f"{'warning: ' if share > MISSING_SHARE else ''}without a contact above "
+            f"{dataset.layout.onset} counts, and counted as wrong: {_files(some)}"
         )
         if share > MISSING_SHARE:
             lines[-1] += "; `python -m train thresholds` proposes thresholds"
     for what, paths in dataset.left_out.items():
-        lines.append(
-            f"warning: {len(paths)} recordings lack {what} and are left out: {_files(paths)}"
-        )
+        lines.append(f"warning: left out for lack of {what}: {_files(paths)}")
     if dataset.unused:
         lines.append(
-            f"warning: {len(dataset.unused)} recordings have further contacts, of which only the "
-            f"first is used: {_files(dataset.unused)}; `python -m train split` cuts them apart"
+            "warning: only the first of several contacts is used of "
+            f"{_files(dataset.unused)}; `python -m train split` makes a recording of each"
         )
-    for task, one in fitted.chosen.items():
-        if any(measures.feature(name).quantity == "joint_angle" for name in one.choice.features):
+    for task, chosen in fitted.chosen.items():
+        names = chosen.choice.features
+        if any(measures.feature(name).quantity == "joint_angle" for name in names):
             share = told_by_posture(dataset, task)
             lines.append(
                 f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset, before "
@@ -232,10 +230,10 @@ def warnings(fitted: Fitted) -> list[str]:
             f"warning: the window of {fitted.window_s:g} s is longer than any recording goes on "
             f"after its onset ({longest:.2f} s)"
         )
-    for task, one in fitted.chosen.items():
+    for task, chosen in fitted.chosen.items():
         classifier = fitted.classifier
-        dropped = one.choice.components - classifier.components_[task]
-        if dropped > 0 and one.choice.projection == "pca":
+        dropped = chosen.choice.components - classifier.components_[task]
+        if dropped > 0 and chosen.choice.projection == "pca":
             lines.append(
                 f"warning: {task}: the trials span {classifier.components_[task]} components, "
                 f"{dropped} fewer than asked for"
@@ -244,9 +242,9 @@ def warnings(fitted: Fitted) -> list[str]:
         equal = told_by_order(rows, classifier.labels_[task])
         if equal:
             lines.append(
-                f"warning: {task}: {equal} trials equal one of another label in all that the model "
-                "looks at; of equal trials the one that was read first counts as nearer, so their "
-                "order decides the label"
+                f"warning: {task}: {equal} trials equal one of another label in all coordinates of "
+                "the model; of equal trials the earlier one counts as nearer, so their order "
+                "decides the label"
             )
         projection = classifier.projections_[classifier.spaces_[task]]
         steps, farthest = coarseness(rows, projection.grid_.unit)
@@ -292,14 +290,14 @@ def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
 
 
 def told_by_posture(dataset: DataSet, task: str) -> float:
-    """Share of a task's labels that the nearest other trial's joint angles at onset tell."""
-    found = []
+    """Share of a task's trials whose nearest other one, by joint angles at onset, has the label."""
+    at_onset = []
     for trial in dataset.trials:
         joints = trial.series.joints
         assert joints is not None
         known = joints[np.isfinite(joints).all(axis=1)]
-        found.append(known[0] if len(known) else np.zeros(joints.shape[1]))
-    angles, labels = np.array(found), dataset.labels(task)
+        at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
+    angles, labels = np.array(at_onset), dataset.labels(task)
     squares = ((angles[:, None] - angles) ** 2).sum(axis=2)
     np.fill_diagonal(squares, np.inf)
     return float((labels[squares.argmin(axis=1)] == labels).mean())
@@ -317,7 +315,7 @@ def measure(fitted: Fitted) -> list[tuple[float, float]]:
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     full = fitted.measured
-    choices = {task: one.picks[candidate] for task, one in fitted.chosen.items()}
+    choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
     names = tuple(n for n in full.names if any(n in c.features for c in choices.values()))
     y = {
         task: full.labels(task)

@@ -128,9 +128,9 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         output = names[f"{task}_label"].removesuffix("_label")
         k = build.ints(choice.k)
         near = ["", names[f"{task}_neighbours"]]
-        values, found = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
+        values, places = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
         labels, classes = last.labels_[task], len(last.classes_[task])
-        nearest = values, found, length
+        nearest = values, places, length
         _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])
         if early:
             all_squares = build.node("Add", [squares, length])

@@ -1,4 +1,4 @@
-"""`python -m export.prices`: what a decision costs in time by the size of its model."""
+"""`python -m export.prices`: times of a decision by the size of its model."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ FEWEST = 10
 
 
 def grown(X: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
-    """`rows` vectors like those of X: repeated with a thousandth of jitter, the same every time."""
+    """`rows` vectors like those of X, repeated with a jitter of a thousandth; no call differs."""
     stream = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0x70726963,)))
     every = X[np.arange(rows) % len(X)]
     return every * (1.0 + 1e-3 * stream.normal(size=every.shape) * (rows > len(X)))
@@ -124,14 +124,14 @@ def run(arguments: argparse.Namespace) -> int:
     if len(dataset.trials) < FEWEST:
         raise InputError(f"prices need at least {FEWEST} trials, not {len(dataset.trials)}")
     task = "category" if "category" in dataset.tasks else dataset.tasks[0]
-    found = {
+    measured = {
         "machine": f"{machine()['kind']} ({machine()['name']})",
         "data_digest": dataset.digest,
         "task": task,
         "decisions": prices(dataset, task, arguments.calls),
     }
     with write_whole(arguments.out) as file:
-        file.write(json.dumps(found, indent=1).encode() + b"\n")
+        file.write(json.dumps(measured, indent=1).encode() + b"\n")
     print(os.fspath(arguments.out))
     return 0
 
@@ -140,7 +140,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     top = argparse.ArgumentParser(
         prog="export.prices",
-        description="Measures on this machine what one decision costs by components, "
+        description="Measures how long one decision takes on this machine, by components, "
         "neighbours, training rows and operators; `python -m train tradeoff --prices` shows it.",
     )
     top.add_argument("--data", nargs="+", required=True, metavar="REC")

@@ -106,12 +106,12 @@ def label_distances(
 
 
 Space = tuple[object, ...]
-"""What projections of two tasks must have in common to be one."""
+"""The settings that two tasks must share to have one projection."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a task is fitted with.
+    """The settings that a task is fitted with.
 
     Attributes:
         scaling: one of `train.scaling.SCALINGS`.
@@ -241,18 +241,18 @@ def projections(
     y: Mapping[str, NDArray[np.str_]],
 ) -> dict[Space, Projection]:
     """{space: Projection} of all tasks, fitted on X (n, p) and labels y[task] (n,)."""
-    found: dict[Space, Projection] = {}
+    fitted: dict[Space, Projection] = {}
     for task, choice in choices.items():
         space = choice.space(task)
-        tasks = [other for other, one in choices.items() if one.space(other) == space]
-        if space not in found:
+        tasks = [name for name, other in choices.items() if other.space(name) == space]
+        if space not in fitted:
             targets = choice.targets or (task,)
             taken = [
                 i for i, f in enumerate(features) if not choice.features or f in choice.features
             ]
-            found[space] = Projection(
+            fitted[space] = Projection(
                 choice.scaling,
-                max(choices[other].components for other in tasks),
+                max(choices[name].components for name in tasks),
                 [features[i] for i in taken],
                 choice.projection,
                 choice.shrinkage,
@@ -261,4 +261,4 @@ def projections(
                 X[:, columns_of(choice.features, features, widths)],
                 np.column_stack([y[target] for target in targets]),
             )
-    return found
+    return fitted

@@ -42,7 +42,7 @@ SAME_SIZE = 1e-6
 KINDS = ("pca", "lda")
 """Principal components, and discriminants."""
 NO_DISTANCE = 1e-6
-"""How far classes lie apart in a direction, as a part of all spread, below which it is rounding."""
+"""Separation of the classes in a direction, as a part of all spread, below which it is rounding."""
 
 
 def _centred(
@@ -51,9 +51,9 @@ def _centred(
     """Mean (p,), X without it, and which columns have no variance (p,)."""
     mean = column_means(X)
     centred = X - mean
-    # What is left of a constant column is the rounding of its mean.
+    # A constant column leaves nothing but the rounding of its mean.
     still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)
-    # The mean of a large offset is rounded; what that leaves in every row is one more direction.
+    # The mean of a large offset is rounded, which would leave the same direction in every row.
     centred -= centred.mean(axis=0)
     centred[:, still] = 0.0
     return mean, centred, still
@@ -176,8 +176,8 @@ class Spectrum:
         members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
         # The rows are centred, so the members' indicators need not be.
         means = root[:, None] * (self.scores.T @ (members / np.sqrt(sizes)))
-        left, apart, _ = np.linalg.svd(means, full_matrices=False)
-        keep = apart[: len(sizes) - 1] > NO_DISTANCE
+        left, separation, _ = np.linalg.svd(means, full_matrices=False)
+        keep = separation[: len(sizes) - 1] > NO_DISTANCE
         directions = root[:, None] * left[:, : len(keep)][:, keep]
         z = self.scores @ directions
         within = z - (members.T @ z / sizes[:, None])[labels]
@@ -348,8 +348,8 @@ class Projection(TransformerMixin, BaseEstimator):
         spectrum = Spectrum(d)
         targets = np.asarray(y).reshape(len(d), -1).T
         labels = [np.unique(target, return_inverse=True)[1] for target in targets]
-        parts = [spectrum.discriminants(one, self.shrinkage) for one in labels]
-        return np.hstack(parts), 1.0
+        weights = [spectrum.discriminants(classes, self.shrinkage) for classes in labels]
+        return np.hstack(weights), 1.0
 
     def transform(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""

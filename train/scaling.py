@@ -14,8 +14,7 @@ from edge.touch.measures import feature
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
 SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
-"""Above, squares overflow in a distance. Below, nothing has been asked of the graph: the hard
-cases go down to it."""
+"""Sizes of scaled features whose grid steps and squares are ordinary float64 numbers."""
 
 
 def _exponents(X: NDArray[np.float64], axes: tuple[int, ...]) -> NDArray[np.int32]:
@@ -101,8 +100,8 @@ def scale_of(
     if method == "IV":
         squares = []
         for name, block, middle in zip(features, small, mean, strict=True):
-            # Cells and joints each have a level of their own, which tells them apart and no
-            # trial: a wide feature deviates from each column's mean.
+            # Each cell or joint has a level of its own, which says nothing about a trial: a wide
+            # feature deviates from each column's mean.
             middles = block.mean(axis=0) if feature(name).wide else middle
             squares.append(((block - middles) ** 2).mean())
         deviation = np.sqrt(squares)
@@ -134,7 +133,7 @@ def centred_and_scaled(
     Raises:
         InputError: the scale is beyond what distances hold.
     """
-    # The order in memory decides the order of sums, and so which of equal axes is found.
+    # The order in memory decides the order of sums, and so which of equal axes is taken.
     X = np.ascontiguousarray(X, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         mean = column_means(X)

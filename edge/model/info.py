@@ -1,4 +1,4 @@
-"""What a model file says of itself: the metadata beside the graph."""
+"""The metadata of a model file, which the board reads beside the graph."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FORMAT = 4
 
 @dataclass(frozen=True)
 class Task:
-    """One question that the model answers, and how it was fitted.
+    """A question that the model answers, and how it was fitted.
 
     Attributes:
         labels: the answers, in the order of the scores.
@@ -31,7 +31,7 @@ class Task:
         accuracy: nested accuracy of the whole choice at export, 0 to 1.
         projection: "pca" (principal components) or "lda" (discriminants).
         features: those that it takes, in the order of the model's; all where empty.
-        left_out: what the accuracy left out as a whole: "trial", or a label such as "object".
+        left_out: the groups left out to score the accuracy: "trial", or a label such as "object".
         no_contact: the answer where a recording ends without a contact, or None.
     """
 

@@ -13,13 +13,12 @@ from edge.errors import InputError
 UNKNOWN = "unknown"
 """The label of a contact that is unlike everything in training."""
 NOVELTY_RATE = 0.02
-"""How often a contact with a trained object may be called unknown. At this rate such answers are
-counted among the certified errors."""
+"""Rate at which contacts with trained objects may be called unknown. Such answers are counted among
+the certified errors."""
 
 TEST_SHARE = 0.5
-"""Part of the risk that the tests on calibration trials take. The rest is for what these cannot
-show: the exported model is one of many that such trials may give, and errs more or less often than
-the folds' models do on average."""
+"""Part of the risk that the tests on calibration trials take. The rest covers the exported model,
+which errs more or less often than the folds' models do on average."""
 
 
 def check_rate(value: float, what: str) -> float:
@@ -111,7 +110,7 @@ class Stopping:
         return able[-1] if able else None
 
     def refusal(self, error: float) -> str:
-        """Why an error rate cannot be certified, and what would help."""
+        """A sentence that says why an error rate cannot be certified, and how many trials could."""
         share = self.wrong / self.trials
         known = (
             f"the smallest error that {self.trials} calibration trials certify is "
@@ -179,16 +178,16 @@ class Novelty:
 
     def rate(self, decision_point: int, distance: float) -> float:
         """The smallest novelty rate at which the distance counts as unknown; 1 at none."""
-        found = 1.0
+        smallest = 1.0
         for rate, limit in zip(self.rates, self.limits[decision_point], strict=True):
             if distance > limit:
-                found = rate
-        return found
+                smallest = rate
+        return smallest
 
     def withholds(self, task: str, rate: float, asked: float = NOVELTY_RATE) -> bool:
         """Whether a task names nothing, where the contact counts as unknown from a rate on.
 
-        A new object can still be told to be soft or to move: only what it is has no answer.
+        A new object can still be called soft or movable; only the object itself has no name.
         """
         return task == self.task and rate <= asked
 

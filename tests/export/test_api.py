@@ -68,9 +68,9 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
     paths = [str(recordings), str(tmp_path)]
     fitted = train.fit(paths, features=["paper"], projection="pca", window_s=9.0, jobs=1)
     text = report(fitted)
-    assert "warning: 1 recordings have no contact above 150 counts and count as wrong: " in text
+    assert "warning: without a contact above 150 counts, and counted as wrong: " in text
     assert "python -m train thresholds" in text
-    assert "warning: 1 recordings lack a label for object and are left out: " in text
+    assert "warning: left out for lack of a label for object: " in text
     assert "the window of 9 s is longer than any recording goes on after its onset" in text
 
 
