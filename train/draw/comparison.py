@@ -57,7 +57,7 @@ def draw(
 
     if len(recordings) > MOST:
         raise InputError(f"{len(recordings)} recordings are too many side by side; give {MOST}")
-    found = [_contact(name, recording) for name, recording in recordings]
+    contacts = [_contact(name, recording) for name, recording in recordings]
     horizon = WINDOW_S if model is None else model.info.window_s
     style: dict[Any, Any] = {"font.size": 12, "axes.prop_cycle": cycler(color=[INK, DECISION])}
     if dark:
@@ -66,12 +66,12 @@ def draw(
         style |= {"figure.facecolor": PAPER, "axes.facecolor": PAPER, "savefig.facecolor": PAPER}
         style |= dict.fromkeys(lines, LINES)
     with rc_context(style):
-        _draw(recordings, found, horizon, out, model)
+        _draw(recordings, contacts, horizon, out, model)
 
 
 def _draw(
     recordings: Sequence[tuple[str, Recording]],
-    found: Sequence[tuple[float, FeatureSeries]],
+    contacts: Sequence[tuple[float, FeatureSeries]],
     horizon: float,
     out: Path,
     model: Model | None,
@@ -83,10 +83,10 @@ def _draw(
         4, len(recordings), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
     )
     strongest = max(float(_force(r)[_within(r, f[0], horizon)].max())
-                    for (_, r), f in zip(recordings, found, strict=True))  # fmt: skip
+                    for (_, r), f in zip(recordings, contacts, strict=True))  # fmt: skip
     image = None
     for column, ((name, recording), (onset, series)) in enumerate(
-        zip(recordings, found, strict=True)
+        zip(recordings, contacts, strict=True)
     ):
         image = _skin(axes[0, column], recording, onset, horizon, strongest)
         decided = None if model is None else _decided(name, recording, model)
@@ -116,10 +116,10 @@ def _contact(name: str, recording: Recording) -> tuple[float, FeatureSeries]:
     chain = arm_of(recording, name)
     if chain is not None:
         recording = recording.for_joints(chain.names, name)
-    found = first_contact(recording, ContactTracker(recording.layout, chain=chain))
-    if found is None:
+    contact = first_contact(recording, ContactTracker(recording.layout, chain=chain))
+    if contact is None:
         raise InputError(f"{name}: holds no contact")
-    return found
+    return contact
 
 
 def _decided(name: str, recording: Recording, model: Model) -> Decided | None:

@@ -1,4 +1,4 @@
-"""A map of touch as a picture: where things were touched, and what they were."""
+"""A map of touch as a picture: the places of the contacts and their labels."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ UNKNOWN = "no label"
 
 
 def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
-    """What the contacts lie on: its name, and lines (points, 3) in the map's frame.
+    """The name of the arm or skin behind the contacts, and its lines (points, 3).
 
-    The skin's edges, or the arm with each joint in the middle of its range.
+    In the map's frame: the skin's edges, or the arm with each joint in the middle of its range.
     """
     layout, chain = info.layout, info.chain
     if chain is not None:
@@ -42,20 +42,21 @@ def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
 
 
 def draw(
-    found: TouchMap,
+    contacts: TouchMap,
     out: Path,
     where: str,
     task: str | None = None,
     info: ModelInfo | None = None,
 ) -> None:
-    """Two views of the contacts, a colour and marker a label; fainter where votes were divided.
+    """Draw two views of the contacts, with a colour and marker for each label.
 
-    With the model's `info`, the outline of its arm or skin is drawn behind them.
+    Contacts whose votes were divided are fainter. With the model's `info`, the outline of its arm
+    or skin is drawn behind them.
 
     Raises:
         InputError: the map is empty, or has no such task.
     """
-    touches = list(found)
+    touches = list(contacts)
     if not touches:
         raise InputError(f"{where}: no contact is on this map yet")
     tasks = sorted({task for touch in touches for task in touch.labels})
@@ -90,7 +91,7 @@ def draw(
                 linewidths=0.6,
                 label=f"{label} ({int(those.sum())})",
             )
-        unit = "m" if found.head.unit == "metre" else found.head.unit
+        unit = "m" if contacts.head.unit == "metre" else contacts.head.unit
         axis.set(xlabel=f"{'xyz'[across]} ({unit})", ylabel=f"{'xyz'[up]} ({unit})", title=view)
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(0.15)
@@ -99,7 +100,7 @@ def draw(
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, title=chosen, loc="outside right upper")
     count = len(touches)
-    frame = "the skin" if found.head.frame == "skin" else found.head.frame
+    frame = "the skin" if contacts.head.frame == "skin" else contacts.head.frame
     figure.suptitle(f"{count} contact{'s' * (count != 1)} in the frame of {frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)

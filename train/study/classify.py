@@ -138,7 +138,7 @@ def features(context: Context) -> Section:
     """Table III."""
     cases = [(context.vectors(names=names), context.labels, "none", names) for names in SUBSETS]
     answers = context.map("features", grid_search, cases)
-    results = {" ".join(names): found for names, found in zip(SUBSETS, answers, strict=True)}
+    results = {" ".join(names): result for names, result in zip(SUBSETS, answers, strict=True)}
 
     def short(names: str) -> str:
         return names.replace("contact_", "").replace("max_", "").replace(" ", " + ")

@@ -70,8 +70,8 @@ def section(context: Context) -> Section:
         rows += [
             {"taxels": n, "rows": skin.rows, "columns": skin.cols, "pooling": how, "task": task}
             | score(result)
-            | {"paper %": papers("I", task).get(str(n), ""), "without contact": none}
-            for skin, n, step, none in zip(skins, taxels, steps, without, strict=True)
+            | {"paper %": papers("I", task).get(str(n), ""), "without contact": untouched}
+            for skin, n, step, untouched in zip(skins, taxels, steps, without, strict=True)
             for task, result in step.items()
         ]
         png = figures.lines(

@@ -84,10 +84,10 @@ def study(
             f"{counted(len(dataset.trials), 'trial')} are too few to study; give {FEWEST} or more"
         )
     context = Context(dataset, source, Workers(jobs, None if address is None else "dask"))
-    alike = [task for task in dataset.tasks if task not in context.labels]
+    constant = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:
         raise InputError(
-            f"every trial has the same {' and the same '.join(alike)}: there is nothing to "
+            f"every trial has the same {' and the same '.join(constant)}: there is nothing to "
             "distinguish; give recordings of two classes or more"
         )
     with nullcontext() if address is None else on_cluster(address):
@@ -99,14 +99,14 @@ def study(
     shown = [conclude(context, every) for conclude in CONCLUSIONS] + sections
     name = source.name if source is not None else Path(data[0]).name
     written = write(
-        out, f"What a touch reveals: {name}", _lead(context, alike), [s for s in shown if s]
+        out, f"What a touch reveals: {name}", _lead(context, constant), [s for s in shown if s]
     )
     took = time.perf_counter() - began
     print(f"study: {len(shown)} sections in {took:.0f} s", file=sys.stderr)
     return written
 
 
-def _lead(context: Context, alike: Sequence[str]) -> list[str]:
+def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     """The paragraphs below the title: the data set, and what is left out of it."""
     dataset, scene, layout = context.dataset, context.scene, context.dataset.layout
     tasks = ", ".join(f"{task} ({len(set(y))} classes)" for task, y in context.labels.items())
@@ -122,8 +122,8 @@ def _lead(context: Context, alike: Sequence[str]) -> list[str]:
         f"frame. {source} Accuracies are of leave-one-out cross-validation unless a section says "
         "otherwise, with 95 % binomial (Wilson) intervals."
     ]
-    if alike:
-        lead.append(f"Left out, as every trial has the same label: {', '.join(alike)}.")
+    if constant:
+        lead.append(f"Left out, as every trial has the same label: {', '.join(constant)}.")
     if dataset.untouched:
         lead.append(f"Left out: {counted(len(dataset.untouched), 'recording')} without a contact.")
     return lead

@@ -44,25 +44,25 @@ class Board:
 
 
 def read(path: str | os.PathLike[str]) -> Board:
-    """Read a board file.
+    """The figures in a board file.
 
     Raises:
-        InputError: it is missing, or is none; the sentence names it.
+        InputError: it is missing or has other contents; the sentence names it.
     """
     name = os.fspath(path)
     mend = f"make one with `edge-classify bench --out {name}`"
-    with json_file(name, "a board file", mend) as found:
+    with json_file(name, "a board file", mend) as content:
         board = Board(
-            name=f"{found['machine']['kind']} ({found['machine']['name']})",
-            digest=str(found["model"]["data_digest"]),
+            name=f"{content['machine']['kind']} ({content['machine']['name']})",
+            digest=str(content["model"]["data_digest"]),
             stages_us={
                 str(name): (float(stage["median_us"]), float(stage["p99_us"]))
-                for name, stage in found["stages"].items()
+                for name, stage in content["stages"].items()
             },
-            memory_mb=float(found["memory_mb"]),
-            cold_start_ms=float(found["cold_start_ms"]),
-            features=len(found["model"]["features"]),
-            model=str(found["model"]["sha256"]),
+            memory_mb=float(content["memory_mb"]),
+            cold_start_ms=float(content["cold_start_ms"]),
+            features=len(content["model"]["features"]),
+            model=str(content["model"]["sha256"]),
         )
         if board.features < 1 or not all(0.0 < board.stages_us[s][0] < 1e9 for s in STAGES):
             raise ValueError("a stage takes no time")

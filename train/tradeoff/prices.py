@@ -53,7 +53,7 @@ def read(path: str | os.PathLike[str], digest: str) -> Prices:
     """
     name = os.fspath(path)
     mend = f"make one with `python -m export.prices --out {name}`"
-    with json_file(name, "a prices file", mend) as found:
+    with json_file(name, "a prices file", mend) as content:
         decisions = tuple(
             Price(
                 rows=int(price["rows"]),
@@ -63,9 +63,9 @@ def read(path: str | os.PathLike[str], digest: str) -> Prices:
                 us=float(price["us"]),
                 kilobytes=float(price["kilobytes"]),
             )
-            for price in found["decisions"]
+            for price in content["decisions"]
         )
-        prices = Prices(str(found["machine"]), str(found["data_digest"]), decisions)
+        prices = Prices(str(content["machine"]), str(content["data_digest"]), decisions)
         numbers = [x for d in decisions for x in (d.rows, d.components, d.k, d.us, d.kilobytes)]
         if not numbers or not all(0 < x < 1e12 for x in numbers):
             raise ValueError("no decision, or one of no size")

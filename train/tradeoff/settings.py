@@ -188,8 +188,8 @@ def section(measured: Measured) -> Section:
         if point.task == main and (front or point.paper):
             few.append(row | split | paper)
     arithmetic, wire = (
-        100 * max(part / p.seconds for p, part in parts)
-        for parts in ([(p, p.arithmetic_s) for p in points], [(p, p.wire_s) for p in points])
+        100 * max(part / p.seconds for p, part in pairs)
+        for pairs in ([(p, p.arithmetic_s) for p in points], [(p, p.wire_s) for p in points])
     )
     title = f"The best settings of {main}, and the paper's"
     picture = _picture([p for p in points if p.task == main], best[main], main, measured.breakaways)

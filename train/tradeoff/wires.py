@@ -1,4 +1,4 @@
-"""Ways to wire a skin, and what a frame costs on each, counted from the drivers' transactions."""
+"""Ways to wire a skin, and the cost of a frame on each, counted from the drivers' transactions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
 FRAMES = 100
-"""Counted together, so that what is sent only now and then counts by its share."""
+"""Frames counted together, so that occasional transactions count by their share."""
 STAGES = 12
 CHANNELS, CHIPS = 8, 4
 MUX = 0x70
@@ -25,9 +25,9 @@ class Wire:
     """A wiring.
 
     Attributes:
-        name: what it is.
-        bits: of a frame on all buses together.
-        frame_s: seconds that a frame takes on the slowest bus.
+        name: description of the wiring.
+        bits: bits of a frame on all buses together.
+        frame_s: seconds of a frame on the slowest bus.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Wire:
     frame_s: float
 
     def every(self, rate_hz: float) -> int:
-        """n, where this bus can carry every n-th of the frames that come at the given rate."""
+        """The n of every n-th frame that this wire can carry, of frames at the given rate."""
         return max(1, math.ceil(self.frame_s * rate_hz - 1e-9))
 
 
@@ -47,7 +47,7 @@ def count(name: str, file: SkinFile) -> Wire:
 
 
 def spread(layout: SkinLayout, buses: int, clock_hz: int = 400_000) -> SkinFile:
-    """A skin on AD7147 chips, spread over that many buses, each with a TCA9548A."""
+    """A skin on AD7147 chips, spread over that buses_used buses, each with a TCA9548A."""
     taxels = layout.rows * layout.cols
     groups = [tuple(range(a, min(a + STAGES, taxels))) for a in range(0, taxels, STAGES)]
     specs = []
@@ -73,18 +73,18 @@ def wires(layout: SkinLayout) -> list[Wire]:
     """
     taxels = layout.rows * layout.cols
     chips = -(-taxels // STAGES)
-    found = []
+    choices = []
     for buses in (1, 2, 3):
         if buses <= chips and chips <= buses * CHANNELS * CHIPS:
             name = f"AD7147, {buses} bus{'es' if buses > 1 else ''} at 400 kHz"
-            found.append(count(name, spread(layout, buses)))
+            choices.append(count(name, spread(layout, buses)))
     shipped = skinfile.load(skinfile.shipped("mpr121"))
     if shipped.layout.shape == layout.shape:
         clock = shipped.buses[0].clock_hz // 1000
-        many = len(shipped.buses)
-        name = f"MPR121, {many} bus{'es' if many > 1 else ''} at {clock} kHz"
-        found.append(count(name, replace(shipped, layout=layout)))
+        buses_used = len(shipped.buses)
+        name = f"MPR121, {buses_used} bus{'es' if buses_used > 1 else ''} at {clock} kHz"
+        choices.append(count(name, replace(shipped, layout=layout)))
     chip = ChipSpec(block.KIND, 0x08, tuple(range(taxels)))
     served = SkinFile("block", layout, (BusSpec("fake", (chip,), clock_hz=1_000_000),))
-    found.append(count("microcontroller, 1 bus at 1 MHz", served))
-    return found
+    choices.append(count("microcontroller, 1 bus at 1 MHz", served))
+    return choices
