@@ -149,8 +149,8 @@ def predict(t: Trials, i: Index) -> None:
 
 
 def press(t: Trials, i: Index) -> None:
-    """The contact's loads: the object is at rest."""
-    t.loads[:, i] = t.ask(i, pick(t.y[0], i), pick(t.compliance[0], i))
+    """The contact's loads; an object that moves adds to what gives way."""
+    t.loads[:, i] = t.ask(i, pick(t.y[0], i), pick(t.compliance[0], i) + pick(t.soft, i))
 
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
@@ -167,7 +167,7 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
         force = np.where((elastic > 0.0) & (force > 0.0), force, 0.0)
     else:
         force = closed_form(*law, y, c)
-    return np.stack([force, np.zeros_like(force)])
+    return np.array([force, np.zeros_like(force)])
 
 
 def settle(t: Trials, i: Index) -> None:

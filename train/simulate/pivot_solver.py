@@ -64,6 +64,13 @@ class Loads(NamedTuple):
     rows: Array
 
 
+def determinant(c: Array) -> Array:
+    """Of C (3, n); 0 where it is rounding: an arm of one joint pushes and tilts in one motion, and
+    C has no inverse."""
+    det = c[0] * c[2] - c[1] * c[1]
+    return np.where(det > NO_DIGITS * c[0] * c[2], det, 0.0)
+
+
 @dataclass(frozen=True)
 class Pivots:
     """Contacts of n pivoting forearms: y = free - C (F, M) has to hold.
@@ -74,6 +81,7 @@ class Pivots:
             which the face draws back there, metres from the contact's middle.
         gain, load: (n,), (rows, n): a row bears gain F + load of its springs' F (`viscous`).
         free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in them.
+        det: (n,) of C, as of `determinant`.
     """
 
     springs: list[Springs]
@@ -84,6 +92,7 @@ class Pivots:
     load: Array | float
     free: Array
     c: Array
+    det: Array
 
     def some(self, keep: NDArray[np.intp]) -> Pivots:
         """Some of the contacts."""
@@ -101,7 +110,7 @@ class Pivots:
             springs,
             *(a.take(keep, -1) for a in (self.weight, self.line_gap, self.lever)),
             *(a if isinstance(a, float) else a.take(keep, -1) for a in (self.gain, self.load)),
-            *(a.take(keep, -1) for a in (self.free, self.c)),
+            *(a.take(keep, -1) for a in (self.free, self.c, self.det)),
         )
 
     def loads(self, y: Array) -> Loads:
@@ -133,12 +142,6 @@ class Pivots:
         spread = total(off * off * held)
         return Loads(total(force), total(force * self.lever), stiffness, mean, spread, force)
 
-    def determinant(self) -> Array:
-        """Of C; 0 where it is rounding: an arm of one joint pushes and tilts in one, and C has no
-        inverse."""
-        det = self.c[0] * self.c[2] - self.c[1] * self.c[1]
-        return np.where(det > NO_DIGITS * self.c[0] * self.c[2], det, 0.0)
-
     def step(self, y: Array, loads: Loads) -> Array:
         """(2, n): p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean
         lever, where H is diagonal and the determinant a sum of positive terms: no digits are lost
@@ -147,7 +150,7 @@ class Pivots:
         force, moment, k, mean, spread, _ = loads
         r0 = y[0] - self.free[0] + (c00 * force + c01 * moment)
         r1 = y[1] - self.free[1] + (c01 * force + c11 * moment)
-        det_c = self.determinant()
+        det_c = self.det
         b01 = c01 + mean * c11
         b00 = c00 + mean * (c01 + b01)
         r = r0 + mean * r1
@@ -155,23 +158,23 @@ class Pivots:
         det = 1.0 + b00 * k + c11 * spread + det_c * k * spread
         p0 = (first * r - b01 * spread * r1) / det
         p1 = (second * r1 - b01 * k * r) / det
-        p = np.stack([p0 - mean * p1, p1])
+        p = np.array([p0 - mean * p1, p1])
         single = (det_c == 0.0) & (c00 > 0.0)
         if single.any():
             # One way to go, and a stiffness along it.
             lean = c01 / np.where(single, c00, 1.0)
             reach = 1.0 + lean * mean
             p0 = r0 / (1.0 + c00 * (reach * reach * k + lean * lean * spread))
-            p = np.where(single, np.stack([p0, lean * p0]), p)
+            p = np.where(single, np.array([p0, lean * p0]), p)
         return p
 
     def arm(self, y: Array) -> tuple[Array, NDArray[np.bool_]]:
         """The loads that the arm gives at y, and (n,) whether C tells both of them."""
         c00, c01, c11 = self.c
-        det = self.determinant()
+        det = self.det
         tells, d = det > 0.0, self.free - y
         over = np.where(tells, det, 1.0)
-        both = np.stack([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / over
+        both = np.array([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / over
         return both, tells
 
     def slope(self, y: Array, loads: Loads, p: Array) -> Array:
@@ -190,7 +193,7 @@ class Pivots:
         stiff = (c00 * loads.stiffness > 1.0) & (loads.force > 0.0)
         force = np.where(stiff, np.where(tells, given[0], single), loads.force)
         moment = np.where(stiff & tells, given[1], loads.moment)
-        return np.where(force > 0.0, np.stack([force, moment]), 0.0)
+        return np.where(force > 0.0, np.array([force, moment]), 0.0)
 
 
 class Answer(NamedTuple):
@@ -208,7 +211,7 @@ def search(pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS) -
     turned uphill by more than half of what it began with is cut back along its secant.
     """
     c = pivots.c
-    y = pivots.free - np.stack(
+    y = pivots.free - np.array(
         [c[0] * guess[0] + c[1] * guess[1], c[1] * guess[0] + c[2] * guess[1]]
     )
     left = np.arange(y.shape[1])

@@ -48,8 +48,10 @@ FRAME = (
 STEP = (
     "predict",  # where arm and object would be without load
     "drag",  # what holds the object
-    "press",  # the loads: the last of the effects alone
-    "settle",  # arm and object under these loads
+    "give_way",  # how the object moves under a load
+    "press",  # the loads
+    "move",  # the object under these loads
+    "settle",  # the arm under these loads
 )
 SAMPLE = (
     "bear",  # what the skin bears, and each row's depth: the last of the effects alone
@@ -63,7 +65,7 @@ SENSOR = (
 )
 ANSWER = "answer"
 """The solver of a contact, which `press` asks: the last of the effects alone."""
-INSTEAD = ("lay", "law", "locate", "press", ANSWER, "bear", "image")
+INSTEAD = ("lay", "law", "locate", ANSWER, "bear", "image")
 """Hooks of which the last effect that has one takes the place of all others."""
 STAGES = (*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER, *SAMPLE, *SENSOR)
 

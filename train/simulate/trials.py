@@ -48,6 +48,7 @@ class Trials:
         z: (n,) metres in the skin's link, where the object is met.
         y, y_frame, depth, loads: (2, n) the contact's coordinates (`contact`) without load, at the
             frame and under load, and the loads.
+        soft: (n,) metres that the object gives way for each newton in this step.
         compliance: (3, n) of the arm in them; jacobian: (dof, 2, n) how the joints move them.
         row_z: (rows, 1) metres in the skin's link, of its rows.
         columns: (C, n) of the skin that can touch; column_gaps: (C, n) metres that each lies
@@ -101,7 +102,7 @@ class Trials:
         self.weight, self.line_gap, self.line_depth, self.row_force = zeros((4, skin.rows, n))
         self.law_gaps, self.slopes, self.intercepts = np.full((1, n), np.inf), *zeros((2, 1, n))
         self.lost = zeros(n, dtype=bool)
-        self.z, self.taxel_k, self.force, self.deepest, self.inside = zeros((5, n))
+        self.soft, self.z, self.taxel_k, self.force, self.deepest, self.inside = zeros((6, n))
         self.image = zeros((skin.rows, window, n))
 
     @property

@@ -21,6 +21,8 @@ from train.simulate.schema import THICKNESS
 
 REDRAWS = 40
 """Draws of one trial that may contradict its label before the scene is refused."""
+AHEAD = 4
+"""Further draws of a trial that are simulated side by side; the first true one is taken."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,16 @@ def true_runs(
     while specs:
         physics = run_physics(scene, specs)
         judged = contradictions(physics)
-        yield physics, np.array([i for i, wrong in enumerate(judged) if wrong is None], dtype=int)
-        again = [(spec, wrong) for spec, wrong in zip(specs, judged, strict=True) if wrong]
+        true: dict[tuple[str, int], int] = {}
+        last: dict[tuple[str, int], tuple[TrialSpec, Contradiction]] = {}
+        for i, (spec, wrong) in enumerate(zip(specs, judged, strict=True)):
+            trial = spec.key, spec.number
+            if wrong is None:
+                true.setdefault(trial, i)
+            else:
+                last[trial] = spec, wrong
+        yield physics, np.array(sorted(true.values()), dtype=int)
+        again = [last[trial] for trial in last if trial not in true]
         for spec, wrong in again:
             if spec.attempt + 1 >= REDRAWS:
                 raise InputError(
@@ -118,4 +128,8 @@ def true_runs(
                     f"{scene.labels['window_s']:g} s of the touch (the last {wrong.what}); "
                     f"{wrong.remedy}"
                 )
-        specs = tuple(replace(spec, attempt=spec.attempt + 1) for spec, _ in again)
+        specs = tuple(
+            replace(spec, attempt=attempt)
+            for spec, _ in again
+            for attempt in range(spec.attempt + 1, min(spec.attempt + 1 + AHEAD, REDRAWS))
+        )

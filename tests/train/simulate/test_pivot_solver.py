@@ -11,7 +11,7 @@ import pytest
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate.effects import tilt
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, search
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, determinant, search
 from train.simulate.scene_model import Value
 
 
@@ -92,7 +92,7 @@ def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
     gaps = springs.gaps
     groups = [Springs(np.arange(n), gaps[:, None], springs.stiffness[:, None], gaps.min(axis=1))]
     rows = (springs.weight, springs.line_gap, springs.lever)
-    pivots = Pivots(groups, *rows, 1.0, 0.0, np.array(free), np.array(c))
+    pivots = Pivots(groups, *rows, 1.0, 0.0, np.array(free), np.array(c), determinant(np.array(c)))
     found = search(pivots, np.zeros((2, n)), guarded_rounds)
     return SimpleNamespace(force=found.loads[0], moment=found.loads[1], lost=found.lost)
 

@@ -165,7 +165,7 @@ HOOKS = {
     "relaxation": {"stand"},
     "inertia": {"swing", "stand", "pace", "tune", "predict", "settle"},
     "friction": {"stand", "reach_along", "predict", "drag", "settle", "lean"},
-    "sliding": {"stand", "predict", "drag", "press"},
+    "sliding": {"stand", "predict", "drag", "give_way", "move"},
     "slope": {"stand"},
     "turning": {"stand", "pass_on"},
     "stribeck": {"drag"},

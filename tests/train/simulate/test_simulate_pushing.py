@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.train.simulate.scenes import run
+from train.simulate import base
 from train.simulate.contact import GRAVITY
 from train.simulate.effects import sliding, stribeck, tipping
 from train.simulate.plan import ALL
@@ -130,6 +131,8 @@ class TestToppling:
         mover = t.own["sliding"]
         mover.slide[:], mover.speed[:], t.y[:] = 1e-6, 0.0, -0.1
         tipping.drag(t, ALL)
-        sliding.press(t, ALL)
+        sliding.give_way(t, ALL)
+        base.press(t, ALL)
+        sliding.move(t, ALL)
         assert (mover.slide.tolist(), mover.speed.tolist()) == ([0.0], [0.0])
         assert (t.loads == 0.0).all()

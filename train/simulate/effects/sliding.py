@@ -28,6 +28,7 @@ class Mover:
         leans: (n,) whether it leans: then it moves either way, until it stands or lies.
         lies: (n,) metres that it has moved when it lies.
         speed, slide: (n,) m/s, and metres that it has moved.
+        rest, shifted: (n,) the contact's depth without load, at rest and in motion.
     """
 
     inertia: Array
@@ -40,6 +41,8 @@ class Mover:
     lies: Array
     speed: Array
     slide: Array
+    rest: Array
+    shifted: Array
 
 
 TRACES = {"slide_m": "slide"}
@@ -47,7 +50,7 @@ TRACES = {"slide_m": "slide"}
 
 def stand(t: Trials, i: Index) -> None:
     """At rest, with what holds it and what resists its motion."""
-    values, zeros = t.values, np.zeros((4, t.n))
+    values, zeros = t.values, np.zeros((6, t.n))
     t.own["sliding"] = Mover(
         inertia=values["mass_kg"].copy(),
         static=values["friction_static"].copy(),
@@ -59,6 +62,8 @@ def stand(t: Trials, i: Index) -> None:
         lies=np.full(t.n, np.inf),
         speed=zeros[2],
         slide=zeros[3],
+        rest=zeros[4],
+        shifted=zeros[5],
     )
 
 
@@ -75,39 +80,47 @@ def drag(t: Trials, i: Index) -> None:
     mover.resist[i] = pick(mover.kinetic, i) * weight
 
 
-def press(t: Trials, i: Index) -> None:
-    """The loads of a contact whose object may move, and its motion.
+def give_way(t: Trials, i: Index) -> None:
+    """How an object that moves meets the load.
 
     Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is a further
     compliance h^2/m and a shift, so its solver holds.
     """
     mover: Mover = t.own["sliding"]
+    h, speed, y = pick(t.h, i), pick(mover.speed, i), pick(t.y[0], i)
+    soft = h / pick(mover.inertia, i) * h
+    shifted = y - h * speed + soft * pick(mover.resist, i)
+    moving = pick(mover.leans, i) | (speed > 0.0)
+    mover.rest[i], mover.shifted[i] = y, shifted
+    t.y[0, i] = np.where(moving, shifted, y)
+    t.soft[i] = np.where(moving, soft, 0.0)
+
+
+def move(t: Trials, i: Index) -> None:
+    """The motion under the loads; a few trials are asked for their loads once more."""
+    mover: Mover = t.own["sliding"]
     h, speed, resist = pick(t.h, i), pick(mover.speed, i), pick(mover.resist, i)
-    slide, leans = pick(mover.slide, i), pick(mover.leans, i)
-    y, c = pick(t.y[0], i), pick(t.compliance[0], i)
-    gain = h / pick(mover.inertia, i)
-    soft = gain * h
-    y_moving = y - h * speed + soft * resist
+    slide, leans, lies = pick(mover.slide, i), pick(mover.leans, i), pick(mover.lies, i)
+    gain, force = h / pick(mover.inertia, i), pick(t.loads[0], i)
     moving = leans | (speed > 0.0)
-    loads = t.ask(i, np.where(moving, y_moving, y), np.where(moving, c + soft, c))
-    after = np.where(moving, speed + gain * (loads[0] - resist), 0.0)
-    ends, lies = slide + h * after, pick(mover.lies, i)
+    after = np.where(moving, speed + gain * (force - resist), 0.0)
+    ends = slide + h * after
     lands = leans & ((ends <= 0.0) | (ends >= lies))
     goes = moving & (leans | (after > 0.0)) & ~lands
     stops = moving & ~goes
-    again = (stops | (~moving & (loads[0] > pick(mover.hold, i)))).nonzero()[0]
+    again = np.flatnonzero(stops | (~moving & (force > pick(mover.hold, i))))
     if again.size:
         # What comes to rest is asked once more at rest, and what sets off as it moves.
-        rests = stops[again]
-        shift = np.where(rests, y[again], y_moving[again])
-        second = t.ask(np.arange(t.n)[i][again], shift, (c + np.where(stops, 0.0, soft))[again])
-        off = np.where(rests, 0.0, gain[again] * (second[0] - resist[again]))
+        trials, rests = np.arange(t.n)[i][again], stops[again]
+        y = np.where(rests, mover.rest[trials], mover.shifted[trials])
+        soft = np.where(rests, 0.0, (gain * h)[again])
+        loads = t.ask(trials, y, t.compliance[0, trials] + soft)
+        off = np.where(rests, 0.0, gain[again] * (loads[0] - resist[again]))
         right = rests | (off > 0.0)
-        loads[:, again[right]], after[again] = second[:, right], off
-        goes[again] = off > 0.0
+        t.loads[:, trials[right]] = loads[:, right]
+        after[again], goes[again] = off, off > 0.0
     after = np.where(goes, after, 0.0)
     step = h * after
     mover.speed[i] = after
     mover.slide[i] = np.where(lands, np.clip(ends, 0.0, lies), slide) + step
-    t.y[0, i] = y - step
-    t.loads[:, i] = loads
+    t.y[0, i] = pick(mover.rest, i) - step

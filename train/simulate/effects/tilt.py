@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from train.simulate import base
 from train.simulate.arm import Array, cross, dot
 from train.simulate.contact import by_depth, covered, curve_gap, total
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, search
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, determinant, search
 from train.simulate.plan import Index
 from train.simulate.trials import Trials, pick
 
@@ -133,6 +133,7 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
         elif mine.size:
             parts = (group.springs.gaps.take(mine, -1), group.springs.stiffness.take(mine, -1))
             springs.append(Springs(at[mine], *parts, group.springs.nearest))
+    c = np.array([c, pick(t.compliance[1], i), pick(t.compliance[2], i)])
     pivots = Pivots(
         springs,
         pick(t.weight, i),
@@ -140,8 +141,9 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
         pick(own.lever, i),
         1.0 if viscous is None else pick(viscous.gain, i),
         0.0 if viscous is None else pick(viscous.load, i),
-        np.stack([y, pick(t.y[1], i)]),
-        np.stack([c, pick(t.compliance[1], i), pick(t.compliance[2], i)]),
+        np.array([y, pick(t.y[1], i)]),
+        c,
+        determinant(c),
     )
     found = search(pivots, pick(own.guess, i), GUARDED_ROUNDS)
     t.row_force[:, i] = found.rows
