@@ -4,6 +4,7 @@ Behind the kernel stand the chips of `edge.fake`. A frame of a recording lasts u
 been read once, so that the slow guest sees every frame, as the fake bus in virtual time does.
 """
 
+import ctypes
 import errno
 import json
 import math
@@ -13,7 +14,7 @@ import shutil
 import signal
 import threading
 import time
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +26,12 @@ from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
 from edge.fake.player import Playback, calibrated, fake_buses
 from edge.fake.usb_adapter import UsbAdapter, plugged
-from edge.i2c.bus import BusDenied, BusFault, BusNack, LinuxBus, fetch
+from edge.i2c.bus import BusBusy, BusDenied, BusFault, BusNack, LinuxBus, fetch
 from edge.recording import Recording, load, save
 from edge.skin import file as skinfile
 from edge.skin.calibration import save_calibration
+from edge.skin.loop import Loop
+from edge.skin.skin import Skin
 
 SKINS = Path(os.environ["SKINS"])
 PERIOD_S = 0.1
@@ -36,6 +39,8 @@ CHIP_BYTES = 24
 """Both kinds of chip serve their 12 taxels in so many bytes."""
 PAD_CHIPS = [0x5A, 0x5B]
 ABSENT = 0x5C
+FINIT_MODULE = 313
+"""The system call's number on x86-64."""
 
 
 class Adapter(UsbAdapter):
@@ -102,6 +107,13 @@ class Rig:
         path = self.folder / f"{name}.npz"
         save(path, Recording(t, np.array(frames, np.uint16), meta=meta))
         return path
+
+
+def load_module(name, parameters):
+    """Load a module of the kernel, as insmod does."""
+    (path,) = (SKINS.parent / "system" / "lib" / "modules").rglob(f"{name}.ko")
+    with path.open("rb") as file:
+        assert ctypes.CDLL(None).syscall(FINIT_MODULE, file.fileno(), parameters.encode(), 0) == 0
 
 
 @pytest.fixture(params=["pad", "cody"])
@@ -236,6 +248,32 @@ def test_a_shortened_transfer_gives_no_value(pad):
         assert fetch(bus, PAD_CHIPS[0], b"\x5d", 1) == b"\x24"
 
 
+def test_a_second_program_is_refused_and_others_do_no_harm(pad):
+    with pad.plugged() as device, closing(LinuxBus(device)) as bus:
+        child = os.fork()
+        if child == 0:
+            with SMBus(device) as smbus:
+                values = {smbus.read_byte_data(PAD_CHIPS[1], 0x5D) for _ in range(10)}
+            try:
+                LinuxBus(device)
+            except BusBusy as error:
+                os._exit(0 if values == {0x24} and f"({os.getppid()})" in str(error) else 1)
+            os._exit(2)
+        values = {fetch(bus, PAD_CHIPS[0], b"\x5c", 2) for _ in range(10)}
+        assert os.waitpid(child, 0)[1] == 0
+        assert values == {b"\x10\x24"}
+
+
+def test_an_address_that_a_kernel_driver_owns_is_refused(pad):
+    with pad.plugged() as device, closing(LinuxBus(device)) as bus:
+        Path("/sys/bus/i2c/devices", Path(device).name, "new_device").write_text(
+            f"dummy {PAD_CHIPS[0]:#x}\n"
+        )
+        with pytest.raises(BusBusy):
+            fetch(bus, PAD_CHIPS[0], b"\x5d", 1)
+        assert fetch(bus, PAD_CHIPS[1], b"\x5d", 1) == b"\x24"
+
+
 def test_a_user_without_permission_is_told_which_group_to_join(pad):
     with pad.plugged() as device:
         Path(device).chmod(0o600)
@@ -262,3 +300,30 @@ def test_plug_puts_a_skin_on_the_bus_until_ctrl_c(pad, edge):
     (event,) = edge("fake", "--skin", pad.path, "--plug")
     looking.join()
     assert (event["event"], seen) == ("plugged", [b"\x24"])
+
+
+def test_a_skin_whose_adapter_comes_back_with_another_number_is_read_again(pad):
+    """The kernel removes an adapter only once no program has its device open."""
+    pad.calibrate()
+    pad.adapter.feel(load(pad.recording("touch", pad.patch)))
+    pad.path.write_text(pad.path.read_text().replace("device = 0", 'device = "i2c-tiny-usb"'))
+    adapter = ExitStack()
+    before = adapter.enter_context(plugged(pad.adapter))
+    heard = []
+    with Skin.open(pad.path) as skin:
+
+        def read_until(happened):
+            for frame in Loop(skin, lasts_s=60.0).frames():
+                heard.extend(skin.bus_changes())
+                if happened(frame):
+                    return frame
+
+        read_until(lambda frame: frame.valid.all())
+        adapter.close()
+        read_until(lambda frame: not Path(before).exists())
+        load_module("i2c-stub", "chip_addr=0x03")  # an adapter that takes the free number
+        with plugged(pad.adapter) as after:
+            frame = read_until(lambda frame: frame.valid.all())
+    assert (before, after) == ("/dev/i2c-0", "/dev/i2c-1")
+    assert (frame.counts == pad.patch).all()
+    assert heard == [("i2c-tiny-usb", True), ("i2c-tiny-usb", False)]

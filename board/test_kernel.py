@@ -66,9 +66,9 @@ def skins(tmp_path_factory):
 
 
 def test_the_skin_is_read_through_a_real_kernel(skins):
-    command = [sys.executable, "-m", "pytest", str(HERE / "kernel_guest.py"), "-vv", "-rA"]
+    command = [sys.executable, "-m", "pytest", str(HERE / "kernel_guest.py"), "-vv", "--color=no"]
     command += ["--noconftest", "-p", "no:cacheprovider", "--basetemp=/run/pytest"]
-    command += ["--rootdir", str(kernel.CHECKOUT), "--durations=0"]
+    command += ["--rootdir", str(kernel.CHECKOUT), "--durations=10"]
     environment = ["PYTHONDONTWRITEBYTECODE=1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD=1"]
     environment += [f"PYTHONPATH={kernel.CHECKOUT}", "OPENBLAS_NUM_THREADS=1", f"SKINS={skins}"]
     try:

@@ -74,6 +74,9 @@ def event_text(line: Mapping[str, Any]) -> str:
     if kind == "chip":
         error = f": {line['error']}" if line.get("error") else ""
         return f"{line['t']:8.3f} s  {line['bus']}, {line['place']} is {line['state']}{error}"
+    if kind == "bus":
+        again = "; it is opened again until it answers" if line["state"] == "lost" else ""
+        return f"{line['t']:8.3f} s  {line['bus']} is {line['state']}{again}"
     if kind == "end":
         period = line["period_ms"]
         median = f", one every {period['p50']:g} ms (99 % within {period['p99']:g})"

@@ -21,7 +21,7 @@ import numpy as np
 
 from edge.commands.options import add_arm, add_joints, add_skin, open_arm, within
 from edge.commands.output import Output
-from edge.commands.source import ending_signals, open_joints, open_skin
+from edge.commands.source import bus_events, ending_signals, open_joints, open_skin
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
@@ -219,6 +219,7 @@ def run(arguments: argparse.Namespace) -> int:
         loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         LOG.info("waiting for a contact")
         for frame in loop.frames():
+            lines.write(bus_events(skin, frame.t))
             recorder.save(trials.push(frame), complete=True)
             if recorder.saved == wanted:
                 break

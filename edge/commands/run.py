@@ -17,6 +17,7 @@ from edge.classifier import Classifier
 from edge.commands.options import add_error, add_joints, add_skin, check_error
 from edge.commands.output import Output
 from edge.commands.source import (
+    bus_events,
     check_joints,
     chip_event,
     ending_signals,
@@ -120,6 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames += 1
             notifier.alive()
+            emit(bus_events(skin, frame.t))
             emit([chip_event(status, t=frame.t) for status in skin.changes()])
             emit([event.to_dict() for event in classifier.push(frame)])
         notifier.stopping()

@@ -45,6 +45,14 @@ def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
     return {**event, "error": status.error} if status.error else event
 
 
+def bus_events(skin: Skin, t: float) -> list[dict[str, Any]]:
+    """The events of buses that were lost or have come back."""
+    return [
+        {"event": "bus", "t": t, "bus": name, "state": "lost" if lost else "back"}
+        for name, lost in skin.bus_changes()
+    ]
+
+
 @dataclass(frozen=True)
 class Opened:
     """A skin that is being read.

@@ -28,6 +28,8 @@ I2C_TIMEOUT = 0x0702
 I2C_SLAVE = 0x0703
 """ioctl that gives EBUSY where a driver of the kernel owns the address; `I2C_RDWR` never does."""
 I2C_RDWR = 0x0707
+ADAPTERS = Path("/sys/class/i2c-dev")
+"""A folder for each adapter, named as its device and with the adapter's name in the file `name`."""
 LARGEST_MESSAGES = 42
 LARGEST_BYTES = 8192
 """Limits of one I2C_RDWR call (linux/i2c-dev.h)."""
@@ -117,6 +119,9 @@ RESPONSES: dict[int, Response] = {
     errno.EINVAL: _REFUSED,
     errno.ENOENT: Response(
         BusMissing, remedy="no such bus; is I2C switched on, and the number right?"
+    ),
+    errno.ENOTUNIQ: Response(
+        BusMissing, remedy="several adapters have names that begin so; give more of the name"
     ),
     errno.EACCES: _DENIED,
     errno.EPERM: _DENIED,
@@ -261,6 +266,25 @@ def lock_holder(fd: int) -> str:
     return "another program"
 
 
+def find_device(name: str, adapters: Path = ADAPTERS) -> str:
+    """The path of an I2C device: `name` itself if it is a path, else that of the adapter.
+
+    Args:
+        name: a path, or the beginning of an adapter's name.
+        adapters: see `ADAPTERS`.
+
+    Raises:
+        OSError: no adapter has the name (ENOENT), or several have (ENOTUNIQ).
+    """
+    if name.startswith("/"):
+        return name
+    files = [file for file in adapters.glob("*/name") if file.read_text().startswith(name)]
+    if len(files) != 1:
+        code = errno.ENOTUNIQ if files else errno.ENOENT
+        raise OSError(code, os.strerror(code))
+    return f"/dev/{files[0].parent.name}"
+
+
 class LinuxBus:
     """An adapter of Linux, `/dev/i2c-N`, over smbus2.
 
@@ -273,7 +297,8 @@ class LinuxBus:
         """Open the bus and set its timeout.
 
         Args:
-            device: `/dev/i2c-1`, or 1.
+            device: `/dev/i2c-1`, 1, or the beginning of the adapter's name, which is looked up
+                whenever the bus is opened: an adapter on USB may come back with another number.
             timeout_s: how long a hung transfer may last, rounded up to the adapter's 10 ms;
                 the kernel's own default is a second.
 
@@ -304,7 +329,7 @@ class LinuxBus:
         self.close()
         smbus: Any = smbus2.SMBus()
         try:
-            smbus.open(self.name)
+            smbus.open(find_device(self.name))
             if not smbus.funcs & smbus2.I2cFunc.I2C:
                 raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
             flock(smbus.fd, LOCK_EX | LOCK_NB)

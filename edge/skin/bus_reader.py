@@ -22,6 +22,9 @@ from edge.skin.wiring import BusSpec
 PAUSE_S = 0.1
 """Time between two attempts to bring the same chip back, and from a timeout to the next attempt
 on its bus."""
+LONGEST_PAUSE_S = 1.0
+"""Time between two attempts to open a lost bus again, at most: a tenth of the time since the loss,
+and no less than `PAUSE_S`."""
 RETRIES_PER_FRAME = 12
 SET_UP_AFTER, SET_UP_EVERY = 16, 64
 """A chip that keeps its settings but serves damaged bytes is set up again after so many frames in a
@@ -109,6 +112,14 @@ class BusReader:
         self._retries = self._timeouts = 0
         self._rest_until = -math.inf
         """No chip is brought back before this time."""
+        self._lost_at = math.inf
+        """When the bus was lost; infinity while a chip runs."""
+        self._reopen_at = -math.inf
+
+    @property
+    def lost(self) -> bool:
+        """Whether every chip has failed, so that the bus is closed and opened again and again."""
+        return self._lost_at < math.inf
 
     def start(self) -> None:
         """Identify and set up every chip; one that fails twice is left down.
@@ -215,7 +226,9 @@ class BusReader:
         waiting = [slot for slot in self.slots if not slot.running and slot.retry_at <= now()]
         if not waiting or now() < self._rest_until:
             return
-        if all(slot.state is ChipState.DOWN for slot in self.slots) and not self._reopened():
+        if all(slot.state is ChipState.DOWN for slot in self.slots) and (
+            now() < self._reopen_at or not self._reopened()
+        ):
             return
         for slot in sorted(waiting, key=lambda slot: slot.retry_at):
             while not slot.running and slot.retry_at <= now():
@@ -225,11 +238,17 @@ class BusReader:
                 self._step(slot)
 
     def _reopened(self) -> bool:
-        """Open a bus anew on which no chip runs; an unplugged adapter may be back."""
+        """Close and open a bus on which no chip runs.
+
+        The kernel removes an unplugged adapter, and lets it return, only once no program has its
+        device open; until then every transfer fails with EIO.
+        """
+        now = self.bus.now()
+        self._lost_at = min(self._lost_at, now)
+        self._reopen_at = now + min(max(PAUSE_S, 0.1 * (now - self._lost_at)), LONGEST_PAUSE_S)
         try:
             self.bus.reopen()
         except BusError:
-            self._rest_until = self.bus.now() + PAUSE_S
             return False
         return True
 
@@ -242,6 +261,7 @@ class BusReader:
         except StopIteration:
             slot.recoveries += slot.error is not None
             slot.state, slot.error, slot.steps = ChipState.RUNNING, None, None
+            self._lost_at, self._reopen_at = math.inf, -math.inf
         except BusError as error:
             self._fail(slot, error)
             return False

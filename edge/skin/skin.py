@@ -136,6 +136,7 @@ class Skin:
         self._touched_at = self._followed_at = -math.inf
         self._since_follow = 0
         self._states = [slot.state for slot in self._slots]
+        self._lost = [False for _ in self.readers]
         self._workers = [_Worker(reader) for reader in self.readers[1:]]
         self._closed = False
 
@@ -209,6 +210,17 @@ class Skin:
             for reader in self.readers
             for slot in reader.slots
         ]
+
+    def bus_changes(self) -> list[tuple[str, bool]]:
+        """The buses that were lost or have come back since the last call: name, and if it is lost.
+
+        A bus is lost while every chip on it fails, as when its adapter is unplugged.
+        """
+        lost = [reader.lost for reader in self.readers]
+        pairs = zip(self.readers, lost, self._lost, strict=True)
+        changed = [(reader.bus.name, now) for reader, now, before in pairs if now != before]
+        self._lost = lost
+        return changed
 
     def changes(self) -> list[ChipStatus]:
         """The chips whose state has changed since the last call, or since the start."""

@@ -90,7 +90,8 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
     device = table.get("device", None)
     number = type(device) is int and 0 <= device < 1 << 20
     if not number and not (isinstance(device, str) and device and "\0" not in device):
-        raise table.fail("device", 'the number of a bus or its path, like 1 or "/dev/i2c-1"')
+        form = 'the number of a bus or its path or adapter, like 1, "/dev/i2c-1" or "CP2112"'
+        raise table.fail("device", form)
     if isinstance(device, str) and SERIAL_PORT.fullmatch(device):
         raise InputError(
             f"{table.called('device')} {device} is a serial port, not an I2C bus; write serial = "

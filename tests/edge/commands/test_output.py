@@ -67,6 +67,10 @@ def test_a_map_of_chips_comes_last(terminal, capsys):
             "   2.750 s  released after 1.25 s",
         ),
         (
+            {"event": "bus", "t": 3.0, "bus": "/dev/i2c-1", "state": "lost"},
+            "   3.000 s  /dev/i2c-1 is lost; it is opened again until it answers",
+        ),
+        (
             {"event": "chip", "t": 3.0, "bus": "/dev/i2c-1", "place": "address 0x2c",
              "state": "down", "error": "no power"},
             "   3.000 s  /dev/i2c-1, address 0x2c is down: no power",

@@ -85,3 +85,26 @@ def test_the_process_that_holds_a_lock_is_named(tmp_path):
         assert bus.lock_holder(wanted.fileno()) == "another program"
         fcntl.flock(held, fcntl.LOCK_EX)
         assert bus.lock_holder(wanted.fileno()).endswith(f" ({os.getpid()})")
+
+
+def adapters(folder, **names):
+    """A stand-in for /sys/class/i2c-dev with these adapters."""
+    for device, name in names.items():
+        entry = folder / device.replace("_", "-")
+        entry.mkdir()
+        (entry / "name").write_text(f"{name}\n")
+    return folder
+
+
+def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(tmp_path):
+    folder = adapters(tmp_path, i2c_0="bcm2835 (i2c@7e804000)", i2c_7="CP2112 on hidraw0")
+    assert bus.find_device("CP2112", folder) == "/dev/i2c-7"
+    assert bus.find_device("/dev/i2c-3", folder) == "/dev/i2c-3"
+
+
+@pytest.mark.parametrize(("name", "code"), [("i801", errno.ENOENT), ("bcm", errno.ENOTUNIQ)])
+def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(name, code, tmp_path):
+    folder = adapters(tmp_path, i2c_0="bcm2835 (i2c@7e804000)", i2c_1="bcm2835 (i2c@7e805000)")
+    with pytest.raises(OSError, match=f"Errno {code}") as caught:
+        bus.find_device(name, folder)
+    assert isinstance(bus.bus_error(caught.value.errno, name), bus.BusMissing)

@@ -17,7 +17,7 @@ from edge.i2c.bus import BusRefused, bus_error
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
-from edge.skin.bus_reader import PAUSE_S, SET_UP_AFTER, SET_UP_EVERY, BusReader
+from edge.skin.bus_reader import LONGEST_PAUSE_S, PAUSE_S, SET_UP_AFTER, SET_UP_EVERY, BusReader
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
 from tests.edge.skin.campaign import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts, sweep
@@ -229,3 +229,23 @@ def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
     assert down.error.endswith("check its power, wiring and address (EREMOTEIO)")
     assert (up.state, up.error) == ("running", "")
     assert 0.2 <= back_at <= 0.2 + PAUSE_S + 0.01
+
+
+def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_heard():
+    """As an adapter that is unplugged for ten seconds: the kernel wants its device closed."""
+    name = CODY.buses[1].device
+    gone = Fault(code=errno.EIO, bus=name, during=(0.1, 10.0))
+    opened, heard = [], []
+    with fake_skin(CODY, lambda t: QUIET, faults=[gone]) as skin:
+        bus = skin.readers[1].bus
+        reopen = bus.reopen
+        bus.reopen = lambda: (opened.append(bus.now()), reopen())
+        for frame in Loop(skin, lasts_s=11.5).frames():
+            heard += [(round(frame.t, 3), *change) for change in skin.bus_changes()]
+    pauses = np.diff(opened)
+    assert pauses[0] == pytest.approx(PAUSE_S, abs=0.02)
+    assert (np.diff(pauses) > -0.02).all()
+    assert 0.8 < pauses[-1] < LONGEST_PAUSE_S + 0.02
+    (lost_at, *lost), (back_at, *back) = heard
+    assert (lost_at, lost, back) == (0.1, [name, True], [name, False])
+    assert 10.0 <= back_at <= 10.0 + LONGEST_PAUSE_S + 0.1
