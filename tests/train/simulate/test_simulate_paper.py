@@ -89,4 +89,5 @@ def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     cody18 = replace(cody18, add=tuple(name for name in cody18.add if name != "inertia"))
     some = list(kinds(cody18).values())[2:10:3]
     for specs, found in zip(some, measure(cody18, some), strict=True):
-        assert found.errors[found.steps_s.index(specs[0].step_s)] < 0.015
+        # Of the window that labels are judged in; of the longer trials it is a quarter less.
+        assert found.errors[found.steps_s.index(specs[0].step_s)] < 0.02
