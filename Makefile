@@ -223,7 +223,6 @@ HARD := $(OUT)/hard-cases
 # Includes the answers of another ONNX Runtime, and of an aarch64 after `make board-test`.
 hard-cases: hard-cases-versions
 	$(BIN)/python -m tests.hard_cases --out $(HARD)
-	$(BIN)/python -m tests.hard_cases.adversarial
 
 # Writes golden files of the hard cases, then checks them with another ONNX Runtime.
 OTHER_RUNTIME ?= 1.22.1

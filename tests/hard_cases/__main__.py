@@ -1,10 +1,8 @@
-"""`python -m tests.hard_cases`: the hard cases as a table, text, Markdown and CSV."""
+"""`python -m tests.hard_cases`: the hard cases as text and as a table in Markdown."""
 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import sys
 import textwrap
 import time
@@ -19,11 +17,11 @@ from tests.hard_cases.registry import CASES
 COLUMNS = (
     "case",
     "oracle",
-    "what is measured",
+    "measured",
     "bound",
     "worst seen",
     "where",
-    "the usual stack",
+    "the usual tools",
     "margin",
     "price",
 )
@@ -49,7 +47,7 @@ def say(text: str) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print and write the table; 1 where a case is beyond its bound."""
+    """Print and write the table; 1 if a case exceeds its bound."""
     parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("build/hard-cases"))
     parser.add_argument("--only", default="", help="cases whose group and name hold this text")
@@ -71,16 +69,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
         say(f"{case.unit}: worst {error}, bound {bound}; oracle: {case.oracle}")
         say(f"worst at {where}" if worst.error else f"{tried}")
-        say(f"usual stack: {usual}")
+        say(usual and f"the usual tools: {usual}")
         say(f"margin: {far}")
         say(cost and f"price: {cost}")
-    table = io.StringIO()
-    csv.writer(table, lineterminator="\n").writerows([COLUMNS, *rows])
     lines = [COLUMNS, tuple("---" for _ in COLUMNS), *rows]
     markdown = "".join("| " + " | ".join(c.replace("|", "\\|") for c in r) + " |\n" for r in lines)
-    for name, text in (("table.csv", table.getvalue()), ("table.md", markdown)):
-        with write_whole(arguments.out / name) as file:
-            file.write(text.encode())
+    with write_whole(arguments.out / "table.md") as file:
+        file.write(markdown.encode())
     print(f"{len(rows)} cases, {beyond} beyond their bound; {arguments.out / 'table.md'}")
     return 1 if beyond else 0
 

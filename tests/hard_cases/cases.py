@@ -1,4 +1,4 @@
-"""What a hard case is, and the search for the worst of it."""
+"""A hard case, and the search for the largest error of it."""
 
 from __future__ import annotations
 
@@ -31,6 +31,35 @@ class Worst:
 
 
 @dataclass(frozen=True)
+class Ladder:
+    """Values of one parameter, each harder than the one before.
+
+    Attributes:
+        parameter: its name, in words with its unit.
+        values: from easy to hard.
+        at: the case's parameters for a value.
+        recordings: where recordings lie on the same scale: the 856 grasps of SDH-2, and the
+            simulated `cody18`.
+    """
+
+    parameter: str
+    values: Sequence[float]
+    at: Callable[[float], Mapping[str, Any]]
+    recordings: str = ""
+
+
+def decades(first: float, last: float, each: int = 2) -> list[float]:
+    """Powers of ten from one exponent to another, `each` steps a decade."""
+    count = round(abs(last - first) * each) + 1
+    return [10.0**e for e in np.linspace(first, last, count)]
+
+
+def seeded(name: str, **more: Any) -> Callable[[float], Mapping[str, Any]]:
+    """A function that puts a value under a name, beside fixed parameters."""
+    return lambda value: {name: value, **more}
+
+
+@dataclass(frozen=True)
 class Case:
     """A hazard with an oracle.
 
@@ -43,8 +72,9 @@ class Case:
         error: the error at given parameters.
         hazard: the parameters that the case is known by.
         around: strategies of parameters near them, which the search draws from.
-        usual: measures what the usual stack gives on the same hazard, or says why it has none.
-        price: measures what float64 costs where float32 would not hold.
+        ladder: the search for the margin; None if all values are tried.
+        usual: measures what the usual tools give on the same hazard, in words.
+        guard: whose price the table shows, if not that of the group.
         examples: how many the search draws.
     """
 
@@ -56,8 +86,9 @@ class Case:
     error: Callable[..., float]
     hazard: Sequence[Mapping[str, Any]] = ({},)
     around: Mapping[str, Any] = field(default_factory=dict)
-    usual: Callable[[], str] | str = ""
-    price: Callable[[], str] | None = None
+    ladder: Ladder | None = None
+    usual: Callable[[], str] | None = None
+    guard: str = ""
     examples: int = EXAMPLES
 
     @property
@@ -97,18 +128,10 @@ class Case:
         return Worst(error, at, len(seen))
 
     def theirs(self) -> str:
-        """What the usual stack gives, in words."""
-        if isinstance(self.usual, str):
-            return self.usual
+        """The answer of the usual tools, in words; "" without one."""
+        if self.usual is None:
+            return ""
         # It warns of some hazards; what counts is what it then answers.
         with threadpool_limits(1), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             return self.usual()
-
-    def cost(self) -> str:
-        """What float64 costs here, in words; nothing where float32 would do."""
-        if self.price is None:
-            return ""
-        with threadpool_limits(1), warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            return self.price()

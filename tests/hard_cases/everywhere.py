@@ -10,7 +10,7 @@ import onnxruntime
 from hypothesis import strategies as st
 from onnx.reference import ReferenceEvaluator
 
-from tests.hard_cases.cases import Case
+from tests.hard_cases.cases import Case, Ladder, seeded
 from tests.hard_cases.models import Array, Ours, converted, features, session, usual_pipeline
 from tests.hard_cases.neighbours import MANY, near_duplicates
 from train.pipeline import Choice
@@ -91,6 +91,11 @@ CASES = [
             "kind": st.sampled_from(KINDS),
             "seed": st.integers(0, 10**6),
         },
+        Ladder(
+            "vectors at once",
+            [1, 10, 100, 1000],
+            seeded("count", engine="one by one", n=160, kind="contacts", seed=0),
+        ),
         engine_usual,
     ),
 ]

@@ -16,9 +16,10 @@ from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, TrackSettings
 from tests.edge.touch.test_region import SHAPES, by_scipy, by_us
-from tests.hard_cases.cases import Case
+from tests.hard_cases.cases import Case, Ladder, decades, seeded
 
 SEEDS = st.integers(0, 10**6)
+FULL_SCALE = "3554 and 24331"
 FOREARM = SkinLayout(16, 24, True, (0.0108, 0.01205), 0.046, threshold_counts=50, onset_counts=50)
 
 
@@ -41,15 +42,6 @@ def region_error(density: float, peak: int, seed: int) -> float:
     valid = rng.random((16, 24)) < 0.95
     given = counts.astype(np.uint16), 50, valid, bool(seed % 2)
     return float(by_us(*given) != by_scipy(*given))
-
-
-def onset_usual() -> str:
-    never, late = np.zeros(20), np.array([0.0] * 3 + [100.0] * 9)
-    found = [int(np.argmax(peaks > 50)) for peaks in (never, late)]
-    return (
-        f"numpy's argmax over a threshold: never in contact begins at frame {found[0]}, "
-        f"as does one from the first frame on; one from frame 3 at {found[1]}"
-    )
 
 
 def seam_usual() -> str:
@@ -157,17 +149,6 @@ def times_error(seed: int, shortest: float) -> float:
     return worst
 
 
-def times_usual() -> str:
-    rng = np.random.default_rng(0)
-    t = np.sort(rng.uniform(0.0, 1.2, 70))
-    t[0] = 0.0
-    force = 1000.0 * t
-    times = np.arange(40) * (1.2 / 39)
-    by_index = force[np.linspace(0, 69, 40).round().astype(int)]
-    true = np.interp(times, t, force)
-    return f"resampled by frame number: off by {np.abs(by_index - true).max() / 1200:.1%} of range"
-
-
 CASES = [
     Case(
         "features",
@@ -178,7 +159,10 @@ CASES = [
         region_error,
         [{"density": density, "peak": 65535, "seed": 0} for density in (0.0, 0.6, 2.0)],
         {"density": st.floats(0.003, 1.0), "peak": st.integers(51, 65535), "seed": SEEDS},
-        usual=seam_usual,
+        Ladder(
+            "counts", [255, 4095, 16383, 65535], seeded("peak", density=0.6, seed=0), FULL_SCALE
+        ),
+        seam_usual,
         examples=60,
     ),
     Case(
@@ -190,7 +174,7 @@ CASES = [
         flicker_error,
         [{"seed": 0}],
         {"seed": SEEDS},
-        flicker_usual,
+        usual=flicker_usual,
     ),
     Case(
         "features",
@@ -206,7 +190,6 @@ CASES = [
             {"lead": 3, "length": 1, "settings": 2},
         ],
         {"lead": st.integers(0, 9), "length": st.integers(0, 30), "settings": st.integers(1, 3)},
-        onset_usual,
     ),
     Case(
         "features",
@@ -217,6 +200,6 @@ CASES = [
         times_error,
         [{"seed": 0, "shortest": 1e-12}],
         {"seed": SEEDS, "shortest": st.floats(-12, -2).map(lambda e: 10.0**e)},
-        times_usual,
+        Ladder("shortest step, s", decades(-3, -16), seeded("shortest", seed=0), "0.018, 0.010 s"),
     ),
 ]

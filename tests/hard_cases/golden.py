@@ -24,10 +24,8 @@ from export.__main__ import main as export
 from export.api import describe
 from export.graph import to_onnx
 from tests.conftest import FOREARM, touch
-from tests.hard_cases.adversarial import corpus
-from tests.hard_cases.families import Hard, made
-from tests.hard_cases.models import features, labels_for
-from tests.hard_cases.neighbours import MANY, lattice, near_duplicates, offset_data
+from tests.hard_cases.models import Array, features, labels_for
+from tests.hard_cases.neighbours import MANY, dominated, lattice, near_duplicates, offset_data
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
 
@@ -85,11 +83,10 @@ def hard_trials(folder: Path) -> DataSet:
     return load_trials([folder])
 
 
-def vectors(dataset: DataSet) -> dict[str, Hard]:
-    """Training vectors of each hard case, with queries, and what is fitted on them."""
-    own = dataset.features()
-    found = {
-        "frames": (own, Choice("IV", 5, 2)),
+def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
+    """Training vectors of each hard case, which are the queries too, and the model's settings."""
+    return {
+        "frames": (dataset.features(), Choice("IV", 5, 2)),
         "near-duplicates": (near_duplicates(160, 1e-7, 0)[0], Choice("none", 6, 5)),
         "near-duplicates-many": (near_duplicates(MANY, 1e-7, 0)[0], Choice("none", 6, 5)),
         "many": (features(MANY), Choice("IV", 20, 4)),
@@ -98,10 +95,8 @@ def vectors(dataset: DataSet) -> dict[str, Hard]:
         "huge": (features(MANY) * 1e20, Choice("none", 6, 5)),
         "equal-distances": (lattice(0)[0], Choice("none", 3, 8)),
         "duplicates": (np.repeat(features(40), 4, axis=0), Choice("IV", 20, 4)),
+        "dominated": (dominated(12.0, 0)[0], Choice("III", 6, 5)),
     }
-    sets = {name: Hard(X, np.zeros(0, int), X, choice) for name, (X, choice) in found.items()}
-    # The last of each family's hardest sets.
-    return sets | {f"family-{family}": made(family, seed) for family, seed in corpus()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -111,13 +106,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as trials:
         dataset = hard_trials(Path(trials))
-        for name, hard in vectors(dataset).items():
-            fitted = ContactClassifier({"t": hard.choice}).fit(hard.X, {"t": labels_for(hard.X)})
-            info = describe(dataset, fitted, {}, 1.2, hard.X.shape[1] // 3)
+        for name, (X, choice) in vectors(dataset).items():
+            fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels_for(X)})
+            info = describe(dataset, fitted, {}, 1.2, X.shape[1] // 3)
             folder = arguments.out / name
             with write_whole(folder / "model.onnx") as file:
                 file.write(to_onnx(fitted, info))
-            golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, hard.queries)
+            golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
             print(folder)
         # Decisions before the full window.
         decision_points = ["--decision-points", "0.6:1.2:0.3", "--jobs", "1"]

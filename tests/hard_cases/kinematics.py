@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from edge.runtime.joint_stream import Joints
 from edge.touch.arm import Chain, Joint
-from tests.hard_cases.cases import Case
+from tests.hard_cases.cases import Case, Ladder, decades, seeded
 from tests.hard_cases.frames import SEEDS
 
 
@@ -33,14 +33,6 @@ def orthonormal_error(steps: int, reach: float) -> float:
         gap = turn @ turn.transpose(0, 2, 1) - np.eye(3)
         worst = max(worst, float(np.abs(gap).max()))
     return worst
-
-
-def orthonormal_usual() -> str:
-    step = Chain([Joint("j", (1.0, 2.0, -2.0))]).pose([1e-3])[:3, :3]
-    turn = np.eye(3)
-    for _ in range(100_000):
-        turn = turn @ step
-    return f"100 000 small rotations multiplied: {np.abs(turn @ turn.T - np.eye(3)).max():.1e}"
 
 
 def exact_turn(axis: tuple[float, float, float], angle: float) -> list[list[mpmath.mpf]]:
@@ -69,12 +61,6 @@ def turn_error(angle: float, seed: int) -> float:
     return worst
 
 
-def turn_usual() -> str:
-    angle = 1e-8
-    wrong = 1.0 - math.cos(angle)
-    return f"1 - cos(1e-8) as written: {wrong:.1e} instead of 5.0e-17"
-
-
 def wrapped_error(turns: int, seed: int) -> float:
     """Metres between a pose and the same with one angle some turns further."""
     chain = Chain.cody()
@@ -84,11 +70,6 @@ def wrapped_error(turns: int, seed: int) -> float:
     moved = q.copy()
     moved[seed % 5] += turns * 2.0 * math.pi
     return float(np.abs(chain.pose(q) - chain.pose(moved)).max()) / max(1, abs(turns))
-
-
-def wrapped_usual() -> str:
-    q = np.array([3.1, -3.1])
-    return f"joint angles interpolated as numbers: the mean of 3.1 and -3.1 is {q.mean():g}, not pi"
 
 
 def line_error(angle: float, step: float) -> float:
@@ -119,7 +100,7 @@ CASES = [
         orthonormal_error,
         [{"steps": 1_000_000, "reach": 2.0}],
         {"steps": st.just(2000), "reach": st.floats(0, 1e6)},
-        orthonormal_usual,
+        Ladder("radians a step", decades(0, 18, 1), seeded("reach", steps=2000)),
         examples=8,
     ),
     Case(
@@ -131,7 +112,7 @@ CASES = [
         turn_error,
         [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)],
         {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
-        turn_usual,
+        Ladder("radians", decades(0, 300, 0.1), seeded("angle", seed=0)),
         examples=25,
     ),
     Case(
@@ -143,6 +124,7 @@ CASES = [
         wrapped_error,
         [{"turns": 1, "seed": s} for s in range(5)],
         {"turns": st.integers(-1000, 1000), "seed": SEEDS},
+        Ladder("turns", [10, 10**3, 10**5, 10**7, 10**9], seeded("turns", seed=0)),
         limits_usual,
     ),
     Case(
@@ -154,6 +136,6 @@ CASES = [
         line_error,
         [{"angle": math.pi - 0.001, "step": 0.002}],
         {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
-        wrapped_usual,
+        Ladder("radians between two lines", [1e-9, 1e-3, 1.0, 3.1, 3.2], seeded("step", angle=3.0)),
     ),
 ]

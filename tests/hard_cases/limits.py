@@ -1,4 +1,4 @@
-"""What lies at the ends of the ranges: large skins, late clocks, ties made on purpose."""
+"""The ends of the ranges: large skins, late clocks, forces of zero, long vectors."""
 
 from __future__ import annotations
 
@@ -12,14 +12,9 @@ from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, TrackSettings
-from tests.hard_cases.adversarial import judged
-from tests.hard_cases.cases import Case
-from tests.hard_cases.families import FAMILIES
+from tests.hard_cases.cases import Case, Ladder, decades, seeded
 from tests.hard_cases.frames import FOREARM
-from tests.hard_cases.neighbours import LISTS, WHOLE
 from train.projection import Projection
-
-FAMILY_GROUP = "ties and gaps"
 
 
 def skin_error(side: int, across: bool, full: bool = False) -> float:
@@ -41,14 +36,6 @@ def skin_error(side: int, across: bool, full: bool = False) -> float:
     gap = abs(col - (first + (width - 1) / 2)) % side
     errors = (region.area - side * width, region.peak - 65535, row - (side - 1) / 2)
     return max(*map(abs, errors), min(gap, side - gap))
-
-
-def skin_usual() -> str:
-    """float32 sums of counts times columns."""
-    counts = np.full((256, 256), 65535, np.float32)
-    columns = np.arange(256, dtype=np.float32)
-    seen = (counts * columns).sum() / counts.sum()
-    return f"float32 sums: the column is off by {abs(float(seen) - 127.5):.0e} on 256 x 256"
 
 
 def clock_error(start: float) -> float:
@@ -75,12 +62,6 @@ def clock_error(start: float) -> float:
     return float((np.abs(vectors[1] - vectors[0]) / scale).max())
 
 
-def clock_usual() -> str:
-    """The same samples interpolated at float32 times."""
-    t = np.float32(1.7e9) + np.arange(0, 1.2, 1 / 128, dtype=np.float32)
-    return f"float32 times at 1.7e9 s: {len(np.unique(t))} of {len(t)} frames are told apart"
-
-
 COURSES = ("log_max_force", "sqrt_max_force", "log_right_force", "sqrt_right_force")
 """Of the contact, and of the untouched right half, whose logarithm is that of the floor."""
 
@@ -105,11 +86,6 @@ def transform_error(counts: int, scale: float) -> float:
         return float(max(errors))
 
 
-def transform_usual() -> str:
-    """NumPy's logarithm of a zone that feels nothing."""
-    return f"np.log of a force of 0: {np.log(0.0)}, which a scaler and PCA pass on as NaN"
-
-
 def column_error(columns: int, seed: int) -> float:
     """Coordinates that change with the order in which products are added."""
     X = np.random.default_rng(seed).normal(size=(12, int(columns)))
@@ -117,20 +93,6 @@ def column_error(columns: int, seed: int) -> float:
     z, d = p.transform(X), (X - p.mean_) * p.gain_
     order = np.random.default_rng(seed + 1).permutation(int(columns))
     return float((p.grid_.project(d[:, order], p.weights_[order]) != z).sum())
-
-
-def column_usual() -> str:
-    """The same products added up in float64."""
-    X = np.random.default_rng(0).normal(size=(12, 4096))
-    p = Projection("none", 6, ["max_force"]).fit(X)
-    order = np.random.default_rng(1).permutation(4096)
-    differ = (X @ p.weights_ != X[:, order] @ p.weights_[order]).sum()
-    return f"float64 alone: {differ} of {12 * 6} coordinates differ at 4096 columns"
-
-
-def family_error(family: str, seed: int, sets: int) -> float:
-    """Answers that are not those of whole numbers."""
-    return float(sum(judged(family, seed + i).wrong for i in range(sets)))
 
 
 CASES = [
@@ -147,7 +109,12 @@ CASES = [
             {"side": 256, "across": False, "full": True},
         ],
         {"side": st.integers(4, 64).map(lambda n: 4 * n), "across": st.booleans()},
-        usual=skin_usual,
+        Ladder(
+            "rows and columns",
+            [16, 64, 128, 256, 512],
+            seeded("side", across=True),
+            "13 x 13 and 16 x 24",
+        ),
     ),
     Case(
         "limits",
@@ -158,7 +125,13 @@ CASES = [
         clock_error,
         [{"start": start} for start in (1.0, 1e5, 1.7e9)],
         {"start": st.floats(0.0, 9.2).map(lambda e: 10.0**e)},
-        usual=clock_usual,
+        Ladder(
+            "seconds",
+            decades(3, 18, 1),
+            seeded("start"),
+            "7.3 and 2.6 s, or the time since the board's start",
+        ),
+        guard="features",
         examples=5,
     ),
     Case(
@@ -173,7 +146,8 @@ CASES = [
             "counts": st.integers(51, 65535),
             "scale": st.floats(-12.0, 12.0).map(lambda e: 10.0**e),
         },
-        usual=transform_usual,
+        Ladder("counts in a newton", decades(3, -300, 0.1), seeded("scale", counts=51)),
+        guard="features",
     ),
     Case(
         "limits",
@@ -184,20 +158,13 @@ CASES = [
         column_error,
         [{"columns": columns, "seed": 0} for columns in (128, 129, 4096)],
         {"columns": st.integers(6, 600), "seed": st.integers(0, 10**6)},
-        usual=column_usual,
+        Ladder(
+            "values",
+            [120, 512, 2048, 4096, 8192],
+            seeded("columns", seed=0),
+            "120 and 120 (the paper's features)",
+        ),
+        guard="neighbours",
         examples=6,
-    ),
-    *(
-        Case(
-            FAMILY_GROUP,
-            family.replace("_", " "),
-            WHOLE,
-            LISTS,
-            0,
-            family_error,
-            [{"family": family, "seed": 0, "sets": 8}],
-            usual="does not apply: it has no whole numbers to be judged by; see `neighbours`",
-        )
-        for family in FAMILIES
     ),
 ]

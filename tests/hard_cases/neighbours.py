@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -10,8 +11,9 @@ from sklearn.neighbors import KNeighborsClassifier
 
 from edge.errors import InputError
 from tests.hard_cases import exact
-from tests.hard_cases.cases import Case
+from tests.hard_cases.cases import Case, Ladder, decades, seeded
 from tests.hard_cases.models import (
+    USUAL,
     Array,
     Ours,
     converted,
@@ -71,14 +73,54 @@ def lattice(seed: int, n: int = 160) -> tuple[Array, Array]:
     return X, queries
 
 
-def wrong(data: Callable[..., tuple[Array, Array]], k: int = 5) -> Callable[..., float]:
+def duplicates(n: int, seed: int) -> tuple[Array, Array]:
+    """Rows that stand four times in the set, and the first of them as queries."""
+    order = np.random.default_rng(seed).permutation(n)
+    X = np.repeat(features(n // 4, seed), 4, axis=0)[order]
+    return X, X[:40]
+
+
+def dominated(power: float, seed: int) -> tuple[Array, Array]:
+    """One feature is 10^power times as large as the others, which alone separate the rows."""
+    rng = np.random.default_rng(seed)
+    X = features(160, seed)
+    X[:, :40] = np.rint(2.0 * rng.random((160, 40))) * 10.0**power
+    queries = X[rng.integers(0, 160, 24)]
+    queries[:, 40:] *= 1.0 + 1e-6 * rng.normal(size=(24, 80))
+    return X, queries
+
+
+def denormals(times: int, seed: int) -> tuple[Array, Array]:
+    """One feature has a few of the smallest numbers of float64; the others are ordinary."""
+    X, queries = features(160, seed), features(24, seed + 1)
+    smallest = float(np.finfo(np.float64).smallest_subnormal)
+    X[:, :40] = np.random.default_rng(seed).integers(0, 50, (160, 40)) * times * smallest
+    queries[:, :40] = X[:24, :40]
+    return X, queries
+
+
+def wrong(data: Callable[..., tuple[Array, Array]], choice: Choice) -> Callable[..., float]:
     """The error of a case: wrong answers to the queries of `data`."""
 
     def error(**at: float) -> float:
         X, queries = data(**at)
-        return Ours(X, choice=Choice("none", 6, k)).wrong(queries)
+        return Ours(X, choice=choice).wrong(queries)
 
     return error
+
+
+def ties_error(k: int, seed: int) -> float:
+    X = features(160, seed)
+    ours = Ours(X, labels_for(X, 12, seed), Choice("none", 6, k))
+    return ours.wrong(features(40, seed + 1))
+
+
+def discriminants_error(shrinkage: float, seed: int) -> float:
+    """Wrong answers of a projection fitted to the labels, with ties of equal rows."""
+    X = features(60, seed)
+    X[30:40] = X[:10]
+    choice = Choice("III", 4, 4, projection="lda", shrinkage=shrinkage)
+    return Ours(X, labels_for(X, 5, seed), choice).wrong(X[::3])
 
 
 def far_error(factor: float, seed: int, n: int = 160) -> float:
@@ -113,21 +155,6 @@ def refused_error(scale: float) -> float:
     except InputError as error:
         return float("other units" not in str(error))
     return 1.0
-
-
-def duplicates_error(n: int, seed: int) -> float:
-    """Rows that are not at distance 0 from themselves, or duplicates out of order."""
-    X = np.repeat(features(n // 4, seed), 4, axis=0)[np.random.default_rng(seed).permutation(n)]
-    seen = Ours(X, choice=Choice("IV", 20, 4)).alone(X[:40])
-    same = [np.flatnonzero((x == X).all(axis=1)).tolist() for x in X[:40]]
-    wrong = sum(seen["distances"][i].any() for i in range(40))
-    return float(wrong + sum(seen["neighbours"][i].tolist() != same[i] for i in range(40)))
-
-
-def ties_error(k: int, seed: int) -> float:
-    X = features(160, seed)
-    ours = Ours(X, labels_for(X, 12, seed), Choice("none", 6, k))
-    return ours.wrong(features(40, seed + 1))
 
 
 def ties_usual() -> str:
@@ -167,23 +194,39 @@ def few_error(n: int, classes: int, same: bool) -> float:
     return ours.wrong(np.concatenate([X[:5], features(3, 1)]))
 
 
-def few_usual() -> str:
-    ratio = usual_pipeline(features(1), 6, 1, np.array([0]))[0].explained_variance_ratio_
-    return f"scikit-learn's PCA of one row: explained variance ratio {ratio.tolist()}"
+SEEDED = {"seed": SEEDS}
+ROWS = "856 and 140"
 
+
+def answers(
+    name: str,
+    error: Callable[..., float],
+    hazard: Sequence[Mapping[str, Any]],
+    around: Mapping[str, Any],
+    ladder: Ladder | None,
+    usual: Callable[[], str] | None = None,
+) -> Case:
+    """A row whose answers whole numbers judge."""
+    around = around | SEEDED if "seed" in hazard[0] else around
+    return Case(
+        "neighbours", name, WHOLE, LISTS, 0, error, hazard, around, ladder, usual, examples=4
+    )
+
+
+BY_ROWS: dict[str, Any] = {
+    "hazard": [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
+    "around": {"n": st.just(160)},
+    "ladder": Ladder("training rows", [160, 1400], seeded("n", seed=0), ROWS),
+}
 
 CASES = [
-    Case(
-        "neighbours",
+    answers(
         "near-duplicate rows, spread 1e-7 to 1e-2 of the norm",
-        WHOLE,
-        LISTS,
-        0,
-        wrong(near_duplicates),
+        wrong(near_duplicates, USUAL),
         [{"n": n, "spread": 1e-7, "seed": 0} for n in (160, MANY)],
-        {"n": st.just(160), "spread": powers_of_ten(-7, -2), "seed": SEEDS},
+        {"n": st.just(160), "spread": powers_of_ten(-7, -2)},
+        None,
         lambda: usual_neighbours(*near_duplicates(160, 1e-7, 0)),
-        examples=4,
     ),
     Case(
         "neighbours",
@@ -194,6 +237,12 @@ CASES = [
         grid_error,
         [{"spread": 1e-7, "seed": 0}],
         {"spread": powers_of_ten(-9, -2), "seed": SEEDS},
+        Ladder(
+            "spread over norm",
+            decades(-2, -12, 1),
+            seeded("spread", seed=0),
+            "1e-6 (856 real grasps) and 3e-5 (cody18)",
+        ),
         lambda: (
             "at a spread of "
             + "; ".join(
@@ -203,29 +252,31 @@ CASES = [
         ),
         examples=3,
     ),
-    Case(
-        "neighbours",
+    answers(
         "offset 1e6, deviation 0.01",
-        WHOLE,
-        LISTS,
-        0,
-        wrong(offset_data),
+        wrong(offset_data, USUAL),
         [{"offset": 1e6, "sd": 0.01, "seed": 0}],
-        {"offset": st.floats(-1e6, 1e6), "sd": st.sampled_from([0.01, 0.1, 1.0]), "seed": SEEDS},
+        {"offset": st.floats(-1e6, 1e6), "sd": st.sampled_from([0.01, 0.1, 1.0])},
+        Ladder(
+            "offset, of a deviation of 0.01",
+            decades(4, 15, 1),
+            seeded("offset", sd=0.01, seed=0),
+            "0.036 and 0.014",
+        ),
         lambda: usual_neighbours(*offset_data(1e6, 0.01, 0)),
-        examples=4,
     ),
-    Case(
-        "neighbours",
+    answers(
         "scales 1e-24 to 1e+20",
-        WHOLE,
-        LISTS,
-        0,
-        wrong(scaled_data),
+        wrong(scaled_data, USUAL),
         [{"scale": scale, "seed": 0} for scale in (1e-24, 1e20)],
-        {"scale": powers_of_ten(-24, 20), "seed": SEEDS},
+        {"scale": powers_of_ten(-24, 20)},
+        Ladder(
+            "scale",
+            decades(20, 170, 0.1),
+            seeded("scale", seed=0),
+            "0.01 to 920 and 0.02 to 25",
+        ),
         lambda: usual_neighbours(*scaled_data(1e20, 0)),
-        examples=4,
     ),
     Case(
         "neighbours",
@@ -236,52 +287,27 @@ CASES = [
         refused_error,
         [{"scale": 1e-40}, {"scale": 1e105}],
         {"scale": st.one_of(powers_of_ten(-300, -34), powers_of_ten(102, 300))},
-        lambda: (
+        usual=lambda: (
             f"fitted and converted without a word; {usual_neighbours(*scaled_data(2.0**349, 0))}"
         ),
     ),
-    Case(
-        "neighbours",
+    answers(
         "exact duplicates",
-        "distance exactly 0, in the order of the rows",
-        "rows not at 0 or out of order",
-        0,
-        duplicates_error,
-        [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
-        {"n": st.just(160), "seed": SEEDS},
-        lambda: usual_neighbours(np.repeat(features(40), 4, axis=0), features(40)),
-        examples=4,
+        wrong(duplicates, Choice("IV", 20, 4)),
+        **BY_ROWS,
+        usual=lambda: usual_neighbours(*duplicates(160, 0)),
     ),
-    Case(
-        "neighbours",
+    answers("equal distances", wrong(lattice, Choice("none", 6, 8)), **BY_ROWS, usual=equal_usual),
+    answers(
         "vote ties with even k",
-        WHOLE,
-        LISTS,
-        0,
         ties_error,
         [{"k": k, "seed": 0} for k in (2, 4, 6)],
-        {"k": st.integers(1, 20), "seed": SEEDS},
+        {"k": st.integers(1, 20)},
+        Ladder("neighbours that vote", [2, 8, 32, 160], seeded("k", seed=0)),
         ties_usual,
-        examples=4,
     ),
-    Case(
-        "neighbours",
-        "equal distances",
-        WHOLE,
-        LISTS,
-        0,
-        wrong(lattice, k=8),
-        [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
-        {"n": st.just(160), "seed": SEEDS},
-        equal_usual,
-        examples=4,
-    ),
-    Case(
-        "neighbours",
+    answers(
         "one row, one class, all rows the same, k as large as the training set",
-        WHOLE,
-        LISTS,
-        0,
         few_error,
         [
             {"n": 1, "classes": 1, "same": False},
@@ -290,8 +316,29 @@ CASES = [
             {"n": 480, "classes": 7, "same": False},
         ],
         {"n": st.integers(1, 90), "classes": st.integers(1, 4), "same": st.booleans()},
-        few_usual,
-        examples=4,
+        None,
+    ),
+    answers(
+        "a feature much larger than those that separate the rows",
+        wrong(dominated, Choice("none", 6, 5)),
+        [{"power": power, "seed": 0} for power in (3.0, 12.0)],
+        {"power": st.floats(3.0, 16.0)},
+        Ladder("decades larger", [3, 6, 9, 12, 16, 20], seeded("power", seed=0)),
+        lambda: usual_neighbours(*dominated(12.0, 0)),
+    ),
+    answers(
+        "a feature of denormal numbers",
+        wrong(denormals, Choice("III", 6, 5)),
+        [{"times": 1, "seed": 0}],
+        {"times": st.integers(1, 2**30)},
+        None,
+    ),
+    answers(
+        "discriminants",
+        discriminants_error,
+        [{"shrinkage": 0.1, "seed": 0}],
+        {"shrinkage": powers_of_ten(-4, 0)},
+        Ladder("shrinkage", decades(0, -12, 0.5), seeded("shrinkage", seed=0)),
     ),
     Case(
         "neighbours",
@@ -302,6 +349,12 @@ CASES = [
         far_error,
         [{"factor": factor, "seed": 0} for factor in (1.0, 10.0, 1e6)],
         {"factor": powers_of_ten(0, 6), "seed": SEEDS},
+        Ladder(
+            "distance over range",
+            decades(0, 160, 0.1),
+            seeded("factor", seed=0),
+            "0.5 and 0.1 of the set's size",
+        ),
         lambda: usual_neighbours(*far_data(1e6, 0)),
         examples=3,
     ),

@@ -10,8 +10,9 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from tests.hard_cases import exact
-from tests.hard_cases.cases import Case
-from tests.hard_cases.models import Array, features, labels_for, usual_pipeline
+from tests.hard_cases.cases import Case, Ladder, seeded
+from tests.hard_cases.cases import decades as powers
+from tests.hard_cases.models import Array, features
 from train.projection import CLOSE_EIGENVALUES, Projection, principal_axes
 from train.scaling import SCALINGS
 
@@ -125,17 +126,6 @@ def decades_usual() -> str:
     )
 
 
-def usual_labels_note() -> str:
-    """k-NN on null directions: what components beyond the rank cost."""
-    X = features(12)
-    y = labels_for(X)
-    kept = usual_pipeline(X, 12, 1, y)[0].components_
-    queries = features(200, 1) - X.mean(axis=0)
-    null = kept[-1:]
-    share = ((queries @ null.T) ** 2).sum() / ((queries @ kept.T) ** 2).sum()
-    return f"PCA(12) of 12 rows: the 12th component is rounding and takes {share:.0%} of a query"
-
-
 CASES = [
     Case(
         "scaling",
@@ -146,7 +136,7 @@ CASES = [
         constant_error,
         [{"scaling": s, "value": 0.1, "seed": 0} for s in SCALINGS],
         {"scaling": METHODS, "value": st.floats(-1e3, 1e3), "seed": SEEDS},
-        constant_usual,
+        usual=constant_usual,
     ),
     Case(
         "PCA",
@@ -157,7 +147,7 @@ CASES = [
         rank_error,
         [{"rows": 12, "rank": 20, "seed": 0}, {"rows": 30, "rank": 3, "seed": 0}],
         {"rows": st.integers(2, 30), "rank": st.integers(1, 20), "seed": SEEDS},
-        lambda: f"{rank_usual()}; {usual_labels_note()}",
+        usual=rank_usual,
     ),
     Case(
         "PCA",
@@ -171,6 +161,7 @@ CASES = [
             "gap": st.one_of(st.floats(-14, -6.1), st.floats(-5.9, -1)).map(lambda e: 10.0**e),
             "seed": SEEDS,
         },
+        Ladder("relative gap", powers(-1, -16, 1), seeded("gap", seed=0), "0.03 and 0.02"),
         cut_usual,
     ),
     Case(
@@ -182,6 +173,11 @@ CASES = [
         decades_error,
         [{"top": 48, "count": 12, "seed": 0}],
         {"top": st.integers(1, 48), "count": st.integers(2, 16), "seed": SEEDS},
+        Ladder(
+            "columns of the Hadamard matrix",
+            [2, 4, 8, 12, 16],
+            seeded("count", top=48, seed=0),
+        ),
         decades_usual,
         examples=6,
     ),

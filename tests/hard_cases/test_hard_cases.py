@@ -1,12 +1,15 @@
-"""Every hard case is within its bound, at the hazard and wherever the search looked."""
+"""Every hard case is within its bound, and the table's margins are found by search."""
 
 import pytest
 
+from edge.errors import InputError
+from tests.hard_cases.cases import Case, Ladder, decades
+from tests.hard_cases.margins import margin
 from tests.hard_cases.registry import CASES
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.key)
-def test_the_worst_is_within_the_bound(case):
+def test_the_largest_error_is_within_the_bound(case):
     worst = case.worst()
     assert worst.error <= case.bound, f"{case.unit}: {worst.error} at {worst.at}"
 
@@ -16,6 +19,29 @@ def test_the_table_has_no_row_twice():
     assert len(keys) == len(set(keys))
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.key)
-def test_the_usual_stack_is_measured_or_the_table_says_why_not(case):
-    assert callable(case.usual) or case.usual.startswith("does not apply: ")
+def refuse(x):
+    raise InputError("too much")
+
+
+@pytest.mark.parametrize(
+    ("error", "values", "words"),
+    [
+        (lambda x: float(x >= 1e3), decades(0, 6, 1), "x: holds to 100, fails from 1000"),
+        (lambda x: float(x >= 1e3), [1.0, 2.0], "x: holds to 2, no failure seen"),
+        (lambda x: float(x >= 1e3), [1e4], "x: fails from 10000"),
+        (refuse, [1.0], "x: refused with a sentence from 1"),
+    ],
+)
+def test_a_margin_ends_at_the_first_failure(error, values, words):
+    case = Case("g", "n", "", "", 0, error, ladder=Ladder("x", values, lambda x: {"x": x}))
+    assert margin(case) == words
+
+
+def test_a_case_that_draws_holds_only_if_it_holds_with_every_seed():
+    ladder = Ladder("x", [1, 4, 5, 9], lambda x: {"x": x, "seed": 0}, "3")
+    case = Case("g", "n", "", "", 0, lambda x, seed: float(x + seed >= 9), ladder=ladder)
+    assert margin(case) == "x: holds to 4, fails from 5; recordings lie at 3"
+
+
+def test_a_case_without_a_parameter_says_so():
+    assert margin(Case("g", "n", "", "", 0, lambda: 0.0)).startswith("no parameter")
