@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 from collections.abc import Callable
 from typing import Any
 
@@ -32,9 +30,6 @@ TREES = 100
 TIMES = 10
 """Times at which every taxel is sampled for the other methods."""
 GROUP_TASK = "object"
-QUARTERS = 4
-"""Shares of the trials in the learning curve: one quarter, two, three, all."""
-CURVE = (("paper", "pca"), ("contact", "lda"))
 
 Peer = Callable[[NDArray[np.float64], NDArray[np.str_], NDArray[np.float64]], NDArray[np.str_]]
 """(taxels over time (n, times, taxels), their labels, new trials) -> labels."""
@@ -60,25 +55,11 @@ def forest(
     return np.asarray(trees.predict(statistics(new)))
 
 
-def minirocket(
-    X: NDArray[np.float64], y: NDArray[np.str_], new: NDArray[np.float64]
-) -> NDArray[np.str_]:
-    """Labels by aeon's MiniRocket and ridge (Dempster, Schmidt and Webb, 2021) on every taxel."""
-    convolutions = importlib.import_module("aeon.classification.convolution_based")
-    series, others = X.transpose(0, 2, 1), new.transpose(0, 2, 1)
-    model = convolutions.MiniRocketClassifier(random_state=0).fit(series, y)
-    return np.asarray(model.predict(others))
-
-
-def peers() -> dict[str, Peer]:
-    """Widely used methods by name; MiniRocket only where aeon is installed."""
-    usual: dict[str, Peer] = {
-        f"{TREES} extra trees on every taxel": extra_trees,
-        f"{TREES} random trees on each taxel's mean, deviation, maximum": forest,
-    }
-    if importlib.util.find_spec("aeon") is None:
-        return usual
-    return {**usual, "MiniRocket and ridge on every taxel": minirocket}
+PEERS: dict[str, Peer] = {
+    f"{TREES} extra trees on every taxel": extra_trees,
+    f"{TREES} random trees on each taxel's mean, deviation, maximum": forest,
+}
+"""Widely used methods by name."""
 
 
 def taxels(context: Context) -> NDArray[np.float64]:
@@ -121,7 +102,7 @@ def _call(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
 
 
 def section(context: Context) -> Section:
-    """Feature sets, discriminants and other methods, and the trials that they need."""
+    """Feature sets, discriminants and other methods."""
     y, layout = context.labels, context.dataset.layout
     sets = list(dict.fromkeys(name for name, _ in OURS))
     (series,) = context.follow_again("every feature", [View(layout, names=expand(sets))])
@@ -137,7 +118,7 @@ def section(context: Context) -> Section:
         for name, projection in OURS:
             method = f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"
             cases[table, method] = _ours, (X[name], asked, fold, layout, name, projection)
-        for method, peer in peers().items():
+        for method, peer in PEERS.items():
             cases[table, method] = _theirs, (raw, asked, fold, peer)
     answers = context.map("sets and peers", _call, list(cases.values()))
     results: dict[tuple[str, str, str], Result] = {
@@ -172,57 +153,11 @@ def section(context: Context) -> Section:
         "`make export` chooses among the feature sets by itself, and prints what a decision with "
         "each costs.",
     ]
-    if len(peers()) < 3:
-        text.append("MiniRocket is left out, as aeon is not installed (`pip install aeon`).")
     title = "Nested accuracy with trials left out, and with whole objects left out"
     return Section(
         "Beyond three features",
         text,
-        [Table("beyond_sets", title, rows, narrow=5), _learning(context, X, y)],
+        [Table("beyond_sets", title, rows, narrow=5)],
         [Figure("beyond", "Features and methods", png)],
         numbers={key: percent(result.accuracy) for key, result in results.items()},
     )
-
-
-def _learning(context: Context, X: dict[str, NDArray[np.float64]], y: Labels) -> Table:
-    """Accuracy against the number of trials.
-
-    Which trials are drawn matters as much as how many, so each share is drawn once from each
-    quarter that it can begin with.
-    """
-    labels, layout = y[finest(y)], context.dataset.layout
-    quarter = stratified_folds(labels, QUARTERS)
-    cases: list[tuple[str, str, int]] = []
-    work = []
-    for count in range(1, QUARTERS + 1):
-        for first in range(QUARTERS if count < QUARTERS else 1):
-            some = np.flatnonzero((quarter - first) % QUARTERS < count)
-            own = {task: each[some] for task, each in y.items() if len(set(each[some])) > 1}
-            if len(some) < 20 or not own:
-                continue
-            for name, projection in CURVE:
-                folds = stratified_folds(labels[some])
-                cases.append((name, projection, count))
-                work.append((X[name][some], own, folds, layout, name, projection))
-    draws: dict[tuple[str, str, int], list[Result]] = {}
-    for (name, projection, count), tasks in zip(
-        cases, context.map("learning curve", _ours, work), strict=True
-    ):
-        for task, result in tasks.items():
-            key = task, f"`{name}`, {projection.upper()}", count
-            draws.setdefault(key, []).append(result)
-    rows = []
-    for (task, method, _), results in sorted(draws.items()):
-        shares = [100 * result.accuracy for result in results]
-        spread = f"{min(shares):.0f} to {max(shares):.0f}" if len(shares) > 1 else ""
-        rows.append(
-            {
-                "task": task,
-                "trials": round(float(np.mean([result.total for result in results]))),
-                "accuracy %": round(float(np.mean(shares)), 2),
-                "lowest to highest draw %": spread,
-                "method": method,
-            }
-        )
-    title = f"Nested accuracy by number of trials, the mean of {QUARTERS} draws"
-    return Table("learning", title, rows, narrow=5)

@@ -15,7 +15,6 @@ from train.report.section import Figure, Numbers, Section, Table
 from train.scaling import SCALINGS
 from train.study.context import Context
 from train.study.paper import papers
-from train.study.readings import EACH_TRIAL, scaled_by_trial
 
 WINDOWS_S = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.6, 1.8, 2.0)
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))
@@ -108,15 +107,11 @@ def window(context: Context) -> Section:
 def scaling(context: Context) -> Section:
     """Table II."""
     X, labels = context.vectors(), context.labels
-    cases: list[tuple[Any, ...]] = [(X, labels, method) for method in SCALINGS]
-    alone = [method for method in SCALINGS if method != "V" and context.scene is not None]
-    cases += [(scaled_by_trial(X, method), labels) for method in alone]
-    answers = context.map("feature scaling", grid_search, cases)
-    results = dict(zip(SCALINGS, answers, strict=False))
-    by_trial = dict(zip(alone, answers[len(SCALINGS) :], strict=True))
+    answers = context.map("feature scaling", grid_search, [(X, labels, m) for m in SCALINGS])
+    results = dict(zip(SCALINGS, answers, strict=True))
     title = "Effect of feature scaling (Table II)"
     theirs = {task: papers("II", task) for task in labels} if context.scene else None
-    png = figures.bars(SCALINGS, by_task(answers[: len(SCALINGS)]), title=title, paper=theirs)
+    png = figures.bars(SCALINGS, by_task(answers), title=title, paper=theirs)
     return Section(
         title,
         [
@@ -130,7 +125,7 @@ def scaling(context: Context) -> Section:
         ],
         [Table("scaling", "Accuracy of each scaling", rows("scaling", results, "II"))],
         [Figure("scaling", "Accuracy of each scaling", png)],
-        numbers=numbers("II", results) | numbers(EACH_TRIAL.key, by_trial),
+        numbers=numbers("II", results),
     )
 
 

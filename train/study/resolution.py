@@ -14,7 +14,6 @@ from train.report.skins import View, masked, pooled_down, pooled_layout, thinned
 from train.study.classify import by_task, numbers
 from train.study.context import Context
 from train.study.paper import papers
-from train.study.readings import BY_MEAN, averaged
 
 POOLING = {"sum": np.add, "maximum": np.maximum}
 SHARES = (1, 2, 4, 8)
@@ -55,15 +54,12 @@ def section(context: Context) -> Section:
     lost = [sum(contact is None for contact in contacts) for contacts in series]
     full, X = context.vectors(), [vectors(contacts) for contacts in series]
     levels = len(skins) - 1
-    # The first views are those by the sum.
-    means = [averaged(x, taxels[0] / n) for x, n in zip(X[:levels], taxels[1:], strict=True)]
-    cases = [(x, labels) for x in [full, *X, *(means if context.scene else [])]]
+    cases = [(x, labels) for x in [full, *X]]
     plain, *results = context.map("its accuracy", grid_search, cases)
     pooled = {
         how: [plain, *results[i * levels : (i + 1) * levels]] for i, how in enumerate(POOLING)
     }
-    fewer = [plain, *results[2 * levels : len(X)]]
-    by_mean = [plain, *results[len(X) :]] if context.scene else []
+    fewer = [plain, *results[2 * levels :]]
     rows, pictures = [], []
     for i, (how, steps) in enumerate(pooled.items()):
         without = [0, *lost[i * levels : (i + 1) * levels]]
@@ -116,6 +112,5 @@ def section(context: Context) -> Section:
             Table("chips", "The same taxels, fewer of them read", chips),
         ],
         pictures,
-        numbers=numbers("I", dict(zip(names, pooled["sum"], strict=True)))
-        | numbers(BY_MEAN.key, dict(zip(names, by_mean, strict=False))),
+        numbers=numbers("I", dict(zip(names, pooled["sum"], strict=True))),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,12 +26,13 @@ FACTORS = (0.5, 2.0)
 SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
 """Effects that change what is read, never what happens."""
 UNCHANGED = "as recorded"
+HOW = "trained and tested with it", "trained without it, tested with it"
 BATCHES = 2
 """Parts of a scene that are simulated anew one by one; more cost more time in all."""
 
 
-def variants(scene: Scene) -> dict[str, Scene]:
-    """{name: the scene with one thing changed}."""
+def variants(scene: Scene) -> list[dict[str, Scene]]:
+    """{name: the scene with one thing changed}; all changes of the sensor are the last group."""
     changed: dict[str, Scene] = {}
     for factor in FACTORS:
         # The equilibrium point travels the same distance.
@@ -41,36 +42,14 @@ def variants(scene: Scene) -> dict[str, Scene]:
         changed[f"arm stiffness x {factor:g}"] = replace(
             scene, stiffness=tuple(k * factor for k in scene.stiffness)
         )
+    sensor: dict[str, Scene] = {}
     for name in SENSOR:
         without = tuple(effect for effect in scene.add if effect != name)
         if name in scene.add:
-            changed[f"without {name}"] = replace(scene, add=without)
+            sensor[f"without {name}"] = replace(scene, add=without)
         else:
-            changed[f"with {name}"] = replace(scene, add=(*without, name))
-    return changed
-
-
-def physics(scene: Scene) -> Scene:
-    """The scene without its sensor's effects; scenes with the same result share their physics."""
-    return replace(scene, add=tuple(name for name in scene.add if name not in SENSOR))
-
-
-def groups(scenes: Mapping[str, Scene]) -> list[list[str]]:
-    """Names of the scenes, grouped by physics; scenes of a group differ in their sensor alone.
-
-    A scene without any effect of the sensor stands alone: its frames are kept in whole counts.
-    """
-    grouped: list[tuple[Scene, bool, list[str]]] = []
-    for name, scene in scenes.items():
-        bare = physics(scene)
-        sensed = any(e in SENSOR and e not in scene.leave_out for e in scene.add)
-        for other, other_sensed, names in grouped:
-            if other_sensed and sensed and other == bare:
-                names.append(name)
-                break
-        else:
-            grouped.append((bare, sensed, [name]))
-    return [names for _, _, names in grouped]
+            sensor[f"with {name}"] = replace(scene, add=(*without, name))
+    return [*({name: changed[name]} for name in changed), sensor]
 
 
 def measured(
@@ -91,7 +70,8 @@ def measured(
         tracking: how contacts are followed.
         chain: the arm, or None.
     """
-    physics = run_physics(next(iter(scenes.values())), trials)
+    # Without any effect of the sensor, frames would be kept in whole counts.
+    physics = run_physics(max(scenes.values(), key=lambda scene: len(scene.add)), trials)
     contacts: dict[str, dict[str, FeatureSeries | None]] = {}
     for name, scene in scenes.items():
         sensed = recordings(physics, scene=scene)
@@ -101,8 +81,12 @@ def measured(
     return contacts
 
 
-def anew(context: Context, scenes: Mapping[str, Scene]) -> dict[str, list[FeatureSeries | None]]:
+def anew(
+    context: Context, groups: Sequence[Mapping[str, Scene]]
+) -> dict[str, list[FeatureSeries | None]]:
     """{name: contacts of the data set's trials, in its order, simulated again from each scene}.
+
+    The scenes of a group differ in their sensor alone, so that they share one simulation.
 
     A trial has the same random draws in every scene, those with which it met its label when it was
     recorded. A weaker arm that no longer moves an object does not change its label.
@@ -117,12 +101,12 @@ def anew(context: Context, scenes: Mapping[str, Scene]) -> dict[str, list[Featur
         for file, recording in zip(wanted, context.recordings, strict=True)
     }
     cases = []
-    for group in [{name: scenes[name] for name in names} for names in groups(scenes)]:
+    for group in groups:
         shown = next(iter(group.values()))
         for trials in parts(shown, jobs=BATCHES):
             drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
             cases.append((group, drawn, set(wanted), data.layout, data.tracking, data.chain))
-    merged: dict[str, dict[str, FeatureSeries | None]] = {name: {} for name in scenes}
+    merged: dict[str, dict[str, FeatureSeries | None]] = {n: {} for group in groups for n in group}
     for answer in context.map("simulated again", measured, cases):
         for name, contacts in answer.items():
             merged[name] |= contacts
@@ -140,47 +124,37 @@ def section(context: Context) -> Section | None:
     scene = context.scene
     if scene is None:
         return None
-    others = variants(scene)
-    series = anew(context, {UNCHANGED: scene, **others})
+    series = anew(context, [{UNCHANGED: scene}, *variants(scene)])
     X, y = context.vectors(), context.labels
     if not np.array_equal(vectors(series.pop(UNCHANGED)), X):
         raise InputError(
             f"the scene {scene.name} gives other trials than these recordings; simulate it again, "
             "or study them without a scene"
         )
-    changed = {name: vectors(contacts) for name, contacts in series.items()}
-    own = context.map("their accuracy", grid_search, [(x, y) for x in changed.values()])
+    changed = [vectors(contacts) for contacts in series.values()]
+    own = context.map("their accuracy", grid_search, [(x, y) for x in changed])
     plain = grid_search(X, y)
-    to = context.map("trained here", transfer, [(X, y, plain, x) for x in changed.values()])
-    work = [(x, y, best, X) for x, best in zip(changed.values(), own, strict=True)]
-    back = context.map("trained there", transfer, work)
-    rows = []
-    for name, *sets in zip(others, own, to, back, strict=True):
-        lost = sum(contact is None for contact in series[name])
-        hows = (
-            "leave-one-out with the change",
-            "trained without it, tested with it",
-            "trained with it, tested without it",
-        )
-        rows += [
-            {"change": name, "task": task, "trained and tested": how, **score(result)}
-            | {"without contact": lost}
-            for how, results in zip(hows, sets, strict=True)
-            for task, result in results.items()
-        ]
+    to = context.map("trained here", transfer, [(X, y, plain, x) for x in changed])
+    rows = [
+        {"change": name, "task": task, "trained and tested": how, **score(result)}
+        | {"without contact": sum(contact is None for contact in series[name])}
+        for name, *sets in zip(series, own, to, strict=True)
+        for how, results in zip(HOW, sets, strict=True)
+        for task, result in results.items()
+    ]
     pictures = []
     for task in y:
         png = figures.bars(
-            list(others),
+            list(series),
             {
-                "with the change, leave-one-out": [r[task] for r in own],
-                "trained without, tested with": [r[task] for r in to],
+                how: [result[task] for result in results]
+                for how, results in zip(HOW, (own, to), strict=True)
             },
             title=f"{task}: the cost of a change",
             reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
         )
         pictures.append(Figure(f"robustness_{task}", f"Robustness, {task}", png))
-    title = "Another speed, arm or sensor; trained and tested with it, or across"
+    title = "Another speed, arm or sensor; trained with it or without it"
     return Section(
         "Another speed, another arm, each effect of the sensor",
         [

@@ -21,7 +21,7 @@ from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
 from train.simulate.scene_model import Scene
-from train.study import beyond, classify, findings, honest, paper, readings, resolution, robust
+from train.study import beyond, classify, findings, honest, paper, resolution, robust
 from train.study.context import Context
 
 COMPARED = (resolution.section, classify.scaling, classify.features)
@@ -40,7 +40,6 @@ ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
 CONCLUSIONS: tuple[Callable[[Context, Sequence[Numbers]], Section | None], ...] = (
     findings.section,
     paper.section,
-    readings.section,
 )
 """Each draws conclusions from the analyses' numbers, a dictionary for each data set; they come
 first in the report."""
