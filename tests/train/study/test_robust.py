@@ -46,7 +46,9 @@ def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
     assert [name for group in alone for name in group] == [
         f"{what} x {factor}" for factor in ("0.5", "2") for what in ("speed", "arm stiffness")
     ]
-    assert {"with crosstalk", "with dead_taxels", "without noise", "with drift"} < set(sensor)
+    effects = {name.split(" ")[1] for name in sensor}
+    assert {"crosstalk", "hysteresis", "drift", "noise", "saturation", "dead_band"} < effects
+    assert {"quantisation", "dead_taxels", "jitter", "dropped_frames"} < effects
     assert "noise" not in sensor["without noise"].add
     assert "drift" in sensor["with drift"].add
     fast = changes(scene)["speed x 2"]
