@@ -38,7 +38,7 @@ def available() -> bool:
 
 
 @contextmanager
-def chromium(width: int, *, dark: bool = False) -> Iterator[Any]:
+def chromium(width: int) -> Iterator[Any]:
     """A headless browser with a window of that width."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="needs the group `browser`")
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
@@ -48,8 +48,6 @@ def chromium(width: int, *, dark: bool = False) -> Iterator[Any]:
     options.binary_location = program
     for argument in ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--disable-gpu"):
         options.add_argument(argument)
-    if dark:
-        options.add_argument("--force-dark-mode")
     browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
     try:
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
@@ -78,15 +76,3 @@ def faults(report: Path) -> list[str]:
                     exists = (report.parent / link).is_file()
                 lines += [] if exists else [f"broken link: {link}"]
     return lines
-
-
-def shoot(report: Path, out: Path, width: int, *, dark: bool = False) -> None:
-    """Save the full page as a PNG."""
-    with chromium(width, dark=dark) as browser:
-        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
-        browser.get(report.resolve().as_uri())
-        height = browser.execute_script("return document.documentElement.scrollHeight")
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        browser.save_screenshot(str(out))

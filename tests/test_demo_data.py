@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from edge import demo
 from edge.cli import main
 from edge.model.model import Model
@@ -19,25 +17,6 @@ def test_the_demo_touches_one_of_each_category_and_gets_them_right(capsys):
     decided = {line["label"] for line in lines if line.get("task") == "category"}
     assert decided == {"rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"}
     assert all(line["label"] == line["expected"] for line in lines if line["event"] == "decision")
-
-
-@pytest.mark.parametrize("path", demo.recordings(), ids=lambda path: path.stem)
-def test_the_chips_in_between_change_no_decision(path, capsys):
-    """The drivers read from the fake chips what the recording holds."""
-    assert main(["replay", "--model", str(demo.MODEL), str(path)]) == 0
-    straight = decisions(capsys.readouterr().out)
-    main(["demo"])
-    assert straight == [d for d in decisions(capsys.readouterr().out) if d[0] == path.stem]
-    assert len(straight) == 3
-
-
-def decisions(text):
-    lines = [json.loads(line) for line in text.splitlines()]
-    return [
-        (Path(line["source"]).stem, line["task"], line["label"], line["confidence"])
-        for line in lines
-        if line["event"] == "decision"
-    ]
 
 
 def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, capsys):

@@ -91,20 +91,6 @@ def plugged(host):
     os.close(slave)
 
 
-def test_its_frames_come_over_a_serial_port(plugged):
-    bus = SerialBus(plugged[0], timeout_s=5.0)
-    chip = Block(bus, 0, taxels=TAXELS, bits=12)
-    seen = []
-    for _ in range(5):
-        bus.transfer(chip.frame)
-        taxels, intact = parse(chip.frame.buffer[None], TAXELS, 12)
-        assert intact.all()
-        seen.append(taxels[0].tolist())
-    # Two requests came before: the one at opening, and the driver's for the identity.
-    assert seen == [values(12, n).tolist() for n in range(2, 7)]
-    bus.close()
-
-
 def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     """Bytes between two requests end with the next zero."""
     bus = SerialBus(plugged[0], timeout_s=5.0)

@@ -85,32 +85,6 @@ def test_joint_angles_are_asked_for_before_anything_is_read(model, make_touch):
     assert [event.flags for event in decided] == [("skin_motion",)] * 2
 
 
-def test_an_event_is_what_a_line_of_json_says():
-    decided = Decided(
-        "t", "a", 0.5, 1.2, 0.25, 0.3, ("unsure",), error=0.1, stopped_by="window", contact=2
-    )
-    assert list(decided.to_dict().items()) == [
-        ("event", "decision"),
-        ("contact", 2),
-        ("window_s", 1.2),
-        ("onset_s", 0.25),
-        ("place", None),
-        ("task", "t"),
-        ("label", "a"),
-        ("confidence", 0.5),
-        ("latency_ms", 0.3),
-        ("error", 0.1),
-        ("stopped_by", "window"),
-        ("flags", ["unsure"]),
-    ]
-    assert Release(0.25, 2.5, contact=2).to_dict() == {
-        "event": "release",
-        "contact": 2,
-        "onset_s": 0.25,
-        "release_s": 2.5,
-    }
-
-
 def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(model, make_touch):
     events = watch(model, make_touch(kind="soft", seed=3))
     assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (1.4, Decided), (1.4, Decided)]

@@ -46,13 +46,6 @@ def test_the_version_is_the_package_s(capsys):
     assert capsys.readouterr().out == f"edge-classify {__version__}\n"
 
 
-def test_a_bad_option_is_exit_2(capsys):
-    with pytest.raises(SystemExit) as left:
-        cli.main(["run", "--no-such-option"])
-    assert left.value.code == 2
-    assert "usage: edge-classify" in capsys.readouterr().err
-
-
 def test_without_a_command_the_commands_are_listed(capsys):
     assert cli.main([]) == 2
     said = capsys.readouterr().out
@@ -110,11 +103,6 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
         [sys.executable, "-m", "edge.cli"], cwd=ROOT, env=asked, capture_output=True, text=True
     )
     assert done.stdout.split() == ["record"]
-
-
-@pytest.mark.parametrize("status", [0, 1])
-def test_a_command_s_own_status_is_the_exit_status(status):
-    assert cli.dispatch(top(lambda arguments: status), []) == status
 
 
 def test_bad_input_is_one_sentence_and_exit_2(capsys):

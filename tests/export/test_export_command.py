@@ -71,6 +71,9 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
         (["--threshold", "-3"], "--threshold must be 0 to"),
         (["--threshold", "200", "--onset", "100"], "onset_counts 100 is below"),
         (["--tasks", "colour"], "label 'colour'; all have category, object"),
+        (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
+        (["--samples", "1"], "--samples must be 2 to 1000"),
+        (["--samples", "1001"], "--samples must be 2 to 1000"),
     ],
 )
 def test_options_that_make_no_sense_are_one_sentence(options, word, recordings, tmp_path, capsys):

@@ -51,29 +51,3 @@ def test_its_golden_file_holds(six, capsys):
     counts = next(line for line in lines if line["name"] == "series counts")
     assert counts["passed"]
     assert counts["rows"] > 1000
-
-
-def test_replay_decides_with_it(six, recordings, capsys):
-    assert edge_classify(["replay", "--model", str(six / "model.onnx"), str(recordings)]) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    decided = [line for line in lines if line["event"] == "decision"]
-    assert len(decided) == 32
-    assert all(line["label"] == line["expected"] for line in decided if line["task"] == "category")
-
-
-@pytest.mark.parametrize(
-    ("given", "sentence"),
-    [
-        (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
-        (["--samples", "1"], "--samples must be 2 to 1000"),
-        (["--samples", "1001"], "--samples must be 2 to 1000"),
-    ],
-)
-def test_what_cannot_be_measured_is_one_sentence_and_writes_nothing(
-    given, sentence, recordings, tmp_path, capsys
-):
-    arguments = ["--data", str(recordings), "--out", str(tmp_path / "out"), "--jobs", "1"]
-    assert main([*arguments, "--components", "2", "-k", "1", *given]) == 2
-    error = capsys.readouterr().err.splitlines()[-1]
-    assert sentence in error
-    assert not (tmp_path / "out").exists()

@@ -1,7 +1,5 @@
 """The ONNX graph against Python's whole numbers, the estimators and ONNX's own reference."""
 
-from pathlib import Path
-
 import numpy as np
 import onnx
 import onnxruntime
@@ -225,11 +223,3 @@ def test_trials_that_are_all_equal_lie_at_distance_zero(export):
     answer = model.run(np.concatenate([X[:1], features(1, seed=1)]))
     assert answer["t_neighbours"].tolist() == [[0, 1, 2]] * 2
     assert not answer["t_distances"].any()
-
-
-def test_the_same_fit_gives_the_same_bytes(export):
-    X = features(30)
-    _, first = export(X, {"t": Choice("IV", 5, 2)})
-    before = Path(first.path).read_bytes()
-    _, again = export(X, {"t": Choice("IV", 5, 2)})
-    assert Path(again.path).read_bytes() == before

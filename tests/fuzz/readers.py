@@ -161,17 +161,6 @@ TOUCH = {
     **{"event": "decision", "task": "object", "contact": 1, "onset_s": 1.5, "label": "cup"},
     **{"place": [0.1, 0.2, 0.3], "confidence": 0.5, "flags": ["tie"]},
 }
-STAGE = {"median_us": 12.5, "p99_us": 20.0}
-BOARD = {
-    "machine": {"kind": "x86_64", "name": "a board"},
-    "model": {"data_digest": "0" * 64, "features": ["max_force"], "sha256": "1" * 64},
-    "stages": {"track": STAGE, "features": STAGE, "decision": STAGE},
-    **{"memory_mb": 54.0, "cold_start_ms": 110.0},
-}
-PRICE = {"rows": 140, "components": 6, "k": 2, "operators": "ours", "us": 16.0, "kilobytes": 9.5}
-PRICES = {"machine": "x86_64", "data_digest": "0" * 64, "decisions": [PRICE, PRICE | {"rows": 280}]}
-SKIN = {"rows": 2, "cols": 2, "threshold_counts": 50, "wraps": True, "pitch_m": 0.003}
-BESIDE = {"labels": {"object": "cup"}, "frames_topic": "/skin", "skin": SKIN}
 
 
 def read_map(path: Path) -> None:
@@ -191,29 +180,6 @@ def read_scene(path: Path) -> None:
 def beside_a_scene(path: Path) -> None:
     """The scene that another one builds on."""
     shutil.copy(ROOT / "train" / "scenes" / "cody18.toml", path.parent)
-
-
-def read_board(path: Path) -> None:
-    """Read a board's timings."""
-    from train.tradeoff.board import read
-
-    read(path)
-
-
-def read_prices(path: Path) -> None:
-    """Read measured prices."""
-    from train.tradeoff.prices import read
-
-    read(path, "0" * 64)
-
-
-def read_front(path: Path) -> None:
-    """Read a front, and pick from it."""
-    from train.operating_points import ParetoFront
-
-    front = ParetoFront.read(path)
-    for wanted in ("fast", "balanced", "accurate"):
-        front.pick(wanted)
 
 
 def grasps() -> list[bytes]:
@@ -321,15 +287,8 @@ READERS = (
     Reader("map", ".jsonl", text(HEAD, TOUCH, TOUCH, HEAD, TOUCH), mutate.of_text, read_map),
     Reader("scene", ".toml", files("train/scenes/*.toml"), mutate.of_text, read_scene,
            beside_a_scene),
-    Reader("board", ".json", text(BOARD), mutate.of_text, read_board),
-    Reader("prices", ".json", text(PRICES), mutate.of_text, read_prices),
-    Reader("front", ".json", files("train/tradeoff/front.json"), mutate.of_text, read_front),
     Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
     Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("mcap")),
-    Reader("mcap_words", ".mcap", lambda: logs()[:1], mutate.of_text, importing("mcap")),
     Reader("rosbag", ".bag", bags, mutate.of_bytes, importing("rosbag")),
-    Reader("beside", ".json", text(BESIDE), mutate.of_text,
-           lambda path: importing("mcap")(path.with_suffix(".mcap")),
-           lambda path: path.with_suffix(".mcap").write_bytes(logs()[0])),
 )  # fmt: skip

@@ -92,6 +92,9 @@ def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(make_touch, t
     (note,) = [note for note in fitted.notes if "the window is" in note]
     assert "the window is 2.4 s" in note
     assert "100% at 2.4 s, 100% at 4.8 s" in note
+    points = fitted.sequential.decision_points_s
+    assert points[-1] == 2.4
+    assert len(points) <= 12
     early = train.fit(touches(make_touch, tmp_path / "early", 6.0, 0.4), **FEW)
     assert early.window_s == 1.2
 
@@ -105,11 +108,3 @@ def test_a_window_that_is_given_is_kept(given, make_touch, tmp_path):
 
 def test_touches_that_last_little_longer_than_the_window_are_told_in_it(make_touch, tmp_path):
     assert train.fit(touches(make_touch, tmp_path, 2.0, 1.8), **FEW).window_s == 1.2
-
-
-def test_decision_points_of_a_long_window_are_as_many_as_of_the_usual_one(make_touch, tmp_path):
-    fitted = train.fit(touches(make_touch, tmp_path, 6.0, 1.8), **FEW)
-    assert fitted.sequential is not None
-    points = fitted.sequential.decision_points_s
-    assert points[-1] == 2.4
-    assert len(points) <= 12

@@ -93,7 +93,7 @@ def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_
     best, honest = [], []
     for _ in range(6):
         X, y = rng.normal(size=(40, 12)), rng.choice(["a", "b"], 40)
-        table = evaluate(X, {"t": y}, stratified_folds(y), GRIDS, features=TWO)
+        table = evaluate(X, {"t": y}, stratified_folds(y, 5), GRIDS[1:2], features=TWO)
         best.append(table.held_out("t").mean(axis=1).max())
         honest.append(table.nested("t").accuracy)
     assert np.mean(best) > 0.55
@@ -145,15 +145,6 @@ def test_of_candidates_that_cost_the_same_the_best_is_chosen():
     right[0, :3] = right[1, 2:4] = right[2, 4:6] = False
     right[3, 50:] = False
     assert choose(right, np.array([1, 1, 1, 0])) == 1
-
-
-def test_processes_do_not_change_the_table():
-    X, y = trials()
-    one, two = (
-        evaluate(X, {"t": y}, stratified_folds(y, 4), GRIDS, features=TWO, jobs=jobs).right["t"]
-        for jobs in (1, 2)
-    )
-    assert (one == two).all()
 
 
 def test_folds_spread_each_class_evenly():

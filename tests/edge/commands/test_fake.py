@@ -1,11 +1,8 @@
 """`edge-classify fake`: a skin of any size is rehearsed without hardware."""
 
 import json
-import shutil
 import signal
 from contextlib import contextmanager
-
-import pytest
 
 from edge import demo
 from edge.cli import main
@@ -13,31 +10,6 @@ from edge.commands import fake
 from edge.commands.output import Output
 from edge.recording import load
 from edge.skin import file as skinfile
-
-
-@pytest.mark.parametrize("name", ["mpr121", "matrix"])
-def test_the_whole_loop_without_hardware(name, edge, tmp_path, monkeypatch, capsys):
-    from export.__main__ import main as export
-
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(skinfile.shipped(name), "my.toml")
-
-    status, (made,), _ = edge("fake", "--skin", "my.toml", "--out", "f", "--trials", "4")
-    assert (status, made["trials"]) == (0, 16)
-    assert edge("calibrate", "--skin", "my.toml", "--fake", "f/still.npz", "--frames", "50")[0] == 0
-    first = "f/touches/cardboard-box-fixed-000.npz"
-    status, (saved,), _ = edge(
-        "record", "--skin", "my.toml", "--fake", first, "--label", "object=box"
-    )
-    assert (status, saved["missing_taxels"]) == (0, False)
-    assert export(["--data", "f/touches", "--out", "build", "--jobs", "1"]) == 0
-    capsys.readouterr()
-    status, events, _ = edge(
-        "run", "--model", "build/model.onnx", "--skin", "my.toml", "--fake", first
-    )
-    said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
-    assert status == 0
-    assert said["category"] == "rigid-fixed"
 
 
 def test_what_to_rehearse_next_is_said_at_a_terminal(tmp_path, monkeypatch, capsys):

@@ -29,9 +29,3 @@ def test_a_person_gets_sentences(capsys, monkeypatch):
     assert "Skin: 16 x 24 taxels, closed around" in out
     assert f"Fitted on {info.rows} trials" in out
     assert max(map(len, out.splitlines())) <= 80
-
-
-def test_what_is_no_model_is_one_sentence(tmp_path, capsys):
-    (tmp_path / "a.onnx").write_bytes(b"nothing")
-    assert main(["info", str(tmp_path / "a.onnx")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1

@@ -2,7 +2,6 @@
 
 import json
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -146,25 +145,16 @@ def test_run_stops_cleanly_at_ctrl_c(exported, recordings):
 def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
     edge, exported, recordings, tmp_path, monkeypatch, command
 ):
-    """A silent serial port or name server may take seconds, and there is nothing to lose yet."""
-    handled = []
-    open_skin, resolve = command.open_skin, socket.getaddrinfo
+    """A silent serial port may take seconds, and there is nothing to lose yet."""
+    handled, open_skin = [], command.open_skin
 
     def opened(*arguments, **options):
         handled.append(signal.getsignal(signal.SIGTERM))
         return open_skin(*arguments, **options)
 
-    def resolved(*arguments, **options):
-        handled.append(signal.getsignal(signal.SIGTERM))
-        return resolve(*arguments, **options)
-
     monkeypatch.setattr(command, "open_skin", opened)
-    monkeypatch.setattr(socket, "getaddrinfo", resolved)
-    options = {
-        record: ["--label", "object=foam", "--out", tmp_path],
-        run: ["--model", exported / "model.onnx", "--udp", "127.0.0.1:9"],
-        view: ["--model", exported / "model.onnx"],
-    }[command]
+    model = ["--model", exported / "model.onnx"]
+    options = {record: ["--label", "object=foam", "--out", tmp_path], run: model, view: model}
     name = command.__name__.rpartition(".")[2]
-    assert edge(name, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
-    assert handled == [signal.SIG_DFL] * (2 if command is run else 1)
+    assert edge(name, "--fake", recordings / "soft_1.npz", *options[command], text=True)[0] == 0
+    assert handled == [signal.SIG_DFL]

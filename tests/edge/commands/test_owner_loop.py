@@ -7,6 +7,7 @@ import pytest
 from edge import recording
 from edge.recording import load
 from edge.skin import file as skinfile
+from tests.conftest import PAPER
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     )
 
     trials = tmp_path / "trials"
-    shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(3)]
+    shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(2)]
     for name in shown:
         labels = load(recordings / f"{name}.npz").labels
         given = [part for task in labels for part in ("--label", f"{task}={labels[task]}")]
@@ -42,14 +43,14 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
         assert (status, event["complete"]) == (0, True)
     assert len(list(trials.iterdir())) == len(shown)
 
-    assert export(["--data", str(trials), "--out", str(tmp_path / "build"), "--jobs", "1"]) == 0
+    assert export(["--data", str(trials), "--out", str(tmp_path / "build"), *PAPER]) == 0
     capsys.readouterr()
 
     # One file goes to the board; what it was shown it knows again, live.
     board = tmp_path / "board"
     board.mkdir()
     shutil.copy(tmp_path / "build" / "model.onnx", board)
-    for name in ("hard_1", "soft_2"):
+    for name in ("hard_1", "soft_0"):
         status, events, _ = edge("run", "--model", board / "model.onnx", "--skin", skin,
                              "--fake", recordings / f"{name}.npz")  # fmt: skip
         said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge.commands.record import Recorder, Trials, recording, trial_path
+from edge.commands.record import Recorder, Trials, trial_path
 from edge.commands.source import ending_signals
-from edge.recording import Recording, load, save
+from edge.recording import load, save
 from edge.runtime.event_writer import Lines
 from edge.touch.frame import Frame
 
@@ -74,22 +74,6 @@ def test_a_skin_without_an_arm_is_not_warned_of(tmp_path, caplog):
         mine.save(frames(None, None), complete=True)
     assert load(tmp_path / "box-001.npz").joints is None
     assert caplog.messages == []
-
-
-def test_a_frame_without_a_pose_keeps_the_angles_of_the_others(tmp_path):
-    poses = [np.array([0.1, 0.2]), None, np.array([0.3, 0.4])]
-    save(tmp_path / "a.npz", recording(frames(*poses), {}))
-    back = load(tmp_path / "a.npz")
-    assert np.isnan(back.joints).tolist() == [[False] * 2, [True] * 2, [False] * 2]
-    assert [None if f.joints is None else f.joints.tolist() for f in back] == [
-        [0.1, 0.2],
-        None,
-        [0.3, 0.4],
-    ]
-
-
-def test_frames_of_which_none_has_a_pose_have_no_angles():
-    assert recording(frames(None, None, None), {}).joints is None
 
 
 def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
@@ -239,15 +223,3 @@ def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(edge, recordings, t
     status, (event,), _ = edge("record", "--fake", recordings / "hard_0.npz", "--label", "o=a",
                                "--out", tmp_path, "--seconds", 1.0)  # fmt: skip
     assert (status, event["complete"], event["seconds"]) == (0, False, 0.99)
-
-
-def test_two_contacts_are_two_trials(edge, make_touch, tmp_path):
-    touch = make_touch(seconds=0.5, arm=False)
-    gap = np.zeros((50, 16, 24), dtype=np.uint16)
-    frames = np.concatenate([touch.frames, gap, touch.frames, gap])
-    recording_of_two = Recording(np.arange(len(frames)) / 100.0, frames, meta=touch.meta)
-    save(tmp_path / "two.npz", recording_of_two)
-    events = edge("record", "--fake", tmp_path / "two.npz", "--label", "object=a", "--out",
-                  tmp_path / "t")[1]  # fmt: skip
-    # 20 frames of lead-in, 50 of contact, 30 that show its end.
-    assert [(e["frames"], e["complete"]) for e in events] == [(100, True)] * 2

@@ -73,13 +73,6 @@ def verify(exported, edge):
     return lambda golden: edge("verify", "--model", exported / "model.onnx", "--golden", golden)
 
 
-@pytest.mark.parametrize("given", ["--model", "--golden"])
-def test_both_of_a_models_files_are_asked_for(given, exported, capsys):
-    with pytest.raises(SystemExit, match="2"):
-        main(["verify", given, str(exported / "model.onnx")])
-    assert "the following arguments are required: --" in capsys.readouterr().err
-
-
 def test_the_golden_file_is_met(verify, exported):
     status, checks, err = verify(exported / "golden.npz")
     assert status == 0
@@ -114,14 +107,6 @@ def test_a_difference_names_the_worst_row(verify, exported, tmp_path, key, name,
     (failed,) = (check for check in checks if not check["passed"])
     assert (status, failed["name"], failed["worst_row"]) == (1, name, row)
     assert f"results that differ from the golden file: {name}" in err
-
-
-def test_a_difference_within_the_bound_passes(verify, exported, tmp_path):
-    arrays = dict(np.load(exported / "golden.npz"))
-    arrays["vectors"][:2] *= 1 + 1e-14
-    arrays["onset_s"] += 1e-10
-    np.savez(tmp_path / "golden.npz", **arrays)
-    assert verify(tmp_path / "golden.npz")[0] == 0
 
 
 def test_another_distance_hints_at_float32(verify, exported, tmp_path):

@@ -5,7 +5,6 @@ import numpy as np
 from edge.fake.bus import FakeBus
 from edge.i2c import ad7147
 from edge.i2c.ad7147 import AD7147, FakeAD7147
-from edge.i2c.bus import wire_bits
 from tests.edge.i2c.chips import parsed, sense
 
 
@@ -44,12 +43,6 @@ def test_ones_before_the_end_are_a_value():
     data = np.full((1, 24), 0x51, dtype=np.uint8)
     data[0, 4:6] = 0xFF
     assert ad7147.parse(data)[1].all()
-
-
-def test_frame_is_one_portable_call_of_255_bits():
-    chip = AD7147(FakeBus(chips={0x2C: FakeAD7147(sense)}), 0x2C)
-    assert [m.read for m in chip.frame.messages] == [False, True]
-    assert wire_bits(chip.frame.messages) == 255
 
 
 def test_model_converts_in_its_own_time():

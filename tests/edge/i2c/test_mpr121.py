@@ -5,7 +5,7 @@ import pytest
 
 from edge.fake.bus import FakeBus
 from edge.i2c import mpr121
-from edge.i2c.bus import fetch, send, wire_bits
+from edge.i2c.bus import fetch, send
 from edge.i2c.chip import WrongChip
 from edge.i2c.mpr121 import MPR121, FakeMPR121
 from tests.edge.i2c.chips import sense
@@ -37,11 +37,6 @@ def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():
     values, whole = mpr121.parse(data)
     assert values[0, :4].tolist() == [0x234, 0x634, 1023, 1022]
     assert whole[0].tolist() == [True, False, False, True] + [False] * 8
-
-
-def test_frame_is_246_bits():
-    chip = MPR121(FakeBus(chips={0x5A: FakeMPR121(sense)}), 0x5A)
-    assert wire_bits(chip.frame.messages) == 246
 
 
 def test_over_current_is_named_with_its_resistor():

@@ -228,16 +228,22 @@ def test_bits_on_the_line_are_those_of_the_packets():
     assert serial_bits(exchange) == 10 * packets
 
 
+def skin_on(port, folder, timeout_s=PATIENT_S):
+    """The file of a skin whose microcontroller stands on this port."""
+    path = folder / "skin.toml"
+    path.write_text(
+        f"[skin]\nrows = 2\ncols = 3\n[read]\ntimeout_s = {timeout_s}\n"
+        f'[[bus]]\nserial = "{port}"\nkind = "block"\n'
+        "chips = [{ first = [0, 0], block = [2, 3] }]"
+    )
+    return path
+
+
 def test_a_skin_over_a_serial_port_survives_being_unplugged(board, tmp_path):
     """Frames without valid taxels while it is away; whole ones when it is back."""
     link = tmp_path / "port"
     link.symlink_to(board.port)
-    path = tmp_path / "skin.toml"
-    path.write_text(
-        "[skin]\nrows = 2\ncols = 3\n[read]\ntimeout_s = 3.0\n"
-        f'[[bus]]\nserial = "{link}"\nkind = "block"\n'
-        "chips = [{ first = [0, 0], block = [2, 3] }]"
-    )
+    path = skin_on(link, tmp_path)
     assert skinfile.load(path).buses[0].serial
     with Skin.open(path, calibrated=False) as skin:
         assert skin.read().valid.all()
@@ -254,13 +260,7 @@ def test_a_skin_over_a_serial_port_survives_being_unplugged(board, tmp_path):
 
 def test_noise_costs_a_skin_no_frame(board, tmp_path):
     """Half of an answer is asked for again within the same frame."""
-    path = tmp_path / "skin.toml"
-    path.write_text(
-        "[skin]\nrows = 2\ncols = 3\n[read]\ntimeout_s = 0.5\n"
-        f'[[bus]]\nserial = "{board.port}"\nkind = "block"\n'
-        "chips = [{ first = [0, 0], block = [2, 3] }]"
-    )
-    with Skin.open(path, calibrated=False) as skin:
+    with Skin.open(skin_on(board.port, tmp_path, 0.5), calibrated=False) as skin:
         noisy = board.asked + 1
         board.change = lambda answer, number: answer[: 5 if number == noisy else None]
         assert skin.read().valid.all()

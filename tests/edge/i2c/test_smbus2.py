@@ -60,11 +60,6 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
     assert log.read_text() == "timeout 2\n" * 3
 
 
-def test_one_mute_chip_costs_its_twelve_taxels(library):
-    done = python(library, WHOLE_SKIN, I2CDEV_MUTE="2:0x2E")
-    assert done.stdout == "372 0\n"
-
-
 def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
     """Its buffer still holds what was read before: old values must not pass for new ones."""
     done = python(
@@ -101,64 +96,6 @@ def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_name
     valid, sentences = done.stdout.splitlines()
     assert valid == f"{384 - 8 * 12} 0"
     assert sentences == "['a driver of the kernel owns the address; unbind it (EBUSY)']"
-
-
-def test_a_bus_that_is_not_there_is_one_sentence(library):
-    code = "from edge.i2c.bus import LinuxBus; LinuxBus(77)"
-    done = python(library, code)
-    assert done.stderr.splitlines()[-1] == (
-        "edge.i2c.bus.BusMissing: /dev/i2c-77: no such bus; is I2C switched on, and the number "
-        "right? (ENOENT)"
-    )
-
-
-def test_what_smbus2_reads_itself_is_what_the_bus_reads(library):
-    done = python(
-        library,
-        """
-        from smbus2 import SMBus, i2c_msg
-        from edge.i2c.bus import LinuxBus, fetch, send
-        bus = LinuxBus(3)
-        send(bus, 0x70, [4])
-        with SMBus(3) as smbus:
-            read = i2c_msg.read(0x2D, 2)
-            smbus.i2c_rdwr(i2c_msg.write(0x2D, [0, 0x17]), read)
-        print(bytes(read).hex(), fetch(bus, 0x2D, bytes([0, 0x17]), 2).hex())
-        """,
-    )
-    assert done.stdout == "1473 1473\n", done.stderr
-
-
-def test_adapter_and_fake_refuse_the_same_shapes_with_the_same_errors(library):
-    done = python(
-        library,
-        """
-        from edge.i2c.bus import BusError, LinuxBus, read, send, write
-        from edge.fake.bus import FakeBus
-        from edge.i2c.tca9548a import FakeTCA9548A
-        shapes = [
-            [read(0x70, 1), write(0x70, [1])],
-            [write(0x70, [1]), read(0x2C, 2)],
-            [write(0x70, [1])] * 43,
-            [read(0x70, 8193)],
-            [write(0x33, [0])],
-            [write(0x70, [1]), read(0x70, 1)],
-        ]
-        for bus in (LinuxBus(1), FakeBus(chips={0x70: FakeTCA9548A()})):
-            said = []
-            for shape in shapes:
-                try:
-                    bus.transfer(bus.prepare(*shape))
-                    said.append("fine")
-                except BusError as error:
-                    said.append(f"{type(error).__name__} {error.errno}")
-            print(", ".join(said))
-        """,
-    )
-    real, fake = done.stdout.splitlines()
-    assert real == fake
-    assert real.split(", ")[-1] == "fine"
-    assert len(set(real.split(", "))) == 4
 
 
 def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):

@@ -8,7 +8,7 @@ import pytest
 from edge.fake.bus import FakeBus
 from edge.fake.faults import Fault
 from edge.i2c.ad7147 import AD7147, FakeAD7147
-from edge.i2c.bus import BusFault, bus_error
+from edge.i2c.bus import BusFault
 from edge.i2c.tca9548a import TCA9548A, FakeTCA9548A
 from tests.edge.i2c.chips import parsed
 
@@ -90,17 +90,3 @@ def test_a_mux_beside_that_has_gone_does_not_cost_this_one():
     del bus.chips[0x71]
     first.select(3)
     assert first.selected == 3
-
-
-def test_a_mux_beside_that_does_not_answer_is_asked_four_times(monkeypatch):
-    bus, first = muxed()
-    second, asked = TCA9548A(bus, 0x71, beside=(first,)), []
-
-    def gone():
-        asked.append(0x70)
-        raise bus_error(errno.EREMOTEIO, "a bus", 0x70)
-
-    monkeypatch.setattr(first, "disconnect", gone)
-    first._open = 1
-    second.select(2)
-    assert (len(asked), second.selected) == (4, 2)

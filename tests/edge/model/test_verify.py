@@ -5,7 +5,6 @@ import onnx
 import onnxruntime
 import pytest
 
-from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.verify import compared, verify
 
@@ -54,23 +53,6 @@ def test_another_shape_is_a_difference(bound):
     assert (check.seen, check.expected) == ("shape (2, 3)", "(2, 4)")
 
 
-def test_a_model_meets_its_own_golden_file_in_everything(exported):
-    checks = verify(Model(exported / "model.onnx"), exported / "golden.npz")
-    assert all(check.passed for check in checks)
-    kinds = ("_label", "_neighbours", "_distances", "counts", "length")
-    exact = [c for c in checks if c.name.endswith(kinds)]
-    assert len(exact) == 8
-    assert all(check.worst == 0.0 for check in exact)
-
-
-def test_a_golden_file_of_another_width_is_refused(exported, tmp_path):
-    arrays = dict(np.load(exported / "golden.npz"))
-    arrays["vectors"] = np.pad(arrays["vectors"], [(0, 0), (0, 1)])
-    np.savez(tmp_path / "golden.npz", **arrays)
-    with pytest.raises(InputError, match=r"golden\.npz: .*export"):
-        verify(Model(exported / "model.onnx"), tmp_path / "golden.npz")
-
-
 def narrowed(data):
     """The model as an engine runs it that computes in float32: every float64 tensor narrowed."""
     model = onnx.load_from_string(data)
@@ -108,13 +90,3 @@ def test_an_engine_that_computes_in_float32_is_found_out(exported):
     assert not checks["category_distances"].passed
     assert not checks["object_distances"].passed
     assert checks["series counts"].passed
-
-
-def test_almost_every_distance_differs_in_float32(exported):
-    """No vector needs to be made for it: a golden file of any features shows float32."""
-    golden = np.load(exported / "golden.npz")
-    single = narrowed((exported / "model.onnx").read_bytes())
-    vectors, expected = golden["vectors"][:-2], golden["object_distances"][:-2]
-    [seen] = single.run(["object_distances"], {"features": vectors.astype(np.float32)})
-    apart = expected[:, 0] > 0.0
-    assert (seen != expected)[apart].all(axis=1).mean() > 0.95

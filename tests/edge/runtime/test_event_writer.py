@@ -47,12 +47,10 @@ def test_where_nobody_listens_lines_are_counted_and_the_file_is_whole():
     lines.close()
 
 
-def test_a_datagram_that_finds_no_room_is_lost_rather_than_waited_for():
-    with event_writer._connected("127.0.0.1:9") as sender:
-        assert not sender.getblocking()
+NO_PORT = ["", "47400", ":47400", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536", "a:b:c"]
 
 
-@pytest.mark.parametrize("address", ["", "47400", ":47400", "127.0.0.1:", "127.0.0.1:0", "a:b:c"])
+@pytest.mark.parametrize("address", NO_PORT)
 def test_an_address_that_makes_no_sense_is_one_sentence(address):
     with pytest.raises(InputError, match="give HOST:PORT"):
         Lines(udp=address)
@@ -127,17 +125,6 @@ def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
     assert lines.lost == {}
 
 
-def test_a_line_that_does_not_leave_in_time_is_lost_at_the_end(monkeypatch):
-    monkeypatch.setattr(event_writer, "CLOSE_S", 0.05)
-    held = threading.Event()
-    writer = LineWriter("held", lambda line: held.wait())
-    writer.put("{}")
-    writer.close()
-    assert (writer.lost, writer.problem) == (1, "nobody reads them")
-    held.set()
-    writer._thread.join()
-
-
 def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
     reading, writing = os.pipe()
     os.close(reading)
@@ -151,10 +138,6 @@ def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize(("port", "taken"), [(0, False), (1, True), (65535, True), (65536, False)])
-def test_a_datagram_may_go_to_any_port_there_is(port, taken):
-    if taken:
-        Lines(io.StringIO(), udp=f"127.0.0.1:{port}").close()
-    else:
-        with pytest.raises(InputError, match="give HOST:PORT"):
-            Lines(io.StringIO(), udp=f"127.0.0.1:{port}")
+@pytest.mark.parametrize("port", [1, 65535])
+def test_a_datagram_may_go_to_any_port_there_is(port):
+    Lines(io.StringIO(), udp=f"127.0.0.1:{port}").close()

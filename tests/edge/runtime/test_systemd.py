@@ -96,19 +96,6 @@ def test_without_a_manager_no_socket_is_opened(clock, address, monkeypatch):
     assert opened == []
 
 
-def test_a_manager_that_was_away_hears_what_follows(clock, tmp_path):
-    address = str(tmp_path / "notify")
-    with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:
-        notifier.ready()
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-            listener.bind(address)
-            listener.setblocking(False)
-            notifier.stopping()
-            notifier.close()
-            notifier.close()
-            assert said(listener) == ["STOPPING=1"]
-
-
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, clock):
     listener, address = manager
     with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:

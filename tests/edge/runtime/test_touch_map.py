@@ -231,21 +231,19 @@ def test_what_is_not_a_map_is_named(tmp_path, text, sentence):
         list(touchmap.TouchMap(path))
 
 
-def test_a_file_that_is_not_a_map_is_not_written_to(tmp_path):
+ANOTHER = json.dumps({"event": "map", "frame": "another", "unit": "metre", "tasks": []})
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [("what I did today", "not a map"), (ANOTHER, "in the frame another .* keep a map for each")],
+)
+def test_a_file_that_is_no_map_of_this_arm_is_not_written_to(tmp_path, text, sentence):
     path = tmp_path / "notes.txt"
-    path.write_text("what I did today\n")
-    with pytest.raises(InputError, match="not a map"):
+    path.write_text(text + "\n")
+    with pytest.raises(InputError, match=sentence):
         touchmap.map_writer(path, Model(demo.MODEL).info)
-    assert path.read_text() == "what I did today\n"
-
-
-def test_a_map_of_another_arm_is_refused_at_the_first_start(tmp_path):
-    path = tmp_path / "map.jsonl"
-    head = {"event": "map", "frame": "another", "unit": "metre", "tasks": []}
-    path.write_text(json.dumps(head) + "\n")
-    with pytest.raises(InputError, match="in the frame another .* keep a map for each"):
-        touchmap.map_writer(path, Model(demo.MODEL).info)
-    assert path.read_text() == json.dumps(head) + "\n"
+    assert path.read_text() == text + "\n"
 
 
 @pytest.mark.parametrize("left", ['{"ev', '{"event": "map", "fra', '{"event": "map", "fra\n'])
@@ -273,16 +271,3 @@ def test_what_is_no_file_is_refused_as_a_map(tmp_path):
     for path in (tmp_path / "fifo", tmp_path, "/dev/null", "a\0b"):
         with pytest.raises(InputError, match="cannot be written"):
             touchmap.map_writer(path, Model(demo.MODEL).info)
-
-
-def test_a_long_map_is_opened_by_its_head_alone(tmp_path, monkeypatch):
-    """Counted in bytes, not in seconds: 98 MB of contacts take no more than 64 kB of reading."""
-    path = tmp_path / "map.jsonl"
-    info = Model(demo.MODEL).info
-    write(path, info, [])
-    with path.open("ab") as file:
-        file.truncate(98 << 20)
-    read, pread = [], touchmap.os.pread
-    monkeypatch.setattr(touchmap.os, "pread", lambda fd, n, at: read.append(n) or pread(fd, n, at))
-    write(path, info, [])
-    assert sum(read) <= touchmap.LONGEST_LINE + 1

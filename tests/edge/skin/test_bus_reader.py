@@ -51,7 +51,7 @@ def test_after_a_brown_out_every_taxel_is_back_in_half_a_second_also_when_it_rep
         assert outcome.back_s <= BACK_S
 
 
-EVERY = {"frame": {"cody": 97, "one bus": 97}, "set-up": {"cody": 401, "one bus": 401}}
+EVERY = {"frame": {"cody": 193, "one bus": 193}, "set-up": {"cody": 401, "one bus": 401}}
 """Only one position in so many is tried, another for each kind."""
 
 
@@ -64,19 +64,6 @@ def test_one_fault_anywhere_gives_no_wrong_value(name, where):
         outcome = sweep(name, SKINS[name], fault, overhead_s=100e-6, **at)
         assert outcome.wrong == 0, fault
         assert outcome.back_s < BACK_S, fault
-
-
-@pytest.mark.parametrize("name", ["NACK on one chip", "EIO on one chip", "ETIMEDOUT on one chip"])
-def test_one_bad_chip_costs_its_own_taxels_only(name):
-    file, faults, more = ROWS[name]
-    assert run(name, file, faults, seconds=1.2, **more).missing == 12
-
-
-def test_a_chip_that_hangs_costs_its_timeout_once_in_a_tenth_of_a_second():
-    file, faults, more = ROWS["ETIMEDOUT on one chip"]
-    outcome = run("", file, faults, seconds=1.2, **more)
-    assert outcome.met <= 1 + 0.5 / PAUSE_S
-    assert outcome.missed <= 2 * outcome.met
 
 
 def test_a_chip_that_never_comes_back_stays_out_and_costs_nothing():
@@ -92,15 +79,7 @@ def test_without_reading_back_a_wrong_channel_gives_wrong_values():
     assert run("", file, faults, seconds=1.2, **more).wrong > 100
 
 
-def test_the_same_seed_gives_the_same_outcome():
-    file, faults, _ = ROWS["random errors, 1.0% of transactions"]
-    first, again, other = (run("", file, faults, seed=s, seconds=1.6) for s in (3, 3, 4))
-    assert first == again
-    assert first.met != other.met
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_no_result_depends_on_what_power_up_leaves_undefined(seed):
+def test_no_result_depends_on_what_power_up_leaves_undefined():
     def frames(seed):
         clock, feels = VirtualClock(), Pattern(CODY)
         buses = fake_buses(CODY, feels, clock, timed=True, seed=seed)
@@ -109,7 +88,7 @@ def test_no_result_depends_on_what_power_up_leaves_undefined(seed):
             skin.readers[0].bus.chips[0x70].channels[1][0x2D].reset()
             return [skin.read().counts for _ in range(8)]
 
-    np.testing.assert_array_equal(frames(0), frames(seed))
+    np.testing.assert_array_equal(frames(0), frames(1))
 
 
 def test_a_frame_that_breaks_off_before_its_last_byte_is_read_again():
@@ -167,38 +146,12 @@ def test_a_chip_whose_frame_cannot_be_read_does_not_run_and_does_not_flap():
     assert len(changes) < 70
 
 
-def test_an_error_during_set_up_leaves_no_taxel_dead():
-    """One register tells that a chip is set up: it must not be believed after half a set-up."""
-    feels = Pattern(CODY)
-    for position in (17, 18, 30):
-        with fake_skin(CODY, feels, timed=True) as skin:
-            for bus in (reader.bus for reader in skin.readers):
-                for chip in bus.chips[0x70].channels[0].values():
-                    chip.reset()
-                bus.inject([Fault(code=errno.ETIMEDOUT, at=[17 + position])])
-            frames = list(Loop(skin, lasts_s=0.6).frames())
-            assert skin.readers[0].bus.script.met == 1
-        assert frames[-1].valid.all()
-        assert sum(feels.wrong(frame) for frame in frames) == 0
-
-
 def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_start():
     clock = VirtualClock()
     refused = [Fault(code=errno.EOPNOTSUPP)]
     buses = fake_buses(CODY, lambda t: QUIET, clock, faults=refused)
     with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
         BusReader(buses[0], CODY.buses[0], [np.zeros(24, np.uint8)] * 12).start()
-
-
-@pytest.mark.parametrize(("code", "sent"), [(errno.EAGAIN, 4), (errno.EIO, 3), (errno.EBUSY, 1)])
-def test_a_reading_is_sent_again_as_often_as_its_error_allows(code, sent):
-    with fake_skin(CODY, lambda t: QUIET) as skin:
-        bus = skin.readers[0].bus
-        skin.read()
-        bus.inject([Fault(code=code, address=0x2D, channel=1, at=range(100))])
-        skin.readers[0]._bring_back = lambda deadline: None
-        skin.read()
-        assert bus.script.met == sent
 
 
 def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):

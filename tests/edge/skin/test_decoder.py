@@ -18,27 +18,24 @@ CODY = skinfile.load(skinfile.shipped("cody"))
 PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 
 
-def test_block_chips_of_each_width_serve_a_whole_skin():
-    for bits in (8, 12, 16):
-        chip = replace(
-            CODY.chips[0], kind=block.KIND, address=0x28, mux=None, channel=None,
-            options={"bits": bits},
-            taxels=tuple(range(384)),
-        )  # fmt: skip
-        file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
-        picture = PICTURE % 100
-        with fake_skin(file, lambda t, p=picture: p) as skin:
-            frame = skin.read()
-        np.testing.assert_array_equal(frame.counts, picture)
-        assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
+def served(taxels, **options):
+    """A microcontroller that serves these taxels."""
+    return replace(
+        CODY.chips[0], kind=block.KIND, address=0x28, mux=None, channel=None, options=options,
+        taxels=tuple(taxels),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_block_chips_of_each_width_serve_a_whole_skin(bits):
+    file = replace(CODY, buses=(BusSpec("mcu", (served(range(384), bits=bits),)),))
+    with fake_skin(file, lambda t: PICTURE % 100) as skin:
+        np.testing.assert_array_equal(skin.read().counts, PICTURE % 100)
+    assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
 
 
 def test_a_microcontroller_that_hangs_is_told_by_its_sequence_number():
-    chip = replace(
-        CODY.chips[0], kind=block.KIND, options={}, address=0x28, mux=None, channel=None,
-        taxels=tuple(range(384)),
-    )  # fmt: skip
-    file = replace(CODY, buses=(BusSpec("mcu", (chip,)),))
+    file = replace(CODY, buses=(BusSpec("mcu", (served(range(384)),)),))
     with fake_skin(file, lambda t: PICTURE) as skin:
         valid = []
         for k in range(100):
@@ -51,15 +48,11 @@ def test_a_microcontroller_that_hangs_is_told_by_its_sequence_number():
 
 def test_chips_of_different_kinds_make_one_skin():
     ad, mpr, mcu = CODY.chips[0], CODY.chips[1], CODY.chips[2:]
-    served = replace(
-        ad, kind=block.KIND, options={}, address=0x28, mux=None, channel=None,
-        taxels=tuple(t for chip in mcu for t in chip.taxels),
-    )  # fmt: skip
     file = replace(
         CODY,
         buses=(
             BusSpec("a", (ad, replace(mpr, kind=mpr121.KIND, options={}, address=0x5B))),
-            BusSpec("b", (served,)),
+            BusSpec("b", (served(t for chip in mcu for t in chip.taxels),)),
         ),
     )
     picture = PICTURE % 400

@@ -37,17 +37,6 @@ def test_a_late_tick_moves_no_other_and_those_gone_by_are_counted():
     assert schedule.periods.longest == pytest.approx(0.025)
 
 
-def test_a_tick_that_is_late_by_less_than_a_period_is_not_left_out():
-    clock = VirtualClock()
-    schedule = Schedule(clock, 0.01)
-    schedule.wait()
-    clock.sleep_until(0.015)
-    assert schedule.wait() == 0.01
-    assert schedule.late_s == pytest.approx(0.005)
-    assert schedule.wait() == 0.02
-    assert schedule.missed == 0
-
-
 def test_percentiles_are_those_of_the_sorted_periods_to_a_bin():
     draw = np.random.default_rng(1).gamma(4.0, 0.0025, 5000)
     periods = Periods()

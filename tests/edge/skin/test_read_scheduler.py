@@ -10,7 +10,7 @@ from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
-from edge.skin.read_scheduler import SELECT_BITS, VERIFY_BITS, ReadScheduler, with_neighbours
+from edge.skin.read_scheduler import ReadScheduler, with_neighbours
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker
@@ -49,20 +49,16 @@ def test_while_nothing_touches_every_chip_comes_in_turn(scheduler):
         assert set.union(*read[k : k + 3]) == set(range(32))
 
 
-def test_chips_near_a_contact_are_read_in_every_frame(scheduler):
-    # Row 3 is the last of its chip: the next chip, one taxel away, belongs to the neighbourhood.
-    frame = touched((3, 4))
-    near = chips_at((3, 4), (4, 4))
+# Row 3 is the last of its chip: the next chip, one taxel away, belongs to the neighbourhood.
+@pytest.mark.parametrize(
+    ("contact", "neighbour"),
+    [pytest.param((3, 4), (4, 4), id="next chip"), pytest.param((8, 0), (8, 23), id="seam")],
+)
+def test_chips_near_a_contact_are_read_in_every_frame(scheduler, contact, neighbour):
+    near = chips_at(contact, neighbour)
     assert len(near) == 2
     for _ in range(20):
-        assert near <= set(scheduler.plan(frame, 200)[0])
-
-
-def test_the_neighbourhood_reaches_across_the_seam(scheduler):
-    near = chips_at((8, 23), (8, 0))
-    assert len(near) == 2
-    for _ in range(5):
-        assert near <= set(scheduler.plan(touched((8, 0)), 200)[0])
+        assert near <= set(scheduler.plan(touched(contact), 200)[0])
 
 
 def test_away_from_the_contact_no_chip_is_forgotten(scheduler):
@@ -87,14 +83,6 @@ def test_a_wire_too_slow_for_one_chip_still_reads_one():
     scheduler = ReadScheduler(slow)
     seen = [scheduler.plan(None)[0] for _ in range(32)]
     assert sorted(i for chips in seen for i in chips) == list(range(32))
-
-
-@pytest.mark.parametrize(
-    ("verify", "bits"), [(False, SELECT_BITS), (True, SELECT_BITS + VERIFY_BITS)]
-)
-def test_reading_a_mux_back_is_paid_for_where_it_is_done(verify, bits):
-    file = replace(ONE, reading=replace(ONE.reading, verify_mux=verify))
-    assert ReadScheduler(file).select_bits == bits
 
 
 def test_every_plan_fits_the_period():

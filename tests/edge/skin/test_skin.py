@@ -62,11 +62,6 @@ def test_the_wire_carries_the_frame_rates_of_the_notes(kind, buses, hz_100, hz_4
         assert abs(rate - hz) <= 0.0501
 
 
-def test_one_bus_of_32_chips_takes_8320_bits_and_160_more_to_verify():
-    assert frame_bits(on_buses(1)) == [8320]
-    assert frame_bits(on_buses(1, verify=True)) == [8480]
-
-
 def test_all_checks_together_cost_at_most_3_percent_of_the_wire():
     frames = 400
     assert sum(frame_bits(CODY, frames)) / frames <= 1.03 * 8320
@@ -82,18 +77,6 @@ def test_every_taxel_is_where_the_file_says(file):
         frame = skin.read()
     assert frame.valid.all()
     np.testing.assert_array_equal(frame.counts, np.where(picture < max(floor, 1), 0, picture))
-
-
-def test_the_sign_is_turned_back():
-    file = replace(
-        CODY,
-        buses=tuple(
-            replace(b, chips=tuple(replace(c, sign=-1) for c in b.chips)) for b in CODY.buses
-        ),
-    )
-    with fake_skin(file, lambda t: PICTURE) as skin:
-        np.testing.assert_array_equal(skin.read().counts, PICTURE)
-        assert skin.raw()[0][3, 5] == 20946 - PICTURE[3, 5]
 
 
 def test_each_bus_has_a_thread_of_its_own():
@@ -163,17 +146,6 @@ def test_what_is_above_the_threshold_touches_and_is_not_followed(above):
         frames = list(Loop(skin, lasts_s=3.0).frames())
     lost = int(frames[0].counts.max()) - int(frames[-1].counts.max())
     assert (lost == 0) == (above == 1)
-
-
-def test_drift_is_not_followed_beyond_its_limit():
-    signal = replace(CODY.signal, drift_limit_counts=10, drift_counts_per_s=1000.0)
-    file = replace(CODY, signal=signal)
-    level = np.full((16, 24), 30, dtype=np.uint16)
-    with fake_skin(file, lambda t: level) as skin:
-        for i in range(300):
-            skin.clock.sleep_until(i * 0.01)
-            frame = skin.read()
-    assert (frame.counts == 20).all()
 
 
 def test_a_skin_without_a_single_chip_says_so():

@@ -124,10 +124,6 @@ def test_a_kind_that_is_unknown_is_named_before_chips_that_are_missing():
         skinfile.parse(text)
 
 
-def test_the_slowest_clock_is_of_1000_hertz():
-    assert skinfile.parse(SMALL.replace("device = 1", "device = 1\nclock_hz = 1000")).buses
-
-
 def test_the_largest_value_of_a_microcontroller_is_that_of_its_bits():
     chip = skinfile.load(skinfile.shipped("matrix")).chips[0]
     assert replace(chip, options={"bits": 12}).highest == 4095

@@ -218,17 +218,19 @@ def test_angles_that_lack_are_interpolated_and_flagged():
     assert feature_vector(never, 1.0, 5, ["joint_change"]).tolist() == [0.0] * 5
 
 
-def test_another_number_of_angles_is_one_sentence():
-    with pytest.raises(InputError, match="has 2 joint angles, the features were measured with 3"):
-        series_of(touch(PEAKS, joints=np.zeros((5, 2))), ["joint_change"], joints=3)
-
-
-@pytest.mark.parametrize("angle", [np.inf, -np.inf, np.nan])
-def test_an_angle_that_is_not_finite_is_one_sentence(angle):
+@pytest.mark.parametrize(
+    ("angle", "joints", "sentence"),
+    [
+        (0.0, 3, "has 2 joint angles, the features were measured with 3"),
+        (np.inf, 2, "angle 1 of a frame's joints is not finite"),
+        (np.nan, 2, "angle 1 of a frame's joints is not finite"),
+    ],
+)
+def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
     angles = np.zeros((5, 2))
     angles[3, 1] = angle
-    with pytest.raises(InputError, match="angle 1 of a frame's joints is not finite"):
-        series_of(touch(PEAKS, joints=angles), ["joint_change"], joints=2)
+    with pytest.raises(InputError, match=sentence):
+        series_of(touch(PEAKS, joints=angles), ["joint_change"], joints=joints)
 
 
 def test_every_nth_frame_of_a_series_has_all_that_was_measured():

@@ -138,12 +138,6 @@ def test_a_threshold_for_each_taxel():
     assert largest_region(counts, threshold).mask.nonzero() == (np.array([2]), np.array([2]))
 
 
-def test_a_region_across_the_seam_has_its_centroid_on_the_seam():
-    counts = frame((3, 22), (3, 23), (3, 0), (3, 1))
-    assert largest_region(counts, 50).centroid == (3.0, 23.5)
-    assert len(find_regions(counts, 50, wraps=False)) == 2
-
-
 @given(hnp.arrays(bool, (5, 9), elements=st.booleans()), st.integers(0, 8))
 def test_turning_the_cylinder_turns_the_centroid(active, turn):
     """Wherever the seam lies, unless two cuts are exactly equal (a full ring)."""

@@ -61,13 +61,6 @@ def test_the_majority():
     assert majority(np.array(["a", "b", "b"])).accuracy == pytest.approx(2 / 3)
 
 
-def test_nested_accuracy_of_labels_by_chance_is_chance():
-    """Choosing among 78 cells on the score that is reported would flatter it."""
-    rng = np.random.default_rng(0)
-    X, y = rng.normal(size=(80, 30)), rng.choice(["a", "b"], 80)
-    assert abs(nested(X, {"t": y}, SearchGrid(), ONE)["t"].accuracy - 0.5) < 0.15
-
-
 def test_nested_accuracy_of_clear_classes_is_one():
     rng = np.random.default_rng(0)
     y = np.repeat(["a", "b", "c"], 20)

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.model.model import Model
 from edge.skin import file as skinfile
-from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from export.__main__ import main as export
 from tests import browser
 from train.__main__ import main as train
 from train.evaluate import Result, SearchGrid
-from train.operating_points import SHIPPED, OperatingPoint, ParetoFront
+from train.operating_points import ParetoFront
 from train.pipeline import Choice
 from train.tradeoff import answer, board, early
 from train.tradeoff.breakaway import breakaway_times
@@ -55,18 +52,6 @@ class TestWires:
         ]
         quarter = SkinLayout(rows=8, cols=12, wraps=True)
         assert "MPR121" in {wire.name.split(",")[0] for wire in wires(quarter)}
-
-
-def series(n):
-    t = np.arange(n) / 100.0
-    counts = np.arange(n)
-    return FeatureSeries(t, counts, counts, np.stack([counts, counts], axis=1), t * 0.1)
-
-
-def test_a_slower_wire_brings_every_nth_frame():
-    thin = series(9).thinned(4)
-    assert thin.t.tolist() == [0.0, 0.04, 0.08]
-    assert thin.peak.tolist() == thin.sums[:, 1].tolist() == [0, 4, 8]
 
 
 def test_what_is_chosen_without_a_fold_is_chosen_by_the_others_alone():
@@ -117,83 +102,6 @@ def test_the_front_is_what_no_other_beats_in_both():
 
 def test_a_point_s_time_is_the_sum_of_its_three_parts():
     assert point(0.2, 1, wire_s=0.01, arithmetic_s=0.001).seconds == pytest.approx(0.211)
-
-
-class TestParetoFront:
-    FRONT = ParetoFront(
-        "category",
-        tuple(
-            OperatingPoint(ms / 1000, ("max_force",), "IV", ms, accuracy)
-            for ms, accuracy in ((200.0, 0.5), (400.0, 0.8), (1200.0, 0.9))
-        ),
-    )
-
-    @pytest.mark.parametrize(
-        ("wanted", "milliseconds"),
-        [
-            ("fast", 200),
-            ("balanced", 400),
-            ("accurate", 1200),
-            ("399", 200),
-            ("5000", 1200),
-            ("0.8", 400),
-            ("0.81", 1200),
-        ],
-    )
-    def test_by_name_by_time_and_by_accuracy(self, wanted, milliseconds):
-        assert self.FRONT.pick(wanted).milliseconds == milliseconds
-
-    @pytest.mark.parametrize(
-        ("wanted", "sentence"),
-        [
-            ("quick", "--front must be fast, balanced, accurate, milliseconds"),
-            ("-3", "--front must be"),
-            ("nan", "--front must be"),
-            ("150", "the fastest point takes 200 ms"),
-            ("0.95", "the most accurate point reaches 0.900"),
-        ],
-    )
-    def test_what_cannot_be_had_is_one_sentence(self, wanted, sentence):
-        with pytest.raises(InputError, match=sentence):
-            self.FRONT.pick(wanted)
-
-    def test_the_shipped_front_rises(self):
-        front = ParetoFront.read(SHIPPED)
-        assert front.task == "category"
-        accuracies = [point.accuracy for point in front.points]
-        assert accuracies == sorted(accuracies)
-        assert len(accuracies) >= 3
-
-    def test_a_file_that_is_no_front_is_one_sentence(self, tmp_path):
-        with pytest.raises(InputError, match="cannot be read"):
-            ParetoFront.read(tmp_path / "none.json")
-        (tmp_path / "front.json").write_text('{"task": "t", "points": []}')
-        with pytest.raises(InputError, match="has no point"):
-            ParetoFront.read(tmp_path / "front.json")
-
-
-def test_export_takes_window_features_and_scaling_of_a_point(recordings, tmp_path, capsys):
-    fronts = {
-        "task": "category",
-        "points": [
-            {
-                "window_s": 0.4,
-                "features": ["max_force", "contact_area"],
-                "scaling": "IV",
-                "milliseconds": 410.0,
-                "accuracy": 0.8,
-            }
-        ],
-    }
-    (tmp_path / "front.json").write_text(json.dumps(fronts))
-    given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1"]
-    assert export([*given, "--front", "fast", "--fronts", str(tmp_path / "front.json")]) == 0
-    info = Model(tmp_path / "model.onnx").info
-    assert info.window_s == 0.4
-    assert info.features == ("max_force", "contact_area")
-    assert info.tasks["category"].scaling == "IV"
-    assert "category 80.0% in 410 ms there" in capsys.readouterr().err
-    assert export([*given, "--front", "0.99", "--fronts", str(tmp_path / "front.json")]) == 2
 
 
 def comparison(right, seconds=(0.2, 0.6, 1.0)):
