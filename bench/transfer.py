@@ -14,7 +14,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import Parallel, cpu_count, delayed
 from tqdm import tqdm
 
 import edge
@@ -22,7 +22,6 @@ from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Tou
 from edge.commands.summary import wilson
 from edge.errors import InputError
 from edge.recording import load, save
-from train.crossval import jobs_here
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
@@ -91,7 +90,7 @@ def make_trials(folder: Path, count: int, seed: int) -> tuple[list[Path], int]:
     folder.mkdir(parents=True, exist_ok=True)
     objects = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
     work = (delayed(_touch_object)(folder, i, numbers, seed) for i, numbers in enumerate(objects))
-    done = Parallel(n_jobs=jobs_here(), return_as="generator")(work)
+    done = Parallel(n_jobs=cpu_count(), return_as="generator")(work)
     made = list(tqdm(done, total=len(objects), unit=" objects", desc="MuJoCo"))
     return [path for paths, _ in made for path in paths], sum(again for _, again in made)
 

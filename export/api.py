@@ -50,24 +50,14 @@ def save(path: str | os.PathLike[str], fitted: Fitted) -> int:
     Raises:
         InputError: the files cannot be written.
     """
-    data = to_onnx(fitted.sequential or fitted.classifier, info_of(fitted))
+    parts = fitted.dataset, fitted.classifier, fitted.chosen, fitted.window_s, fitted.samples
+    info = describe(*parts, fitted.sequential)
+    data = to_onnx(fitted.sequential or fitted.classifier, info)
     target = Path(path)
     with write_whole(target) as file:
         file.write(data)
     golden.write(target.with_name("golden.npz"), Model(target), fitted.dataset, fitted.X)
     return len(data)
-
-
-def info_of(fitted: Fitted) -> ModelInfo:
-    """The metadata of a fitted model."""
-    return describe(
-        fitted.dataset,
-        fitted.classifier,
-        fitted.chosen,
-        fitted.window_s,
-        fitted.samples,
-        fitted.sequential,
-    )
 
 
 def describe(
@@ -219,10 +209,9 @@ def warnings(fitted: Fitted) -> list[str]:
         if any(measures.feature(name).quantity == "joint_angle" for name in names):
             share = told_by_posture(dataset, task)
             lines.append(
-                f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset, before "
-                f"the touch, tell {share:.1%} of the labels by themselves (1-NN, leave-one-out): "
-                "where the arm was, not what it felt; --features without "
-                "posture tells what touch can"
+                f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone give "
+                f"{share:.1%} of the labels (1-NN, leave-one-out): the model may recognise places "
+                "rather than objects; choose --features without posture to measure touch alone"
             )
     longest = max(float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials)
     if fitted.window_s > longest + 1e-9:
@@ -242,9 +231,8 @@ def warnings(fitted: Fitted) -> list[str]:
         equal = told_by_order(rows, classifier.labels_[task])
         if equal:
             lines.append(
-                f"warning: {task}: {equal} trials equal one of another label in all coordinates of "
-                "the model; of equal trials the earlier one counts as nearer, so their order "
-                "decides the label"
+                f"warning: {task}: {equal} trials have the same coordinates as a trial of another "
+                "label; the earlier trial counts as nearer, so their order decides the label"
             )
         projection = classifier.projections_[classifier.spaces_[task]]
         steps, farthest = coarseness(rows, projection.grid_.unit)
@@ -309,7 +297,7 @@ def _files(paths: Sequence[Path]) -> str:
 
 
 def measure(fitted: Fitted) -> list[tuple[float, float]]:
-    """For each candidate, microseconds of a decision with its features here, and kilobytes."""
+    """For each candidate: microseconds of a decision on this machine, and kilobytes."""
     return [_measured(fitted, i) for i in range(len(fitted.candidates))]
 
 

@@ -26,6 +26,7 @@ from tqdm import tqdm
 
 from edge.cli import dispatch
 from edge.commands.bench import machine
+from edge.commands.options import within
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.model import Model
@@ -117,9 +118,7 @@ def prices(dataset: DataSet, task: str, calls: int = CALLS) -> list[dict[str, An
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure and write."""
-    if arguments.calls < 1:
-        raise InputError(f"--calls must be at least 1, not {arguments.calls}")
+    """Measure the times and write them."""
     dataset = load_trials(arguments.data, horizon_s=1.2)
     if len(dataset.trials) < FEWEST:
         raise InputError(f"prices need at least {FEWEST} trials, not {len(dataset.trials)}")
@@ -145,13 +144,15 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--data", nargs="+", required=True, metavar="REC")
     top.add_argument("--out", type=Path, default=Path("build/tradeoff/prices.json"))
-    top.add_argument("--calls", type=int, default=CALLS, help=f"timed calls each ({CALLS})")
+    top.add_argument(
+        "--calls", type=within(int, 1, 1_000_000), default=CALLS, help=f"timed calls each ({CALLS})"
+    )
     top.set_defaults(run=run)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; 0 fine, 2 bad usage or input."""
+    """Run the command; returns 0 for success, 2 for bad usage or input."""
     return dispatch(parser(), argv)
 
 

@@ -7,7 +7,6 @@ number of components serves all k, as votes are accumulated over k.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -62,15 +61,10 @@ def split_neighbours(
     for near, query in zip(rows, queries, strict=True):
         # Sums of squares by the first 1, 2, ... components: exact, as all coordinates are whole.
         squares = np.cumsum((references - query).T ** 2, axis=0)
-        order = _nearest(squares, max_k)
+        order = np.argsort(squares, axis=1, kind="stable")[:, :max_k]
         near[:used] = train[order]
         near[used:] = train[order[-1]] if used else train[:max_k]
     return rows
-
-
-def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(components, k) places of the k smallest of each row, by value and then by place."""
-    return np.argsort(squares, axis=1, kind="stable")[:, :k]
 
 
 def votes_right(
@@ -145,10 +139,7 @@ def leave_one_out(
     y: NDArray[np.str_],
     max_components: int = MAX_COMPONENTS,
     max_k: int = MAX_K,
-    *,
-    scaling: str = "none",
-    features: Sequence[str] = FEATURES,
-    jobs: int = 1,
+    **settings: Any,
 ) -> NDArray[np.float64]:
     """Leave-one-out accuracies (components, k), entry [c - 1, k - 1]; exact under the tie rule.
 
@@ -157,21 +148,7 @@ def leave_one_out(
         y: (n,) labels.
         max_components: principal components tried, from 1.
         max_k: neighbours tried, from 1; at most n - 1.
-        scaling: one of `train.scaling.SCALINGS`, fitted inside each fold.
-        features: names of the feature types, in the order of X.
-        jobs: processes.
+        settings: `scaling`, `features` and `jobs` of `neighbours`.
     """
-    rows = neighbours(
-        X,
-        scaling=scaling,
-        max_components=max_components,
-        max_k=max_k,
-        features=features,
-        jobs=jobs,
-    )
+    rows = neighbours(X, max_components=max_components, max_k=max_k, **settings)
     return accuracies(rows, np.asarray(y))
-
-
-def jobs_here() -> int:
-    """Processes worth starting on this machine."""
-    return os.cpu_count() or 1

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from edge.errors import InputError
-from edge.recording import Recording, find, load
+from edge.files import read_bytes
+from edge.recording import LARGEST_BYTES, Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries
@@ -167,15 +168,6 @@ def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Ch
     return chain
 
 
-def _contents(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-
-
 def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     """Read recordings, each file once.
 
@@ -194,7 +186,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     bad: list[str] = []
     for path in tqdm(paths, desc="reading", unit=" trials", disable=not progress):
         try:
-            contents = _contents(path)
+            contents = read_bytes(path, LARGEST_BYTES)
             recordings.append(load(path, io.BytesIO(contents)))
             digest.update(contents)
         except InputError as error:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -26,7 +27,7 @@ from edge.errors import InputError
 from edge.statistics import wilson
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
-from train.pipeline import Choice, columns_of
+from train.pipeline import Choice, columns_of, types_of
 from train.projection import Spectrum
 from train.scaling import centred_and_scaled, widths_of
 
@@ -209,13 +210,8 @@ def _answers(
             if fitted_for != (grid.scaling, grid.features):
                 fitted_for = grid.scaling, grid.features
                 part = X[:, columns_of(grid.features, features, widths)]
-                taken = [i for i, f in enumerate(features) if f in (grid.features or features)]
-                mean, gain, known = centred_and_scaled(
-                    part[train],
-                    grid.scaling,
-                    [features[i] for i in taken],
-                    [widths[i] for i in taken],
-                )
+                types = types_of(grid.features, features, widths)
+                mean, gain, known = centred_and_scaled(part[train], grid.scaling, *types)
                 spectrum, new = Spectrum(known), (part[test] - mean) * gain
             shared = _neighbours(spectrum, new, None, grid) if grid.projection == "pca" else None
             for task, labels in classes.items():
@@ -240,7 +236,7 @@ def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]
 class AnswerTable:
     """Every candidate's answers to every trial, by fits without that trial.
 
-    `cost`, `allowed` and `margin` of its methods are those of `choose`.
+    The `rule` of its methods is the `cost`, `allowed` and `margin` of `choose`.
 
     Attributes:
         folds: (n,) the fold of each trial.
@@ -258,38 +254,19 @@ class AnswerTable:
         right = self.right[task]
         return np.asarray(right[self.folds, :, np.arange(len(self.folds))].T)
 
-    def chosen(
-        self,
-        task: str,
-        cost: NDArray[np.int64] | None = None,
-        allowed: NDArray[np.int64] | None = None,
-        margin: float = 0.0,
-    ) -> int:
+    def chosen(self, task: str, *rule: Any, **more: Any) -> int:
         """The candidate chosen by all trials."""
-        return choose(self.held_out(task), cost, allowed, margin)
+        return choose(self.held_out(task), *rule, **more)
 
-    def without(
-        self,
-        task: str,
-        fold: int,
-        cost: NDArray[np.int64] | None = None,
-        allowed: NDArray[np.int64] | None = None,
-        margin: float = 0.0,
-    ) -> int:
+    def without(self, task: str, fold: int, *rule: Any, **more: Any) -> int:
         """The candidate chosen without the trials of a fold."""
-        return choose(self.right[task][fold][:, self.folds != fold], cost, allowed, margin)
+        return choose(self.right[task][fold][:, self.folds != fold], *rule, **more)
 
-    def nested(
-        self,
-        task: str,
-        cost: NDArray[np.int64] | None = None,
-        allowed: NDArray[np.int64] | None = None,
-        margin: float = 0.0,
-    ) -> Result:
+    def nested(self, task: str, *rule: Any, **more: Any) -> Result:
         """The accuracy of the choice itself, with the numbers that it most often takes."""
         right, picked = 0, []
         for fold in range(int(self.folds.max()) + 1):
-            candidate = self.without(task, fold, cost, allowed, margin)
+            candidate = self.without(task, fold, *rule, **more)
             right += int(self.right[task][fold][candidate, self.folds == fold].sum())
             picked.append(candidate)
         usual = self.choices[task][int(np.bincount(picked).argmax())]

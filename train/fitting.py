@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from joblib import cpu_count
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
@@ -16,7 +17,6 @@ from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, without_folds
-from train.crossval import jobs_here
 from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
@@ -126,7 +126,7 @@ def fit(
         >>> fitted.chosen["category"].accuracy.accuracy > 0.5
         True
     """
-    jobs = jobs or jobs_here()
+    jobs = jobs or cpu_count()
     if window_s is None and decision_points_s:
         window_s = decision_points_s[-1]
     windows: tuple[float, ...] = (window_s or WINDOW_S,)

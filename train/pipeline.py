@@ -228,9 +228,17 @@ class ContactClassifier:
 def columns_of(
     wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
 ) -> NDArray[np.int64]:
-    """The columns of vectors of `features` that hold the `wanted` ones, rising; all of none."""
+    """The columns of vectors of `features` that hold the `wanted` ones, rising; all if empty."""
     taken = [not wanted or name in wanted for name in features]
     return np.flatnonzero(np.repeat(taken, widths))
+
+
+def types_of(
+    wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
+) -> tuple[list[str], list[int]]:
+    """Names and widths of the `wanted` among the features, in their order; all if empty."""
+    taken = [(f, w) for f, w in zip(features, widths, strict=True) if not wanted or f in wanted]
+    return [name for name, _ in taken], [width for _, width in taken]
 
 
 def projections(
@@ -247,16 +255,14 @@ def projections(
         tasks = [name for name, other in choices.items() if other.space(name) == space]
         if space not in fitted:
             targets = choice.targets or (task,)
-            taken = [
-                i for i, f in enumerate(features) if not choice.features or f in choice.features
-            ]
+            names, own_widths = types_of(choice.features, features, widths)
             fitted[space] = Projection(
                 choice.scaling,
                 max(choices[name].components for name in tasks),
-                [features[i] for i in taken],
+                names,
                 choice.projection,
                 choice.shrinkage,
-                [widths[i] for i in taken],
+                own_widths,
             ).fit(
                 X[:, columns_of(choice.features, features, widths)],
                 np.column_stack([y[target] for target in targets]),

@@ -50,7 +50,14 @@ from threadpoolctl import threadpool_limits
 from edge.errors import InputError
 from edge.model.stopping import TEST_SHARE, Novelty, Stopping, StoppingRule, margin
 from edge.touch.features import FEATURES
-from train.pipeline import Choice, ContactClassifier, columns_of, label_distances, vote
+from train.pipeline import (
+    Choice,
+    ContactClassifier,
+    columns_of,
+    label_distances,
+    types_of,
+    vote,
+)
 from train.scaling import widths_of
 
 FOLDS = 10
@@ -279,8 +286,8 @@ class SequentialClassifier:
         kept = _taken(self.choices.values(), self.features)
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(kept, self.features, widths)
-        own_widths = [w for name, w in zip(self.features, widths, strict=True) if name in kept]
-        self.decision_points_ = _models(X[..., self.columns_], y, self.choices, kept, own_widths)
+        types = types_of(kept, self.features, widths)
+        self.decision_points_ = _models(X[..., self.columns_], y, self.choices, *types)
         self.n_features_in_ = len(self.columns_)
         work = (delayed(self._fold)(X, y, folds == k, chosen[k]) for k in range(count))
         by_fold = Parallel(n_jobs=self.jobs)(work)

@@ -14,11 +14,11 @@ from edge.touch.layout import SkinLayout
 from tests import browser
 from train.__main__ import main as train
 from train.evaluate import Result, SearchGrid
-from train.operating_points import ParetoFront
 from train.pipeline import Choice
 from train.tradeoff import answer, board, early
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.early import Chooser, NestedChoice
+from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import MeasuredPoint
 from train.tradeoff.run import tradeoff
 from train.tradeoff.settings import pareto_front

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from edge.errors import InputError
-from train.operating_points import NAMES, SHIPPED, ParetoFront
+from train.tradeoff.front import NAMES, SHIPPED, ParetoFront
 
 POINTS = [(100, 0.60), (200, 0.80), (900, 0.90)]
 

@@ -10,7 +10,7 @@ from edge.config import json_file
 from edge.errors import InputError
 from train.scaling import SCALINGS
 
-SHIPPED = Path(__file__).with_name("tradeoff") / "front.json"
+SHIPPED = Path(__file__).with_name("front.json")
 """The front of the simulated `cody18`."""
 NAMES = ("fast", "balanced", "accurate")
 
@@ -41,7 +41,7 @@ class ParetoFront:
     Attributes:
         task: whose accuracy it is.
         points: the fastest first, each more accurate than those before it.
-        digest: SHA-256 over the recordings they were measured on; empty where unknown.
+        digest: SHA-256 over the recordings that they were measured on; empty if unknown.
     """
 
     task: str
