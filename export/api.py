@@ -209,9 +209,9 @@ def warnings(fitted: Fitted) -> list[str]:
         if any(measures.feature(name).quantity == "joint_angle" for name in names):
             share = told_by_posture(dataset, task)
             lines.append(
-                f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone give "
-                f"{share:.1%} of the labels (1-NN, leave-one-out): the model may recognise places "
-                "rather than objects; choose --features without posture to measure touch alone"
+                f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
+                f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may recognise "
+                "places rather than objects; --features without posture measures touch alone"
             )
     longest = max(float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials)
     if fitted.window_s > longest + 1e-9:

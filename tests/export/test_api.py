@@ -96,7 +96,7 @@ def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings,
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert told_by_posture(fitted.dataset, "object") == 1.0
     (said,) = [line for line in warnings(fitted) if line.startswith("warning: object")]
-    assert "tell 100.0% of the labels by themselves" in said
+    assert "at onset alone give 100.0% of the labels" in said
 
 
 def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
@@ -118,7 +118,7 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     other = {**touch.labels, "object": "another"}
     save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
-    said = [line for line in warnings(fitted) if "equal one of another label" in line]
+    said = [line for line in warnings(fitted) if "have the same coordinates" in line]
     assert [line.split(" equal")[0] for line in said] == ["warning: object: 3 trials"]
 
 
