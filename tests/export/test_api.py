@@ -119,7 +119,7 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
     said = [line for line in warnings(fitted) if "have the same coordinates" in line]
-    assert [line.split(" equal")[0] for line in said] == ["warning: object: 3 trials"]
+    assert [line.split(" have")[0] for line in said] == ["warning: object: 3 trials"]
 
 
 def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings, tmp_path):
