@@ -104,6 +104,23 @@ def open_arm(arguments: argparse.Namespace) -> Chain | None:
     return None
 
 
+def add_web(parser: argparse.ArgumentParser, more: str) -> None:
+    """Add the option that serves a live page (`edge.runtime.page`).
+
+    Args:
+        parser: of the command.
+        more: ends the option's help.
+    """
+    parser.add_argument(
+        "--web",
+        metavar="HOST:PORT",
+        nargs="?",
+        const="127.0.0.1:8000",
+        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; another "
+        f"machine needs the link that is printed, with its token{more}",
+    )
+
+
 def add_error(parser: argparse.ArgumentParser) -> None:
     """Add the option that asks for an error rate; `check_error` checks it against the model."""
     parser.add_argument(

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from edge.commands.options import add_arm, add_joints, add_skin, open_arm, within
+from edge.commands.options import add_arm, add_joints, add_skin, add_web, open_arm, within
 from edge.commands.output import Output
-from edge.commands.source import bus_events, ending_signals, open_joints, open_skin
+from edge.commands.source import bus_events, ending_signals, open_joints, open_page, open_skin
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
@@ -46,6 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_skin(parser)
     add_joints(parser)
+    add_web(parser, "; labels are given, changed and corrected there, so --label may be left out")
     parser.add_argument(
         "--label",
         action="append",
@@ -170,7 +171,7 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
     labels = dict(arguments.label)
-    if not labels:
+    if not labels and arguments.web is None:
         raise InputError("give --label TASK=LABEL; a trial without a label teaches nothing")
     if len(labels) < len(arguments.label):
         raise InputError("--label names a task twice")
@@ -181,14 +182,17 @@ def run(arguments: argparse.Namespace) -> int:
     dof = arguments.dof if arm is None else arm.dof
     if arguments.joints is not None and dof is None:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
-    if arguments.fake is not None and arguments.joints is not None:
-        arguments.real_time = True  # the source of joint angles goes by the real clock
+    if arguments.fake is not None and (arguments.joints or arguments.web):
+        arguments.real_time = True  # angles, or a person, go by the real clock
     virtual = arguments.fake is not None and not arguments.real_time
     with (
         open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop_on(*ending_signals()) as stop,
         open_joints(arguments, opened, arm, dof) as joints,
+        open_page(
+            arguments, opened, folder=None if single else Path(arguments.out), labels=labels
+        ) as page,
         Lines(
             form=Output.of(arguments).line,
             patient=lambda: virtual and not stop.asked,
@@ -220,7 +224,14 @@ def run(arguments: argparse.Namespace) -> int:
         LOG.info("waiting for a contact")
         for frame in loop.frames():
             lines.write(bus_events(skin, frame.t))
-            recorder.save(trials.push(frame), complete=True)
+            frames = trials.push(frame)
+            if page is not None:
+                recorder.labels = page.labels
+                frames = frames if page.recording else None
+                page.push(frame, (), loop.schedule)
+            saved = recorder.save(frames, complete=True)
+            if page is not None and saved is not None:
+                page.saved(*saved)
             if recorder.saved == wanted:
                 break
         else:
@@ -257,10 +268,10 @@ class Recorder:
     saved: int = 0
     any_joints: bool = False
 
-    def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
-        """Save the frames of a trial, if there is one."""
+    def save(self, frames: list[Frame] | None, *, complete: bool) -> tuple[Path, Recording] | None:
+        """Save the frames of a trial, if there is one; returns its file and what it holds."""
         if frames is None:
-            return
+            return None
         without = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}
         if self.names is not None and without < len(frames):
@@ -290,3 +301,4 @@ class Recorder:
             "complete": complete,
         }
         self.lines.write([event])
+        return path, trial

@@ -14,14 +14,15 @@ from contextlib import ExitStack
 from typing import Any
 
 from edge.classifier import Classifier
-from edge.commands.options import add_error, add_joints, add_skin, check_error
-from edge.commands.output import Output
+from edge.commands.options import add_error, add_joints, add_skin, add_web, check_error
+from edge.commands.output import Output, event_text
 from edge.commands.source import (
     bus_events,
     check_joints,
     chip_event,
     ending_signals,
     open_joints,
+    open_page,
     open_skin,
 )
 from edge.model.model import Model
@@ -53,6 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         help="also send each event to this address, as a datagram of one JSON line",
     )
+    add_web(parser, "")
     parser.add_argument(
         "--map",
         metavar="FILE",
@@ -77,6 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, decide and print until the recording ends, or the user or systemd stops it."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
+    arguments.real_time |= arguments.web is not None and arguments.fake is not None
     chain, dof = model.info.chain, model.info.dof
     with ExitStack() as stack:
         notifier = stack.enter_context(Notifier(now=time.monotonic))
@@ -105,6 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
         touch_map = None if arguments.map is None else map_writer(arguments.map, model.info)
         if touch_map is not None:
             lines.add(touch_map)
+        page = stack.enter_context(open_page(arguments, opened))
         poses = None if dof is None else joints
         loop = Loop(skin, joints=poses, lasts_s=opened.lasts_s, stop=stop)
 
@@ -121,9 +125,14 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames += 1
             notifier.alive()
-            emit(bus_events(skin, frame.t))
-            emit([chip_event(status, t=frame.t) for status in skin.changes()])
-            emit([event.to_dict() for event in classifier.push(frame)])
+            faults = bus_events(skin, frame.t)
+            faults += [chip_event(status, t=frame.t) for status in skin.changes()]
+            decided = classifier.push(frame)
+            emit([*faults, *(event.to_dict() for event in decided)])
+            if page is not None:
+                for fault in faults:
+                    page.notice(event_text(fault).strip())
+                page.push(frame, decided, loop.schedule)
         notifier.stopping()
         emit([event.to_dict() for event in classifier.finish()])
         emit([end_event(loop.schedule, frames, lines.lost)])

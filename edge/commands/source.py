@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from edge.errors import InputError
 from edge.fake.clock import PacedClock, VirtualClock
@@ -22,6 +22,9 @@ from edge.skin.loop import JointSource
 from edge.skin.skin import ChipStatus, Skin
 from edge.touch.arm import Chain
 from edge.touch.layout import for_device
+
+if TYPE_CHECKING:
+    from edge.runtime.page import Page
 
 LOG = logging.getLogger(__name__)
 
@@ -51,6 +54,23 @@ def bus_events(skin: Skin, t: float) -> list[dict[str, Any]]:
         {"event": "bus", "t": t, "bus": name, "state": "lost" if lost else "back"}
         for name, lost in skin.bus_changes()
     ]
+
+
+@contextmanager
+def open_page(arguments: argparse.Namespace, opened: Opened, **more: Any) -> Iterator[Page | None]:
+    """The live page that `--web` asks for, or None; see `edge.runtime.page.Page`.
+
+    Raises:
+        InputError: the address cannot be used.
+    """
+    if arguments.web is None:
+        yield None
+        return
+    from edge.runtime.page import Page  # a skin without a page needs no web server
+
+    with Page(arguments.web, opened.skin.layout, title=opened.source, **more) as page:
+        LOG.info(f"open {page.server.link} in a browser")
+        yield page
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
-"""Show the skin live in a terminal.
+"""Show the skin live in a terminal or on a web page.
 
 Draws the skin and, with --model, the latest decisions. Taxels in contact are red to white by force,
 those below the contact threshold grey, and those that cannot be read blue. Each line shows two rows
-of taxels, with row 0 at the top. q or Ctrl-C quits.
+of taxels, with row 0 at the top. q or Ctrl-C quits. With --web, a page for a browser shows the
+same, with the features of each contact over time.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from contextlib import contextmanager, suppress
 
 from edge.classifier import Classifier
 from edge.commands import terminal
-from edge.commands.options import add_joints, add_skin, within
-from edge.commands.source import check_joints, ending_signals, open_joints, open_skin
+from edge.commands.options import add_joints, add_skin, add_web, within
+from edge.commands.source import check_joints, ending_signals, open_joints, open_page, open_skin
 from edge.errors import printable
 from edge.events import Decided, Onset
 from edge.model.model import Model
@@ -44,6 +45,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=RATE_HZ,
         help="pictures per second (default: %(default)s)",
     )
+    add_web(parser, " (in place of the terminal)")
     add_skin(parser)
     add_joints(parser)
 
@@ -102,7 +104,9 @@ def run(arguments: argparse.Namespace) -> int:
     chain = None if model is None else model.info.chain
     dof = None if model is None else model.info.dof
     with (
-        open_skin(arguments, paced=sys.stdout.isatty(), arm=chain) as opened,
+        open_skin(
+            arguments, paced=sys.stdout.isatty() or arguments.web is not None, arm=chain
+        ) as opened,
         stop_on(*ending_signals()) as stop,
     ):
         if model is not None:
@@ -110,7 +114,14 @@ def run(arguments: argparse.Namespace) -> int:
         with open_joints(arguments, opened, chain, dof) as joints, quit_on_q(stop) as look:
             poses = None if dof is None else joints
             loop = Loop(opened.skin, joints=poses, lasts_s=opened.lasts_s, stop=stop)
-            _show(opened.skin, model, loop, 1.0 / arguments.rate, look)
+            with open_page(arguments, opened) as page:
+                if page is None:
+                    _show(opened.skin, model, loop, 1.0 / arguments.rate, look)
+                    return 0
+                classifier = None if model is None else Classifier(model, opened.skin.layout)
+                for frame in loop.frames():
+                    events = () if classifier is None else classifier.push(frame)
+                    page.push(frame, events, loop.schedule)
     return 0
 
 

@@ -1,0 +1,267 @@
+"use strict";
+
+// The page of one skin. Pictures come as server-sent events; actions go back as small JSON objects.
+// Text is only ever set as text, so that no label can become a part of the page.
+
+const $ = (id) => document.getElementById(id);
+const query = location.search;
+let latest = null;
+let shownTrials = "";
+
+function element(tag, text, className) {
+  const node = document.createElement(tag);
+  if (text !== undefined) node.textContent = text;
+  if (className) node.className = className;
+  return node;
+}
+
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+function canvas(id, height) {
+  const node = $(id);
+  const ratio = devicePixelRatio || 1;
+  const width = node.clientWidth;
+  if (height) node.style.height = height + "px";
+  const tall = height || node.clientHeight;
+  if (node.width !== Math.round(width * ratio) || node.height !== Math.round(tall * ratio)) {
+    node.width = Math.round(width * ratio);
+    node.height = Math.round(tall * ratio);
+  }
+  const pen = node.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, tall);
+  return [pen, width, tall];
+}
+
+// Dark red over orange to pale yellow: brightness alone tells the force.
+function heat(part) {
+  const stops = [[139, 0, 0], [255, 140, 0], [255, 233, 168]];
+  const at = Math.min(Math.max(part, 0), 1) * (stops.length - 1);
+  const low = Math.min(Math.floor(at), stops.length - 2);
+  const mixed = stops[low].map((value, i) => Math.round(value + (at - low) * (stops[low + 1][i] - value)));
+  return `rgb(${mixed.join(",")})`;
+}
+
+function drawSkin(picture) {
+  const { rows, cols, counts, threshold, scale } = picture;
+  const width = $("skin").clientWidth;
+  const side = Math.max(4, Math.min(width / cols, 420 / rows));
+  const [pen] = canvas("skin", Math.ceil(side * rows));
+  const left = (width - side * cols) / 2;
+  const touched = new Set(picture.contact ? picture.contact.taxels : []);
+  const invalid = new Set(picture.invalid);
+  const dead = new Set(picture.dead);
+  const floor = Math.max(threshold, 1);
+  const full = Math.log(Math.max(scale > 1 ? 17 * scale : 50 * floor, floor + 2) / floor);
+  const rest = [colour("--rest-low"), colour("--rest-high")];
+  for (let i = 0; i < counts.length; i++) {
+    const x = left + (i % cols) * side;
+    const y = Math.floor(i / cols) * side;
+    const count = counts[i];
+    if (dead.has(i)) pen.fillStyle = colour("--dead");
+    else if (invalid.has(i)) pen.fillStyle = colour("--invalid");
+    else if (count > threshold) pen.fillStyle = heat(Math.log(count / floor) / full);
+    else pen.fillStyle = count * 2 > threshold ? rest[1] : rest[0];
+    pen.fillRect(x + 0.5, y + 0.5, side - 1, side - 1);
+    if (dead.has(i)) {
+      pen.strokeStyle = colour("--line");
+      pen.beginPath();
+      pen.moveTo(x + 1, y + side - 1);
+      pen.lineTo(x + side - 1, y + 1);
+      pen.stroke();
+    }
+  }
+  pen.strokeStyle = colour("--edge");
+  pen.lineWidth = 2;
+  pen.beginPath();
+  for (const i of touched) {
+    const row = Math.floor(i / cols), col = i % cols;
+    const x = left + col * side, y = row * side;
+    if (!touched.has(i - cols)) { pen.moveTo(x, y); pen.lineTo(x + side, y); }
+    if (!touched.has(i + cols)) { pen.moveTo(x, y + side); pen.lineTo(x + side, y + side); }
+    if (col === 0 || !touched.has(i - 1)) { pen.moveTo(x, y); pen.lineTo(x, y + side); }
+    if (col === cols - 1 || !touched.has(i + 1)) { pen.moveTo(x + side, y); pen.lineTo(x + side, y + side); }
+  }
+  pen.stroke();
+  $("seam").textContent = "Rows run down, from elbow to wrist." +
+    (picture.wraps ? " The last column touches the first." : "");
+}
+
+function drawCurve(id, name, unit, t, values) {
+  const [pen, width, height] = canvas(id);
+  const known = values.filter((value) => value !== null);
+  const most = Math.max(...known, 0);
+  const end = Math.max(1.2, t.length ? t[t.length - 1] : 0);
+  const left = 8, right = width - 8, top = 24, bottom = height - 18;
+  pen.font = "13px system-ui, sans-serif";
+  pen.fillStyle = colour("--text");
+  pen.fillText(`${name}, ${unit}`, left, 14);
+  const now = known.length ? known[known.length - 1] : 0;
+  pen.textAlign = "right";
+  pen.fillText(`${shortNumber(now)} now, ${shortNumber(most)} at most`, right, 14);
+  pen.fillStyle = colour("--quiet");
+  pen.fillText(`${end.toFixed(1)} s from onset`, right, height - 4);
+  pen.textAlign = "left";
+  pen.fillText("0 s", left, height - 4);
+  pen.strokeStyle = colour("--line");
+  pen.lineWidth = 1;
+  pen.strokeRect(left, top, right - left, bottom - top);
+  pen.strokeStyle = colour("--curve");
+  pen.lineWidth = 2;
+  pen.beginPath();
+  let begun = false;
+  values.forEach((value, i) => {
+    if (value === null) { begun = false; return; }
+    const x = left + (t[i] / end) * (right - left);
+    const y = bottom - (most > 0 ? value / most : 0) * (bottom - top);
+    if (begun) pen.lineTo(x, y); else pen.moveTo(x, y);
+    begun = true;
+  });
+  pen.stroke();
+}
+
+function shortNumber(value) {
+  return Number(value.toPrecision(3)).toString();
+}
+
+function drawContact(picture) {
+  const contact = picture.contact;
+  const seconds = contact && contact.t.length ? contact.t[contact.t.length - 1] : 0;
+  $("contact").textContent = !contact ? "No contact yet."
+    : contact.ended ? `The last contact ended after ${seconds.toFixed(2)} s.`
+    : `In contact for ${seconds.toFixed(2)} s.`;
+  const t = contact ? contact.t : [];
+  drawCurve("force", "largest force", picture.units.force, t, contact ? contact.force : []);
+  drawCurve("area", "area", "taxels", t, contact ? contact.area : []);
+  drawCurve("motion", "motion on the skin", picture.units.motion, t, contact ? contact.motion : []);
+}
+
+function drawDecisions(picture) {
+  const box = $("decisions");
+  if (!picture.decisions.length) {
+    box.replaceChildren(element("p", picture.contact && !picture.contact.ended
+      ? "Waiting for the window to end." : "No decision yet."));
+    return;
+  }
+  box.replaceChildren(...picture.decisions.map((decision) => {
+    const item = element("div", undefined, "decision");
+    item.append(element("div", `${decision.task}, after ${decision.window_s} s`, "task"));
+    item.append(element("strong", decision.label === null ? "out of range" : decision.label));
+    item.append(document.createTextNode(` ${Math.round(100 * decision.confidence)} %`));
+    const meter = element("meter");
+    meter.value = decision.confidence;
+    item.append(meter);
+    for (const flag of decision.flags) item.append(element("span", flag, "flag"));
+    if (decision.neighbours.length) {
+      const near = decision.neighbours.map((n) => `${n.name || "trial " + n.row} (${n.distance})`);
+      item.append(element("div", "nearest: " + near.join(", "), "near"));
+    }
+    return item;
+  }));
+}
+
+async function act(action) {
+  const answer = await fetch("action" + query, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(action),
+  }).catch(() => null);
+  const failed = !answer || !answer.ok;
+  $("error").hidden = !failed;
+  if (failed) $("error").textContent = (answer && await answer.text()) || "The program did not answer.";
+  return !failed;
+}
+
+function labelRow(task, label) {
+  const row = element("div", undefined, "label-row");
+  const inputs = [["task", task], ["label", label]].map(([name, value]) => {
+    const input = element("input");
+    input.placeholder = name;
+    input.setAttribute("aria-label", name);
+    input.value = value;
+    input.maxLength = 80;
+    return input;
+  });
+  const remove = element("button", "−");
+  remove.type = "button";
+  remove.setAttribute("aria-label", "remove this task");
+  remove.onclick = () => row.remove();
+  row.append(...inputs, remove);
+  $("label-rows").append(row);
+}
+
+function formLabels() {
+  const labels = {};
+  for (const row of $("label-rows").children) {
+    const [task, label] = row.querySelectorAll("input");
+    if (task.value.trim()) labels[task.value.trim()] = label.value.trim();
+  }
+  return labels;
+}
+
+function labelText(labels) {
+  return Object.entries(labels).map(([task, label]) => `${task}=${label}`).join(", ");
+}
+
+function drawRecord(picture) {
+  $("record-part").hidden = picture.folder === null;
+  if (picture.folder === null) return;
+  if (!$("label-rows").children.length) {
+    const labels = Object.entries(picture.labels);
+    for (const [task, label] of labels.length ? labels : [["object", ""]]) labelRow(task, label);
+  }
+  $("record").setAttribute("aria-pressed", picture.recording);
+  $("record").textContent = picture.recording ? "Stop recording" : "Record";
+  const what = labelText(picture.labels) || "no labels yet";
+  const count = picture.trials.length;
+  $("recording").textContent = (picture.recording ? `Each contact is saved with ${what}`
+    : `Contacts are not saved (${what})`) + `; ${count} ${count === 1 ? "trial" : "trials"} in ${picture.folder}.`;
+  const text = JSON.stringify(picture.trials);
+  if (text === shownTrials) return;
+  shownTrials = text;
+  $("trials").replaceChildren(...picture.trials.slice().reverse().map((trial) => {
+    const row = element("tr");
+    const buttons = element("td");
+    const relabel = element("button", "Relabel");
+    relabel.title = "Give this trial the labels of the form above";
+    relabel.onclick = () => act({ do: "relabel", file: trial.file, labels: formLabels() });
+    const remove = element("button", "Delete");
+    remove.onclick = () => confirm(`Delete ${trial.file}?`) && act({ do: "delete", file: trial.file });
+    buttons.append(relabel, " ", remove);
+    row.append(element("td", trial.file), element("td", labelText(trial.labels)),
+      element("td", trial.seconds.toFixed(2)), buttons);
+    return row;
+  }));
+}
+
+function draw(picture) {
+  latest = picture;
+  $("title").textContent = picture.title;
+  document.title = picture.title;
+  $("state").className = "";
+  const rate = picture.rate_hz ? `${picture.rate_hz} frames/s, ${picture.missed} missed, ` : "";
+  $("state").textContent = `${rate}${picture.invalid.length} of ${picture.counts.length} taxels cannot be read`;
+  drawSkin(picture);
+  drawContact(picture);
+  drawDecisions(picture);
+  drawRecord(picture);
+  $("notice-part").hidden = !picture.notices.length;
+  $("notices").replaceChildren(...picture.notices.map((text) => element("li", text)));
+}
+
+$("more").onclick = () => labelRow("", "");
+$("labels").onsubmit = (event) => { event.preventDefault(); act({ do: "labels", labels: formLabels() }); };
+$("record").onclick = async () => {
+  const on = !(latest && latest.recording);
+  if (!on || await act({ do: "labels", labels: formLabels() })) act({ do: "record", on });
+};
+addEventListener("resize", () => latest && draw(latest));
+
+const pictures = new EventSource("pictures" + query);
+pictures.onmessage = (event) => draw(JSON.parse(event.data));
+pictures.onerror = () => {
+  $("state").className = "lost";
+  $("state").textContent = "The program does not answer; trying again.";
+};

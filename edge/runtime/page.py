@@ -1,0 +1,227 @@
+"""The live page of a skin: what it shows, and what a person can do there."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from edge.errors import InputError
+from edge.events import Decided, Event, Onset
+from edge.recording import Recording, load, save
+from edge.runtime.web import WebServer
+from edge.skin.loop import Schedule
+from edge.touch.contact import Contact
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.track import ContactTracker
+
+PICTURE_S = 0.1
+"""Between two pictures."""
+LAST_TRIALS, LAST_NOTICES = 200, 8
+CURVE_S, CURVE_POINTS = 5.0, 100
+"""Of a contact, the page draws so many seconds from its onset, at so many times at most."""
+MOST_LABELS, LONGEST_LABEL = 16, 80
+
+
+class Page:
+    """The pictures and the actions of a live page.
+
+    Attributes:
+        server: serves the page; `server.link` opens it.
+        labels: {task: label} of the trials that are recorded next.
+        recording: whether contacts are to be saved.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        layout: SkinLayout,
+        *,
+        title: str,
+        folder: Path | None = None,
+        labels: dict[str, str] | None = None,
+    ) -> None:
+        """Serve a page.
+
+        Args:
+            address: HOST:PORT, as `WebServer` takes it.
+            layout: the skin, with its thresholds.
+            title: names the skin.
+            folder: of the trials that are recorded; None if none are.
+            labels: of the first trials; without any, recording waits for a person to give some.
+
+        Raises:
+            InputError: the address cannot be used, or a trial in the folder cannot be read.
+        """
+        self._layout, self._folder = layout, folder
+        self.labels = dict(labels or {})
+        self.recording = bool(self.labels)
+        self._trials: dict[str, dict[str, Any]] = {}
+        for path in sorted(folder.glob("*.npz"))[-LAST_TRIALS:] if folder is not None else ():
+            self._trials[path.name] = _trial(load(path))
+        self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
+        self._contact: Contact | None = None
+        self._decisions: dict[str, dict[str, Any]] = {}
+        self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
+        self._due = -float("inf")
+        scale = layout.counts_per_newton or 1.0
+        self._fixed = {
+            "title": title,
+            "rows": layout.rows,
+            "cols": layout.cols,
+            "wraps": layout.wraps,
+            "dead": list(layout.dead),
+            "threshold": layout.threshold_counts,
+            "scale": scale,
+            "units": {"force": layout.force_unit, "motion": layout.length_unit},
+            "folder": None if folder is None else str(folder),
+        }
+        self.server = WebServer(address, self._act)
+
+    def push(
+        self, frame: Frame, events: Sequence[Event] = (), schedule: Schedule | None = None
+    ) -> None:
+        """Take in a frame and the events that came with it; now and then, show a picture."""
+        for event in events:
+            if isinstance(event, Onset):
+                self._decisions = {}
+            elif isinstance(event, Decided):
+                self._decisions[event.task] = _decision(event)
+        if not self.server.watched:
+            return
+        self._contact = next(iter(self._tracker.push(frame)), self._contact)
+        if frame.t < self._due:
+            return
+        self._due = frame.t + PICTURE_S
+        picture = {
+            **self._fixed,
+            "t": frame.t,
+            "counts": frame.counts.ravel().tolist(),
+            "invalid": [] if frame.valid is None else (~frame.valid).ravel().nonzero()[0].tolist(),
+            "contact": self._curves(),
+            "decisions": list(self._decisions.values()),
+            "labels": dict(self.labels),
+            "recording": self.recording,
+            "trials": [{"file": name, **trial} for name, trial in list(self._trials.items())],
+            "notices": list(self._notices),
+        }
+        if schedule is not None:
+            picture["missed"] = schedule.missed
+            picture["rate_hz"] = round(1.0 / schedule.periods.percentile(50), 1)
+        self.server.show(picture)
+
+    def notice(self, text: str) -> None:
+        """Show a sentence, such as the state of a chip."""
+        self._notices.append(text)
+
+    def saved(self, path: Path, trial: Recording) -> None:
+        """Add a trial that has been recorded."""
+        self._trials[path.name] = _trial(trial)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self.server.close()
+
+    def __enter__(self) -> Page:
+        """The page itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop serving."""
+        self.close()
+
+    def _curves(self) -> dict[str, Any] | None:
+        """The last contact: its taxels, and its features since onset."""
+        contact = self._contact
+        if contact is None or contact.region is None:
+            return None
+        series = contact.series()
+        series = series.thinned(max(1, -(-series.t.size // CURVE_POINTS)))
+        ended = contact.ended
+        return {
+            "ended": ended,
+            "taxels": [] if ended else contact.region.mask.ravel().nonzero()[0].tolist(),
+            "t": series.t.round(4).tolist(),
+            "force": (series.peak / (self._layout.counts_per_newton or 1.0)).round(4).tolist(),
+            "area": series.area.tolist(),
+            "motion": [None if value != value else round(value, 5) for value in series.motion],
+        }
+
+    def _act(self, action: dict[str, Any]) -> None:
+        """Carry out an action of the page.
+
+        Raises:
+            InputError: it is none, it is not possible here, or a trial cannot be read.
+        """
+        kind = action.get("do")
+        if self._folder is None:
+            raise InputError("this page records nothing; start it with `record --web`")
+        if kind == "labels":
+            self.labels = _labels(action)
+        elif kind == "record":
+            if action.get("on") and not self.labels:
+                raise InputError("give a label first; a trial without one teaches nothing")
+            self.recording = bool(action.get("on"))
+        elif kind in ("relabel", "delete"):
+            name = action.get("file")
+            if not isinstance(name, str) or name not in self._trials:
+                raise InputError(f"{name!r} is none of the trials that this page shows")
+            path = self._folder / name
+            if kind == "delete":
+                path.unlink(missing_ok=True)
+                del self._trials[name]
+                return
+            labels = _labels(action)
+            trial = load(path)
+            save(path, replace(trial, meta={**trial.meta, "labels": labels}))
+            self._trials[name] = {**self._trials[name], "labels": labels}
+        else:
+            raise InputError(f"{kind!r} is no action")
+
+
+def _trial(trial: Recording) -> dict[str, Any]:
+    """A trial's row in the table of the page."""
+    return {"labels": dict(trial.labels), "seconds": round(float(trial.t[-1] - trial.t[0]), 2)}
+
+
+def _decision(event: Decided) -> dict[str, Any]:
+    """A decision for the page, with the nearest training trials."""
+    line = event.to_dict()
+    nearest = event.decision
+    return {
+        **{key: line[key] for key in ("task", "label", "confidence", "flags", "window_s")},
+        "neighbours": []
+        if nearest is None
+        else [
+            {"row": row, "distance": round(distance, 3)}
+            for row, distance in zip(
+                nearest.neighbours.tolist(), nearest.distances.tolist(), strict=True
+            )
+        ],
+    }
+
+
+def _labels(action: dict[str, Any]) -> dict[str, str]:
+    """The labels of an action.
+
+    Raises:
+        InputError: they are not names with names.
+    """
+    labels = action.get("labels")
+    if not isinstance(labels, dict) or not 1 <= len(labels) <= MOST_LABELS:
+        raise InputError(f"give 1 to {MOST_LABELS} labels, each as TASK=LABEL")
+    out = {}
+    for task, label in labels.items():
+        if not isinstance(label, str):
+            raise InputError(f"the label of {task} must be text")
+        task, label = task.strip(), label.strip()
+        for text in (task, label):
+            if not (0 < len(text) <= LONGEST_LABEL and text.isprintable()):
+                raise InputError(
+                    f"a task and a label must be 1 to {LONGEST_LABEL} printable characters"
+                )
+        out[task] = label
+    return out

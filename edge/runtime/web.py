@@ -1,0 +1,289 @@
+"""A small web server for one live page: pictures go out as server-sent events, actions come in.
+
+It is made for a loop that must not be late. The loop leaves its latest picture with `show`, which
+never waits for a browser. A browser that reads slowly misses pictures, and one that stops reading
+is dropped. Actions are carried out in the thread of their request.
+"""
+
+from __future__ import annotations
+
+import hmac
+import json
+import secrets
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from http import HTTPStatus
+from http.cookies import SimpleCookie
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import resources
+from ipaddress import ip_address
+from socket import AF_INET6, SO_SNDBUF, SOL_SOCKET, socket
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from edge.errors import EdgeError, InputError
+
+FILES = {
+    "/": ("page.html", "text/html; charset=utf-8"),
+    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/page.css": ("page.css", "text/css; charset=utf-8"),
+}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
+    "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+MOST_CLIENTS = 12
+"""Connections served at once; a further one is closed."""
+SLOW_S = 2.0
+"""A browser that takes or sends no bytes for so long is dropped."""
+IDLE_S = 1.0
+"""After so long without a picture, a comment shows whether the browser still reads."""
+LARGEST_ACTION = 4096
+BUFFERED = 32768
+"""Bytes that the kernel keeps for a browser: few, so that a slow one shows no old pictures."""
+COOKIE = "edge_classify"
+
+
+class WebServer:
+    """The server of a page, in threads of its own.
+
+    Attributes:
+        link: the address to open in a browser, with the token where one is needed.
+    """
+
+    def __init__(self, address: str, act: Callable[[dict[str, Any]], None]) -> None:
+        """Listen at an address.
+
+        Args:
+            address: HOST:PORT; port 0 takes a free one. A host that is not of the loopback
+                interface needs a token, which the link carries.
+            act: carries out an action of the page, one at a time; its `EdgeError` is shown there.
+
+        Raises:
+            InputError: the address is not of that form, or cannot be listened at.
+        """
+        host, colon, port = address.rpartition(":")
+        host = host.strip("[]")
+        if not (colon and port.isdecimal() and int(port) < 65536):
+            raise InputError(f"--web {address}: give HOST:PORT, for example 127.0.0.1:8000")
+        loopback = host == "localhost" or _is_loopback(host)
+        self.token = "" if loopback else secrets.token_urlsafe(16)
+        try:
+            self._http = _Http((host, int(port)), self)
+        except (OSError, UnicodeError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"--web {address}: cannot be listened at: {reason}") from None
+        self.port = self._http.server_address[1]
+        shown = f"[{host}]" if ":" in host else host
+        self.link = f"http://{shown}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+        self._hosts = {f"{shown}:{self.port}"}
+        if loopback:
+            self._hosts |= {f"{name}:{self.port}" for name in ("localhost", "127.0.0.1", "[::1]")}
+        self.changed = threading.Condition()
+        self.closed = False
+        self._picture: Mapping[str, Any] = {}
+        self._version, self._encoded, self._text = 0, -1, b""
+        self._act, self._acting = act, threading.Lock()
+        self._streams = 0
+        folder = resources.files("edge") / "pages"
+        self.files = {
+            path: (kind, (folder / name).read_bytes()) for path, (name, kind) in FILES.items()
+        }
+        threading.Thread(target=self._http.serve_forever, args=(0.1,), daemon=True).start()
+
+    @property
+    def watched(self) -> bool:
+        """Whether a browser shows the page, so that a picture is worth making."""
+        return self._streams > 0
+
+    def show(self, picture: Mapping[str, Any]) -> None:
+        """Leave a picture, which must not change afterwards, for the browsers."""
+        with self.changed:
+            self._picture = picture
+            self._version += 1
+            self.changed.notify_all()
+
+    def close(self) -> None:
+        """Stop serving; more than once is fine."""
+        if self.closed:
+            return
+        with self.changed:
+            self.closed = True
+            self.changed.notify_all()
+        self._http.shutdown()
+        self._http.server_close()
+
+    def __enter__(self) -> WebServer:
+        """The server itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop serving."""
+        self.close()
+
+    def next_picture(self, seen: int) -> tuple[int, bytes]:
+        """The number and the event of the first picture after `seen`; a comment if none comes."""
+        with self.changed:
+            self.changed.wait_for(lambda: self.closed or self._version > seen, IDLE_S)
+            if self._version == seen:
+                return seen, b": still here\n\n"
+            if self._encoded != self._version:
+                text = json.dumps(self._picture, allow_nan=False, separators=(",", ":"))
+                self._encoded, self._text = self._version, f"data: {text}\n\n".encode()
+            return self._version, self._text
+
+    def act(self, action: dict[str, Any]) -> None:
+        """Carry out an action.
+
+        Raises:
+            EdgeError: it cannot be carried out.
+        """
+        with self._acting:
+            self._act(action)
+
+    @contextmanager
+    def stream(self) -> Iterator[None]:
+        """Count a browser that shows the page during the block."""
+        with self.changed:
+            self._streams += 1
+        try:
+            yield
+        finally:
+            with self.changed:
+                self._streams -= 1
+
+    def refusal(self, request: BaseHTTPRequestHandler) -> HTTPStatus | None:
+        """Why a request is not answered, or None if it may be.
+
+        The host must be the one that the link names, so that no other site's name can lead here; an
+        action must come from the page itself; and where there is a token, link or cookie has it.
+        """
+        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        named = host in self._hosts or (self.token and host.rpartition(":")[0] not in ("", "*"))
+        if not named or (origin is not None and origin != f"http://{host}"):
+            return HTTPStatus.FORBIDDEN
+        if request.command == "POST" and origin is None:
+            return HTTPStatus.FORBIDDEN
+        if self.token and not hmac.compare_digest(_token(request), self.token):
+            return HTTPStatus.UNAUTHORIZED
+        return None
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _token(request: BaseHTTPRequestHandler) -> str:
+    """The token of a request: that of its link, or else that of its cookie."""
+    query = parse_qs(urlsplit(request.path).query)
+    if "token" in query:
+        return query["token"][0].encode("ascii", "replace").decode()
+    cookie = SimpleCookie(request.headers.get("Cookie", ""))
+    return cookie[COOKIE].value if COOKIE in cookie else ""
+
+
+class _Http(ThreadingHTTPServer):
+    """The listening socket, with a bounded number of threads."""
+
+    daemon_threads = True
+
+    def __init__(self, address: tuple[str, int], page: WebServer) -> None:
+        self.page = page
+        self._places = threading.BoundedSemaphore(MOST_CLIENTS)
+        if ":" in address[0]:
+            self.address_family = AF_INET6
+        super().__init__(address, _Handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        if self._places.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._places.release()
+
+    def handle_error(self, request: socket | tuple[bytes, socket], client_address: Any) -> None:
+        """Say nothing of a browser that went away."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One request of a browser."""
+
+    server: _Http
+    timeout = SLOW_S
+    server_version, sys_version = "edge-classify", ""
+
+    def do_GET(self) -> None:
+        """Serve the page, its files, or its pictures."""
+        page, path = self.server.page, urlsplit(self.path).path
+        refused = page.refusal(self)
+        if refused is None and path == "/pictures":
+            self._stream(page)
+        elif refused is None and path in page.files:
+            kind, contents = page.files[path]
+            more = {"Content-Type": kind}
+            if page.token:
+                more["Set-Cookie"] = f"{COOKIE}={page.token}; HttpOnly; SameSite=Strict"
+            self._answer(HTTPStatus.OK, contents, more)
+        else:
+            self._answer(refused or HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        """Take an action."""
+        page, length = self.server.page, self.headers.get("Content-Length", "")
+        refused = page.refusal(self)
+        json_text = self.headers.get_content_type() == "application/json"
+        small = length.isdecimal() and int(length) <= LARGEST_ACTION
+        if refused is not None or urlsplit(self.path).path != "/action":
+            return self._answer(refused or HTTPStatus.NOT_FOUND)
+        if not (json_text and small):
+            return self._answer(HTTPStatus.BAD_REQUEST)
+        try:
+            action = json.loads(self.rfile.read(int(length)))
+            if not isinstance(action, dict):
+                raise InputError("an action is an object")
+            page.act(action)
+        except (ValueError, RecursionError, EdgeError) as error:
+            return self._answer(HTTPStatus.BAD_REQUEST, str(error).encode())
+        return self._answer(HTTPStatus.NO_CONTENT)
+
+    def _answer(
+        self, status: HTTPStatus, contents: bytes = b"", more: Mapping[str, str] | None = None
+    ) -> None:
+        self.send_response(status)
+        for name, value in {
+            **HEADERS,
+            **(more or {}),
+            "Content-Length": str(len(contents)),
+        }.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(contents)
+
+    def _stream(self, page: WebServer) -> None:
+        """Send pictures until the browser goes away, reads too slowly, or the server closes."""
+        self.send_response(HTTPStatus.OK)
+        for name, value in {**HEADERS, "Content-Type": "text/event-stream"}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.connection.setsockopt(SOL_SOCKET, SO_SNDBUF, BUFFERED)
+        seen = 0
+        with page.stream(), suppress(OSError):
+            while not page.closed:
+                seen, event = page.next_picture(seen)
+                self.wfile.write(event)
+
+    def log_message(self, *_: object) -> None:
+        """Keep stderr for what concerns the skin."""
