@@ -100,11 +100,12 @@ function drawCurve(id, name, unit, t, values) {
   pen.fillText(`${name}, ${unit}`, left, 14);
   const now = known.length ? known[known.length - 1] : 0;
   pen.textAlign = "right";
-  pen.fillText(`${shortNumber(now)} now, ${shortNumber(most)} at most`, right, 14);
+  pen.fillText(`${shortNumber(now)} now`, right, 14);
   pen.fillStyle = colour("--quiet");
-  pen.fillText(`${end.toFixed(1)} s from onset`, right, height - 4);
+  pen.fillText(`${end.toFixed(1)} s after onset`, right, height - 4);
   pen.textAlign = "left";
   pen.fillText("0 s", left, height - 4);
+  if (most > 0) pen.fillText(`top of the box: ${shortNumber(most)}`, left + 40, height - 4);
   pen.strokeStyle = colour("--line");
   pen.lineWidth = 1;
   pen.strokeRect(left, top, right - left, bottom - top);

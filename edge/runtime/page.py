@@ -95,7 +95,7 @@ class Page:
         self._contact = next(iter(self._tracker.push(frame)), self._contact)
         if frame.t < self._due:
             return
-        self._due = frame.t + PICTURE_S
+        self._due = frame.t + PICTURE_S * (1.0 - 1e-6)  # the times of frames are rounded
         picture = {
             **self._fixed,
             "t": frame.t,

@@ -18,7 +18,15 @@ from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from ipaddress import ip_address
-from socket import AF_INET6, SO_SNDBUF, SOL_SOCKET, socket
+from socket import (
+    AF_INET,
+    AF_INET6,
+    SO_SNDBUF,
+    SOCK_DGRAM,
+    SOL_SOCKET,
+    gethostname,
+    socket,
+)
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -79,7 +87,8 @@ class WebServer:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"--web {address}: cannot be listened at: {reason}") from None
         self.port = self._http.server_address[1]
-        shown = f"[{host}]" if ":" in host else host
+        shown = _own_address() if host in ("", "0.0.0.0", "::") else host
+        shown = f"[{shown}]" if ":" in shown else shown
         self.link = f"http://{shown}:{self.port}/" + (f"?token={self.token}" if self.token else "")
         self._hosts = {f"{shown}:{self.port}"}
         if loopback:
@@ -160,11 +169,11 @@ class WebServer:
     def refusal(self, request: BaseHTTPRequestHandler) -> HTTPStatus | None:
         """Why a request is not answered, or None if it may be.
 
-        The host must be the one that the link names, so that no other site's name can lead here; an
-        action must come from the page itself; and where there is a token, link or cookie has it.
+        Without a token, the host must be the one that the link names, so that no other site's name
+        can lead here. An action must come from the page itself.
         """
         host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        named = host in self._hosts or (self.token and host.rpartition(":")[0] not in ("", "*"))
+        named = bool(self.token) or host in self._hosts
         if not named or (origin is not None and origin != f"http://{host}"):
             return HTTPStatus.FORBIDDEN
         if request.command == "POST" and origin is None:
@@ -179,6 +188,16 @@ def _is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _own_address() -> str:
+    """The address at which other machines find this one; no packet is sent to learn it."""
+    with socket(AF_INET, SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # reserved for documentation (RFC 5737)
+        except OSError:
+            return gethostname()
+        return str(probe.getsockname()[0])
 
 
 def _token(request: BaseHTTPRequestHandler) -> str:

@@ -17,6 +17,7 @@ import pytest
 
 from edge.commands.record import Recorder, Trials, trial_path
 from edge.commands.source import ending_signals
+from edge.fake.clock import VirtualClock
 from edge.recording import load, save
 from edge.runtime.event_writer import Lines
 from edge.touch.frame import Frame
@@ -223,3 +224,22 @@ def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(edge, recordings, t
     status, (event,), _ = edge("record", "--fake", recordings / "hard_0.npz", "--label", "o=a",
                                "--out", tmp_path, "--seconds", 1.0)  # fmt: skip
     assert (status, event["complete"], event["seconds"]) == (0, False, 0.99)
+
+
+def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
+    """Until the page has given a label and records, contacts are not saved."""
+    pushed = []
+
+    def push(page, frame, *_):
+        pushed.append(frame)
+        if len(pushed) == 2:
+            page.labels, page.recording = {"object": "from the page"}, True
+
+    monkeypatch.setattr("edge.runtime.page.Page.push", push)
+    monkeypatch.setattr("edge.commands.source.PacedClock", VirtualClock)
+
+    status, events, _ = edge("record", "--fake", parted, "--web", "127.0.0.1:0", "--out", tmp_path)
+
+    assert status == 0
+    saved = [event for event in events if event["event"] == "saved"]
+    assert {event["labels"]["object"] for event in saved} == {"from the page"}
