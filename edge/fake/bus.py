@@ -14,8 +14,6 @@ from edge.i2c.bus import LARGEST_BYTES, LARGEST_MESSAGES, Message, Transfer, bus
 from edge.i2c.chip import FakeChip
 from edge.i2c.tca9548a import FakeTCA9548A
 
-Way = tuple[str, int, int | None, int | None]
-
 
 class FakeBus:
     """A bus with chips and muxes.
@@ -116,9 +114,8 @@ class FakeBus:
         self._refuse(messages)
         if not self._open:
             raise bus_error(errno.ENODEV, self.name, address)
-        way, chips = self._route(address)
-        route = Route(*way) if self.script.faults else None
-        fault = None if route is None else self.script.next(route, self.now())
+        route, chips = self._route(address)
+        fault = self.script.next(route, self.now())
         self.transactions += 1
         if fault is not None and fault.kind == "error":
             self._spend(11 if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
@@ -150,7 +147,7 @@ class FakeBus:
         if refused:
             raise bus_error(refused, self.name, address)
 
-    def _route(self, address: int) -> tuple[Way, list[FakeChip]]:
+    def _route(self, address: int) -> tuple[Route, list[FakeChip]]:
         """Every chip that hears the address, and the way to it."""
         own = self.chips.get(address)
         chips = [] if own is None else [own]
@@ -162,7 +159,7 @@ class FakeBus:
                         mux_address, channel = at, n
                     if address in mux.channels[n]:
                         chips.append(mux.channels[n][address])
-        return (self.name, address, mux_address, channel), chips
+        return Route(self.name, address, mux_address, channel), chips
 
     def _carry(
         self,
@@ -170,7 +167,7 @@ class FakeBus:
         chips: Sequence[FakeChip],
         t: float,
         fault: Fault | None,
-        route: Route | None,
+        route: Route,
     ) -> None:
         if not message.read:
             data = message.buffer.tobytes()
@@ -190,9 +187,6 @@ class FakeBus:
             out[bit // 8] ^= 1 << bit % 8
         if fault is not None and fault.kind == "break":
             out[self.script.random.randrange(len(out)) :] = 0xFF
-        if route is None:
-            message.buffer[:] = out
-            return
         if fault is not None and fault.kind == "hold":
             out[:] = np.frombuffer(self._held.get((route, len(out)), out.tobytes()), dtype=np.uint8)
         elif len(out) > 2:

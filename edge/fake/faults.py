@@ -7,7 +7,7 @@ import math
 import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Kind = Literal["error", "flip", "misroute", "reset", "hold", "break"]
 
@@ -48,8 +48,7 @@ class Fault:
 NO_FAULTS: tuple[Fault, ...] = ()
 
 
-@dataclass(frozen=True)
-class Route:
+class Route(NamedTuple):
     """The target of a transaction: bus, address, and the mux and channel on the way."""
 
     bus: str

@@ -17,7 +17,7 @@ from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
 from edge.i2c import block
 from edge.i2c.bus import wire_bits
-from edge.i2c.chip import UNUSED, ChipSpec, FakeChip, Sense
+from edge.i2c.chip import UNUSED, ChipSpec, Sense
 from edge.i2c.serial_bus import serial_bits
 from edge.i2c.tca9548a import FakeTCA9548A
 from edge.recording import Recording
@@ -106,7 +106,6 @@ def fake_buses(
     clock: VirtualClock,
     *,
     timed: bool = False,
-    noise_counts: float = 0.0,
     overhead_s: float = 0.0,
     faults: Sequence[Fault] = NO_FAULTS,
     seed: int = 0,
@@ -118,9 +117,9 @@ def fake_buses(
         scene: the counts that the chips feel.
         clock: shared by the buses.
         timed: the clock advances with the bits on the wire, and conversions take their time.
-        noise_counts: standard deviation of the raw values at each reading.
+        overhead_s: time of the software for each transaction, where timed.
         faults: see `edge.fake.faults`.
-        seed: of noise and faults.
+        seed: of the faults and of what power-up leaves undefined.
     """
     rest = calibrated(file).calibration
     assert rest is not None
@@ -139,10 +138,14 @@ def fake_buses(
         )
         felt = _Felt(spec, scene, rest.baseline.ravel())
         for c, chip in enumerate(spec.chips):
-            stream = np.random.default_rng([seed, b, c]) if noise_counts > 0.0 else None
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
-            sense = felt.sense(chip, noise_counts, stream)
-            _attach(bus, chip, chip.kind.fake(chip, sense, timed, power_up))
+            model = chip.kind.fake(chip, felt.sense(chip), timed, power_up)
+            if chip.mux is None or chip.channel is None:
+                bus.chips[chip.address] = model
+                continue
+            mux = bus.chips.setdefault(chip.mux, FakeTCA9548A())
+            assert isinstance(mux, FakeTCA9548A)
+            mux.channels[chip.channel][chip.address] = model
         buses.append(bus)
     return buses
 
@@ -172,29 +175,10 @@ class _Felt:
             self._at = t
         return self._raw
 
-    def sense(self, chip: ChipSpec, noise: float, stream: np.random.Generator | None) -> Sense:
+    def sense(self, chip: ChipSpec) -> Sense:
         """The function that gives one chip its raw values."""
-        taxels, top = np.array(chip.taxels), chip.highest
-
-        def quiet(t: float) -> NDArray[np.uint16]:
-            return self.raw(t).take(taxels, mode="wrap").astype(np.uint16)
-
-        def noisy(t: float) -> NDArray[np.uint16]:
-            assert stream is not None
-            raw = self.raw(t).take(taxels, mode="wrap")
-            raw = raw + np.rint(noise * stream.standard_normal(len(taxels))).astype(np.int64)
-            return np.maximum(np.minimum(raw, top), 1).astype(np.uint16)
-
-        return quiet if stream is None else noisy
-
-
-def _attach(bus: FakeBus, chip: ChipSpec, model: FakeChip) -> None:
-    if chip.mux is None or chip.channel is None:
-        bus.chips[chip.address] = model
-        return
-    mux = bus.chips.setdefault(chip.mux, FakeTCA9548A())
-    assert isinstance(mux, FakeTCA9548A)
-    mux.channels[chip.channel][chip.address] = model
+        taxels = np.array(chip.taxels)
+        return lambda t: self.raw(t).take(taxels, mode="wrap").astype(np.uint16)
 
 
 def fake_skin(
@@ -203,8 +187,6 @@ def fake_skin(
     *,
     clock: VirtualClock | None = None,
     timed: bool = False,
-    noise_counts: float = 0.0,
-    overhead_s: float = 0.0,
     faults: Sequence[Fault] = NO_FAULTS,
     seed: int = 0,
     touch_counts: int | None = None,
@@ -212,15 +194,7 @@ def fake_skin(
     """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
     clock = clock or VirtualClock()
     file = calibrated(file)
-    buses = fake_buses(
-        file,
-        scene,
-        clock,
-        timed=timed,
-        noise_counts=noise_counts,
-        overhead_s=overhead_s,
-        seed=seed,
-    )
+    buses = fake_buses(file, scene, clock, timed=timed, seed=seed)
     skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
     skin.start()
     clock.sleep_until(clock.now())

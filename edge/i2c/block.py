@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 
 from edge.clock import TIME_ROUNDING_S
 from edge.i2c.bus import Bus, fetch, read, write
-from edge.i2c.chip import (
-    Chip,
-    ChipKind,
-    ChipSpec,
-    Defaults,
-    FakeChip,
-    Option,
-    Parsed,
-    Sense,
-)
+from edge.i2c.chip import Chip, ChipKind, ChipSpec, Defaults, FakeChip, Option, Parsed, Sense
 
 IDENTITY, FRAME = b"\x00", b"\x10"
 MAGIC = b"TAXL\x01"

@@ -135,8 +135,12 @@ def response(code: int | None) -> Response:
     return RESPONSES.get(code or errno.EIO, RESPONSES[errno.EIO])
 
 
-def bus_error(code: int | None, bus: str, address: int | None = None) -> BusError:
+def bus_error(
+    code: int | None, bus: str, address: int | None = None, remedy: str | None = None
+) -> BusError:
     """Build the named error of an errno; its message names the bus and the chip.
+
+    `remedy` replaces the words that end the message.
 
     >>> bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
     BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)')
@@ -145,7 +149,7 @@ def bus_error(code: int | None, bus: str, address: int | None = None) -> BusErro
     where = bus if address is None else f"{bus}, address {address:#04x}"
     answer = response(code)
     name = errno.errorcode.get(code, str(code))
-    error = answer.error(f"{where}: {answer.remedy} ({name})")
+    error = answer.error(f"{where}: {remedy or answer.remedy} ({name})")
     error.errno, error.bus, error.address = code, bus, address
     return error
 
@@ -200,11 +204,9 @@ class Bus(Protocol):
     @property
     def name(self) -> str:
         """Its name in errors."""
-        ...
 
     def prepare(self, *messages: Message) -> Transfer:
         """Build a call's structures once, outside the loop."""
-        ...
 
     def transfer(self, prepared: Transfer) -> None:
         """Send it; bytes read are then in its messages' buffers.
@@ -212,15 +214,12 @@ class Bus(Protocol):
         Raises:
             BusError: it failed; see `RESPONSES`.
         """
-        ...
 
     def now(self) -> float:
         """Seconds on the bus's clock."""
-        ...
 
     def sleep(self, seconds: float) -> None:
         """Wait; some chips need it."""
-        ...
 
     def reopen(self) -> None:
         """Open it anew; prepared transfers stay valid.
@@ -228,11 +227,9 @@ class Bus(Protocol):
         Raises:
             BusError: it is not there.
         """
-        ...
 
     def close(self) -> None:
         """Close it; calling it twice is fine."""
-        ...
 
 
 def send(bus: Bus, address: int, data: bytes | Sequence[int]) -> None:
@@ -337,9 +334,8 @@ class LinuxBus:
         except BlockingIOError:
             other = lock_holder(smbus.fd)
             smbus.close()
-            busy = BusBusy(f"{self.name}: {other} is using the bus; end it first (EBUSY)")
-            busy.errno, busy.bus = errno.EBUSY, self.name
-            raise busy from None
+            remedy = f"{other} is using the bus; end it first"
+            raise bus_error(errno.EBUSY, self.name, remedy=remedy) from None
         except OSError as error:
             smbus.close()
             raise bus_error(error.errno, self.name) from None

@@ -158,11 +158,6 @@ class ChipSpec:
         return f"{way}address {self.address:#04x}"
 
     @property
-    def channel_route(self) -> tuple[int | None, int | None]:
-        """Mux and channel; chips with the same ones need one selection."""
-        return self.mux, self.channel
-
-    @property
     def highest(self) -> int:
         """The largest raw value that is not saturated."""
         return self.kind.highest(self)

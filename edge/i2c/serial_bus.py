@@ -86,11 +86,8 @@ def serial_bits(messages: Sequence[Message]) -> int:
 
 def serial_error(code: int, port: str) -> BusError:
     """Build the named error of an errno; its message names the port."""
-    error = bus_error(code, port)
     remedy = REMEDIES.get(code, "the transfer broke off; check the cable")
-    named = type(error)(f"{port}: {remedy} ({errno.errorcode.get(code, code)})")
-    named.errno, named.bus, named.address = code, port, None
-    return named
+    return bus_error(code, port, remedy=remedy)
 
 
 class SerialBus:

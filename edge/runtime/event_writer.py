@@ -146,7 +146,6 @@ class Lines:
         if udp is not None and self._socket is not None:
             self._udp = LineWriter(udp, self._socket.send)
             self.add(self._udp)
-        self._closed = False
 
     def add(self, writer: LineWriter) -> None:
         """Count the lines that another writer loses, and close it with the others."""
@@ -171,10 +170,7 @@ class Lines:
                 self._udp.put(json_line(event), self._patient)
 
     def close(self) -> None:
-        """Close all destinations, and report lost lines on stderr; twice is fine."""
-        if self._closed:
-            return
-        self._closed = True
+        """Close all destinations, and report lost lines on stderr."""
         for writer in self._writers:
             writer.close(self._patient)
         if self._socket is not None:

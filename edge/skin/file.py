@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, parse_toml, shown
+from edge.config import ConfigTable, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
 from edge.i2c.chip import UNUSED, ChipSpec, Defaults
 from edge.skin.kinds import defaults_of
-from edge.skin.wiring import BusSpec, read_buses
+from edge.skin.wiring import BusSpec, read_buses, taxel_at
 from edge.touch.layout import SkinLayout
 
 
@@ -131,15 +131,15 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     for key in (f.name for f in fields(SkinLayout)):
         skin.has(key)
     skin.done()
-    defaults = defaults_of(top.raw)
-    given = dict(skin.raw)
-    if "threshold_counts" not in given and defaults.threshold_counts:
-        given["threshold_counts"] = defaults.threshold_counts
-        given.setdefault("onset_counts", defaults.onset_counts)
-    layout = SkinLayout.from_dict(given, where=where)
-    signal, sign = _signal(top.table("signal", {}), layout, defaults)
+    layout = SkinLayout.from_dict(skin.raw, where=where)
+    signals = top.table("signal", {})
+    sign = signals.whole("sign", 1, (1, -1)) if signals.has("sign") else None
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
+    defaults = defaults_of([chip for bus in buses for chip in bus.chips])
+    signal = _signal(signals, layout, defaults)
+    if not skin.has("threshold_counts") and defaults.threshold_counts:
+        layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
     calibration = None
     if top.has("calibration"):
         calibration = _calibration(top.table("calibration"), layout)
@@ -147,21 +147,10 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
 
-def _signal(
-    table: ConfigTable, layout: SkinLayout, defaults: Defaults
-) -> tuple[Signal, int | None]:
-    """The signal, and the sign of chips that give none, or None."""
-    sign = table.whole("sign", 1, (1, -1)) if table.has("sign") else None
+def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signal:
     dead = table.get("dead", [])
     if not isinstance(dead, list):
         raise table.fail("dead", "a list of [row, col]")
-    pairs = [table.pair("dead", entry) for entry in dead]
-    for row, col in pairs:
-        if not (0 <= row < layout.rows and 0 <= col < layout.cols):
-            raise InputError(
-                f"{table.called('dead')} names taxel [{shown(row)}, {shown(col)}], which lies "
-                f"outside of {layout.rows} x {layout.cols}"
-            )
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
         dead_band_counts=table.whole("dead_band_counts", defaults.dead_band_counts, range(65536)),
@@ -173,10 +162,10 @@ def _signal(
         ),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
         saturation_counts=table.whole("saturation_counts", 65535, range(1, 65536)),
-        dead=tuple(pairs),
+        dead=tuple(taxel_at(table, "dead", entry, layout) for entry in dead),
     )
     table.done()
-    return signal, sign
+    return signal
 
 
 def _reading(table: ConfigTable) -> Reading:
@@ -195,23 +184,17 @@ def _reading(table: ConfigTable) -> Reading:
 def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
     arrays: dict[str, NDArray[np.float64]] = {}
     for key in ("baseline", "noise"):
-        value = table.get(key)
-        rows = value if isinstance(value, list) else []
-        flat = [x for row in rows if isinstance(row, list) for x in row]
-        shaped = len(rows) == layout.rows and all(
-            isinstance(row, list) and len(row) == layout.cols for row in rows
-        )
-        wanted = (int,) if key == "baseline" else (int, float)
-        if not shaped or any(isinstance(x, bool) or not isinstance(x, wanted) for x in flat):
+        try:
+            array = np.array(table.get(key), dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):  # no numbers, or rows of different lengths
+            array = np.empty(0)
+        whole = key == "baseline"
+        if array.shape != layout.shape or (whole and (array % 1.0 != 0.0).any()):
             raise InputError(
                 f"{table.called(key)} must be {layout.rows} rows of {layout.cols} "
-                f"{'whole ' if key == 'baseline' else ''}numbers; calibrate again"
+                f"{'whole ' if whole else ''}numbers; calibrate again"
             )
-        try:
-            array = np.array(rows, dtype=np.float64)
-        except OverflowError:  # a whole number beyond all floats
-            array = np.array(np.inf)
-        if not (np.isfinite(array).all() and (array >= 0).all() and (array <= 65535).all()):
+        if not ((array >= 0.0) & (array <= 65535.0)).all():
             raise InputError(
                 f"{table.called(key)} has a value outside of 0 to 65535; calibrate again"
             )

@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 from edge.i2c import ad7147, block, mpr121
-from edge.i2c.chip import ChipKind, Defaults
+from edge.i2c.chip import ChipKind, ChipSpec, Defaults
 
 KINDS: dict[str, ChipKind] = {kind.name: kind for kind in (ad7147.KIND, mpr121.KIND, block.KIND)}
 """Descriptors by name. A further chip is added here, and nowhere else outside its module."""
 
 
-def defaults_of(raw: Mapping[str, object]) -> Defaults:
-    """Defaults for the chips of a skin file; for chips that differ, those of no kind.
-
-    Args:
-        raw: the file's tables, unchecked.
-    """
-    defaults = []
-    buses = raw.get("bus")
-    for bus in buses if isinstance(buses, list) else []:
-        chips = bus.get("chips") if isinstance(bus, Mapping) else None
-        for chip in chips if isinstance(chips, list) else []:
-            if not isinstance(chip, Mapping):
-                continue
-            merged = {**bus, **chip}  # a key of a bus holds for all its chips
-            name = merged.get("kind")
-            kind = KINDS.get(name) if isinstance(name, str) else None
-            if kind is not None:
-                given = {key: merged.get(key, opt.default) for key, opt in kind.options.items()}
-                if all(isinstance(value, int) for value in given.values()):
-                    defaults.append(kind.defaults(given))
-    return defaults[0] if defaults and all(d == defaults[0] for d in defaults) else Defaults()
+def defaults_of(chips: Sequence[ChipSpec]) -> Defaults:
+    """Defaults for the chips of a skin file; for chips that differ, those of no kind."""
+    first, *rest = (chip.kind.defaults(chip.options) for chip in chips)
+    return first if all(defaults == first for defaults in rest) else Defaults()

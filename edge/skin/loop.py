@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import signal
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -29,7 +30,6 @@ class JointSource(Protocol):
 
     def at(self, t: float) -> NDArray[np.float64] | None:
         """Angles (dof,) in radians at a time of the loop's clock; None where unknown."""
-        ...
 
 
 class Periods:
@@ -43,30 +43,31 @@ class Periods:
     """
 
     BIN_S = 1e-5
-    BINS = 100_000
 
     def __init__(self) -> None:
-        self._counts = [0] * self.BINS
-        self.n = 0
+        self._counts: Counter[int] = Counter()
         self.longest = 0.0
+
+    @property
+    def n(self) -> int:
+        """Number of periods."""
+        return self._counts.total()
 
     def add(self, period_s: float) -> None:
         """Count a period; one longer than a second counts as a second."""
         # A period on a bin's edge must not fall below it by the last bit of a float.
-        self._counts[min(int(period_s / self.BIN_S + 1e-6), self.BINS - 1)] += 1
-        self.n += 1
+        self._counts[int(min(period_s, 1.0) / self.BIN_S + 1e-6)] += 1
         self.longest = max(self.longest, period_s)
 
     def percentile(self, percent: float) -> float:
-        """The period in seconds that so many percent do not exceed, rounded up to a bin."""
-        if self.n == 0:
-            return math.nan
+        """The period in seconds that so many percent do not exceed, rounded up to a bin; NaN
+        without periods."""
         wanted, seen = math.ceil(self.n * percent / 100.0), 0
-        for i, count in enumerate(self._counts):
+        for i, count in sorted(self._counts.items()):
             seen += count
             if seen >= wanted:
                 return round((i + 1) * self.BIN_S, 9)
-        return self.longest
+        return math.nan
 
 
 @dataclass
@@ -88,8 +89,6 @@ class Schedule:
         self.start = math.nan
         self.tick = -1
         self.missed = 0
-        self.late_s = 0.0
-        """How late the last tick came."""
         self.periods = Periods()
         self._last = math.nan
 
@@ -117,7 +116,6 @@ class Schedule:
         if stop is None or not stop.asked:
             self.clock.sleep_until(due)
         began = self.clock.now()
-        self.late_s = began - due
         if not math.isnan(self._last):
             self.periods.add(began - self._last)
         self._last = began

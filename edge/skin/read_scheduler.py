@@ -87,17 +87,18 @@ class ReadScheduler:
 
     def _take(self, chosen: list[int], wanted: Sequence[int], bus: BusSpec, bits: float) -> float:
         """Add chips while the bits last, and return the bits left."""
-        connected = {bus.chips[i].channel_route for i in chosen}
+        connected = {(bus.chips[i].mux, bus.chips[i].channel) for i in chosen}
         for i in wanted:
             if i in chosen:
                 continue
             chip = bus.chips[i]
-            cost = chip.frame_bits + self.select_bits * (chip.channel_route not in connected)
+            channel = chip.mux, chip.channel
+            cost = chip.frame_bits + self.select_bits * (channel not in connected)
             if cost > bits:
                 break
             bits -= cost
             chosen.append(i)
-            connected.add(chip.channel_route)
+            connected.add(channel)
         return bits
 
 

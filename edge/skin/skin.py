@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-import queue
-import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -49,27 +48,6 @@ class ChipStatus:
     state: str
     error: str
     recoveries: int
-
-
-class _Worker(threading.Thread):
-    """Reads one bus whenever a job is put into `todo`."""
-
-    def __init__(self, reader: BusReader) -> None:
-        super().__init__(name=f"edge-classify {reader.bus.name}", daemon=True)
-        self._reader = reader
-        self.todo: queue.SimpleQueue[tuple[Sequence[Slot], float] | None] = queue.SimpleQueue()
-        self.done: queue.SimpleQueue[BaseException | None] = queue.SimpleQueue()
-        self.start()
-
-    def run(self) -> None:
-        read, todo, done = self._reader.read, self.todo, self.done
-        while (job := todo.get()) is not None:
-            try:
-                read(*job)
-            except BaseException as error:  # raised again by `Skin.read`
-                done.put(error)
-            else:
-                done.put(None)
 
 
 class Skin:
@@ -137,8 +115,8 @@ class Skin:
         self._since_follow = 0
         self._states = [slot.state for slot in self._slots]
         self._lost = [False for _ in self.readers]
-        self._workers = [_Worker(reader) for reader in self.readers[1:]]
-        self._closed = False
+        self._threads = [ThreadPoolExecutor(1) for _ in self.readers[1:]]
+        """A thread for each bus but the first, which the caller's thread reads."""
 
     @classmethod
     def open(
@@ -262,16 +240,16 @@ class Skin:
                 for reader, indices in zip(self.readers, chosen, strict=True)
             ]
         deadline = t + self.period_s - LONGEST_STEP_S
-        for worker, job in zip(self._workers, jobs[1:], strict=True):
-            worker.todo.put((job, deadline))
-        failed: BaseException | None = None
+        beside = [
+            thread.submit(reader.read, job, deadline)
+            for thread, reader, job in zip(self._threads, self.readers[1:], jobs[1:], strict=True)
+        ]
         try:
             self.readers[0].read(jobs[0], deadline)
         finally:
-            for worker in self._workers:
-                failed = worker.done.get() or failed
-        if failed is not None:
-            raise failed
+            wait(beside)
+        for reading in beside:
+            reading.result()
 
     def _assemble(self, t: float) -> Frame:
         valid = self._decoder.decode(t, t - self.oldest_s)
@@ -304,13 +282,8 @@ class Skin:
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""
-        if self._closed:
-            return
-        self._closed = True
-        for worker in self._workers:
-            worker.todo.put(None)
-        for worker in self._workers:
-            worker.join()
+        for thread in self._threads:
+            thread.shutdown()
         for reader in self.readers:
             reader.bus.close()
 

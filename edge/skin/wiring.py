@@ -59,8 +59,8 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     if table.has("kind"):
         _kind(table)
     options = {name for kind in KINDS.values() for name in kind.options}
-    shared = {key: table.raw[key] for key in ("kind", "mux", "block") if table.has(key)}
-    shared_options = {key: table.raw[key] for key in sorted(options) if table.has(key)}
+    keys = ("kind", "mux", "block", *sorted(options))
+    shared = {key: table.raw[key] for key in keys if table.has(key)}
     chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     table.done()
     if serial and len(chips) > 1:
@@ -68,10 +68,9 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     specs = []
     for chip in chips:
         kind = _kind(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix))
-        own = {key: value for key, value in shared_options.items() if key in kind.options}
-        merged = ConfigTable({**shared, **own, **chip.raw}, chip.where, chip.prefix)
-        merged.has("kind")
-        specs.append(_chip(merged, kind, layout, sign, serial))
+        of_others = options - set(kind.options)
+        raw = {key: value for key, value in shared.items() if key not in of_others} | {**chip.raw}
+        specs.append(_chip(ConfigTable(raw, chip.where, chip.prefix), kind, layout, sign, serial))
     return BusSpec(device, tuple(specs), clock_hz, serial)
 
 
@@ -111,6 +110,7 @@ def _kind(table: ConfigTable) -> ChipKind:
 def _chip(
     table: ConfigTable, kind: ChipKind, layout: SkinLayout, sign: int | None, serial: bool
 ) -> ChipSpec:
+    table.has("kind")
     address = 0
     if serial and not kind.serial:
         raise InputError(f"{table.called('kind')} is {kind.name}; a serial port carries block only")
@@ -146,34 +146,38 @@ def _chip(
 
 def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
     """Flat indices from `taxels`, or from `first` and `block`, row by row."""
-    taxels: list[tuple[int, int] | None] = []
-    given = [table.has(key) for key in ("taxels", "first", "block")]
-    if given[0]:
-        listed = table.get("taxels")
-        if not isinstance(listed, list):
+    listed, *block = [table.has(key) for key in ("taxels", "first", "block")]
+    if listed:
+        taxels = table.get("taxels")
+        if not isinstance(taxels, list):
             raise table.fail("taxels", "a list of [row, col]")
-        taxels += [None if entry == [] else table.pair("taxels", entry) for entry in listed]
-    elif all(given[1:]):
+        key = "taxels"
+    elif all(block):
+        key = "first"
         row, col = table.pair("first")
         high, wide = table.pair("block")
         if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
             raise table.fail("block", f"[rows, cols] within {layout.rows} x {layout.cols}")
-        taxels += [(row + i, col + j) for i in range(high) for j in range(wide)]
+        taxels = [[row + i, col + j] for i in range(high) for j in range(wide)]
     else:
         raise InputError(f"{table.called('taxels')} is missing; give it, or first and block")
-    flat = []
-    for taxel in taxels:
-        if taxel is None:
-            flat.append(UNUSED)
-            continue
-        row, col = taxel
-        if not (0 <= row < layout.rows and 0 <= col < layout.cols):
-            raise InputError(
-                f"{table.called('taxel')} [{shown(row)}, {shown(col)}] lies outside "
-                f"of {layout.rows} x {layout.cols}"
-            )
-        flat.append(row * layout.cols + col)
-    return tuple(flat)
+    pairs = [None if taxel == [] else taxel_at(table, key, taxel, layout) for taxel in taxels]
+    return tuple(UNUSED if pair is None else pair[0] * layout.cols + pair[1] for pair in pairs)
+
+
+def taxel_at(table: ConfigTable, key: str, value: object, layout: SkinLayout) -> tuple[int, int]:
+    """Row and column of a taxel that a key names.
+
+    Raises:
+        InputError: it is no [row, col], or lies outside of the skin.
+    """
+    row, col = table.pair(key, value)
+    if not (0 <= row < layout.rows and 0 <= col < layout.cols):
+        raise InputError(
+            f"{table.called(key)} names taxel [{shown(row)}, {shown(col)}], which lies outside of "
+            f"{layout.rows} x {layout.cols}"
+        )
+    return row, col
 
 
 def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> None:
@@ -181,42 +185,36 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
     owner: dict[int, str] = {}
     devices: dict[str, int] = {}
     for b, bus in enumerate(buses):
+        place = f"{where}: bus {b}"
         if bus.device in devices:
-            raise InputError(f"{where}: bus {b} has the same device as bus {devices[bus.device]}")
+            raise InputError(f"{place} has the same device as bus {devices[bus.device]}")
         devices[bus.device] = b
         direct = {c.address for c in bus.chips if c.mux is None}
         muxes = {c.mux for c in bus.chips if c.mux is not None}
         if muxes and bus.clock_hz > FASTEST_MUX_HZ:
             raise InputError(
-                f"{where}: bus {b}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most "
-                f"{FASTEST_MUX_HZ}"
+                f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most {FASTEST_MUX_HZ}"
             )
-        if direct & muxes:
-            raise InputError(
-                f"{where}: bus {b}: a mux and a chip have the same address, "
-                f"{min(direct & muxes):#04x}"
-            )
+        for address in direct & muxes:
+            raise InputError(f"{place}: a mux and a chip have the same address, {address:#04x}")
         seen: dict[tuple[int | None, int | None, int], int] = {}
         for c, chip in enumerate(bus.chips):
+            place = f"bus {b} chip {c}"
             route = (chip.mux, chip.channel, chip.address)
             if route in seen:
                 raise InputError(
-                    f"{where}: bus {b} chip {c} has the same address as chip {seen[route]}, "
-                    f"{chip.route}"
+                    f"{where}: {place} has the same address as chip {seen[route]}, {chip.route}"
                 )
             if chip.mux is not None and chip.address in direct | muxes:
                 raise InputError(
-                    f"{where}: bus {b} chip {c}: another chip, in front of the mux, has the same "
-                    f"address {chip.address:#04x}"
+                    f"{where}: {place}: another chip, in front of the mux, has the same address "
+                    f"{chip.address:#04x}"
                 )
             seen[route] = c
             for taxel in chip.taxels:
-                if taxel == UNUSED:
-                    continue
-                if taxel in owner:
+                if taxel in owner and taxel != UNUSED:
                     row, col = divmod(taxel, layout.cols)
                     raise InputError(
-                        f"{where}: bus {b} chip {c}: taxel [{row}, {col}] belongs to "
-                        f"{owner[taxel]} already"
+                        f"{where}: {place}: taxel [{row}, {col}] belongs to {owner[taxel]} already"
                     )
-                owner[taxel] = f"bus {b} chip {c}"
+                owner[taxel] = place

@@ -9,7 +9,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.fake.clock import PacedClock
-from edge.fake.player import Playback, fake_skin, play, skin_file
+from edge.fake.player import Playback, play, skin_file
 from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
@@ -51,21 +51,6 @@ def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():
     assert once.ends == pytest.approx(0.06)
     assert looped.ends == math.inf
     assert [int(looped(t)[0, 0]) for t in (0.05, 0.061, 0.071)] == [2, 0, 1]
-
-
-def test_noise_is_repeatable_by_seed_and_as_large_as_asked():
-    cody = skinfile.load(skinfile.shipped("cody"))
-    cody = replace(cody, signal=replace(cody.signal, drift_counts_per_s=0.0))
-    quiet = np.full((16, 24), 500, dtype=np.uint16)
-
-    def counts(seed):
-        with fake_skin(cody, lambda t: quiet, noise_counts=5.0, seed=seed) as skin:
-            return np.array([skin.read().counts for _ in range(20)], dtype=int)
-
-    first = counts(1)
-    np.testing.assert_array_equal(first, counts(1))
-    assert (first != counts(2)).any()
-    assert np.std(first) == pytest.approx(5.0, abs=0.2)
 
 
 @pytest.fixture

@@ -106,8 +106,10 @@ def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
     file = calibrated(CODY)
     file = replace(file, calibration=replace(file.calibration, noise=noise))
     quiet = np.zeros((16, 24), dtype=np.uint16)
-    with fake_skin(file, lambda t: quiet, noise_counts=4.0, seed=1) as skin:
-        for _ in range(150):
+    draw = np.random.default_rng(1)
+    with fake_skin(file, lambda t: draw.integers(0, 14, quiet.shape, np.uint16)) as skin:
+        for frame in range(150):
+            skin.clock.sleep_until(0.01 * frame)
             assert skin.read().valid.all()
     with fake_skin(file, lambda t: quiet) as skin:
         valid = [bool(skin.read().valid.all()) for _ in range(150)]

@@ -12,8 +12,8 @@ from edge.i2c.bus import fetch
 from edge.i2c.chip import Chip, ChipKind, Defaults, FakeChip, Option
 from edge.recording import Recording, save
 from edge.skin import file as skinfile
-from edge.skin.file import parse
-from edge.skin.kinds import KINDS, defaults_of
+from edge.skin.file import Signal, parse
+from edge.skin.kinds import KINDS
 
 MPR121 = """[skin]
 rows = 3
@@ -52,22 +52,12 @@ def test_what_the_file_says_counts():
     assert file.signal.dead_band_counts == 1
 
 
-def test_kinds_that_differ_leave_only_what_holds_for_any():
-    chips = [{"kind": "mpr121"}, {"kind": "ad7147"}]
-    assert defaults_of({"bus": [{"chips": chips}]}) == Defaults()
-
-
-@pytest.mark.parametrize("raw", [{}, {"bus": 1}, {"bus": [1]}, {"bus": [{"chips": [1, {}]}]},
-                                 {"bus": [{"kind": [], "chips": [{}]}]}])  # fmt: skip
-def test_a_file_that_makes_no_sense_is_left_to_its_reader(raw):
-    assert defaults_of(raw) == Defaults()
-
-
-def test_chips_of_two_kinds_have_each_its_own_sign():
+def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
     text = MPR121.format(skin="threshold_counts = 5", signal="").replace("rows = 3", "rows = 6")
     more = '[[bus]]\ndevice = 2\nkind = "block"\n'
     file = parse(text + more + "chips = [{ address = 0x28, first = [3, 0], block = [3, 4] }]")
     assert [chip.sign for chip in file.chips] == [-1, 1]
+    assert file.signal == Signal()
 
 
 class Toy(Chip):

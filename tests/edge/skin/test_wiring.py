@@ -45,7 +45,11 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
         ("address = 0x2D", "address = 0x5A", "bus 0 chip 1: address must be 0x2c to 0x2f, not 90"),
         ("address = 0x2D, ", "", "bus 0 chip 1: address is missing"),
         ("first = [0, 3]", "first = [0, 2]", "taxel [0, 2] belongs to bus 0 chip 0 already"),
-        ("first = [0, 3]", "first = [0, 4]", "bus 0 chip 1: taxel [0, 6] lies outside of 4 x 6"),
+        (
+            "first = [0, 3]",
+            "first = [0, 4]",
+            "chip 1: first names taxel [0, 6], which lies outside",
+        ),
         ("first = [0, 3]", "first = 3", "bus 0 chip 1: first must be [row, col], not 3"),
         ("block = [4, 3]", "block = [4, 2]", "names 8 taxels, but an AD7147 has 12 stages"),
         ("chips = [", "chip = [", "bus 0: chips must be a list of tables, not []"),
