@@ -15,7 +15,6 @@ import math
 import sys
 
 from joblib import Parallel, delayed
-from tqdm import tqdm
 
 from tests.edge.skin.campaign import (
     BACK_S,
@@ -27,6 +26,7 @@ from tests.edge.skin.campaign import (
     scripts,
     sweep,
 )
+from train.progress import bar
 
 REPEATED = (3, 20, 37, 54)
 """Frames before which all chips lose their settings, where that repeats."""
@@ -79,7 +79,7 @@ def main() -> None:
             for kind, fault in KINDS.items()
             for set_up in (False, True)
         ]
-        sweeps = Parallel(n_jobs=-1)(tqdm(jobs, desc="positions", unit=" sweeps"))
+        sweeps = Parallel(n_jobs=-1)(bar(jobs, desc="positions", unit=" sweeps"))
         print(
             f"\nOverhead of {overhead:g} us a transaction:\n\n{table(played, 'met')}{UNKNOWABLE}\n"
         )

@@ -25,7 +25,6 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.stats import binom
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
@@ -33,6 +32,7 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from train.choose import candidates
 from train.dataset import DataSet, load_trials
 from train.fitting import fit
+from train.progress import bar as progress_bar
 from train.simulate import scene as scenes
 from train.simulate.run import total_trials, write
 from train.stopping import RISK, answers, confidences, stops, withheld
@@ -122,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     with tempfile.TemporaryDirectory() as folder:
         scene = scenes.load(SCENE, count=POOL)
-        with tqdm(total=total_trials(scene), desc="simulating", unit=" trials") as bar:
+        with progress_bar(total=total_trials(scene), desc="simulating", unit=" trials") as bar:
             write(scene, folder, jobs=arguments.jobs, progress=bar.update)
         dataset = load_trials(
             [folder], features=expand(features), horizon_s=POINTS_S[-1], progress=True
@@ -133,7 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
     draws = [np.sort(rng.permutation(n)[: arguments.trials]) for _ in range(arguments.sets)]
     work = (delayed(realised)(pool, rows) for rows in draws)
     parts = Parallel(n_jobs=arguments.jobs, return_as="generator")(work)
-    outcomes = np.array(list(tqdm(parts, total=len(draws), desc="data sets")))
+    outcomes = np.array(list(progress_bar(parts, total=len(draws), desc="data sets")))
     allowed = int(binom.ppf(0.99, len(draws), RISK))
     failed = 0
     print("| task | asked | certified | of all sets, above | wrong on average | mean time, s |")

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
-from tqdm import tqdm
 
 import edge
 from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Touched, simulate
 from edge.commands.summary import wilson
 from edge.errors import InputError
 from edge.recording import load, save
+from train.progress import bar
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
@@ -91,7 +91,7 @@ def make_trials(folder: Path, count: int, seed: int) -> tuple[list[Path], int]:
     objects = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
     work = (delayed(_touch_object)(folder, i, numbers, seed) for i, numbers in enumerate(objects))
     done = Parallel(n_jobs=cpu_count(), return_as="generator")(work)
-    made = list(tqdm(done, total=len(objects), unit=" objects", desc="MuJoCo"))
+    made = list(bar(done, total=len(objects), unit=" objects", desc="MuJoCo"))
     return [path for paths, _ in made for path in paths], sum(again for _, again in made)
 
 

@@ -22,7 +22,6 @@ from sklearn.decomposition import PCA
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from tqdm import tqdm
 
 from edge.cli import dispatch
 from edge.commands.bench import machine
@@ -35,6 +34,7 @@ from export.api import describe
 from export.graph import to_onnx
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
+from train.progress import bar
 
 COMPONENTS = (1, 2, 5, 10, 20)
 NEIGHBOURS = (1, 2, 5, 20)
@@ -59,7 +59,7 @@ def medians_us(decisions: Sequence[Callable[[], object]], calls: int) -> list[fl
     """Median microseconds of a call of each, taken in turns: a machine's pace drifts."""
     rounds = min(ROUNDS, calls)
     taken: list[list[int]] = [[] for _ in decisions]
-    for _ in tqdm(range(rounds), desc="arithmetic", unit=" rounds"):
+    for _ in bar(range(rounds), desc="arithmetic", unit=" rounds"):
         for decide, times in zip(decisions, taken, strict=True):
             decide()
             for _ in range(max(calls // rounds, 1)):

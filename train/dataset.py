@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.files import read_bytes
@@ -22,6 +21,7 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, wid
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
+from train.progress import bar
 
 NO_CONTACT = "none"
 """The label of a recording in which nothing is touched."""
@@ -184,7 +184,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     digest = hashlib.sha256()
     recordings: list[Recording] = []
     bad: list[str] = []
-    for path in tqdm(paths, desc="reading", unit=" trials", disable=not progress):
+    for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
         try:
             contents = read_bytes(path, LARGEST_BYTES)
             recordings.append(load(path, io.BytesIO(contents)))
@@ -252,7 +252,7 @@ def load_trials(
     trials: list[Trial] = []
     untouched: list[tuple[Path, dict[str, str]]] = []
     unused: list[Path] = []
-    for recording, path in tqdm(kept, desc="following", unit=" trials", disable=not progress):
+    for recording, path in bar(kept, desc="following", unit=" trials", disable=not progress):
         try:
             tracker = ContactTracker(
                 for_device(reference, recording.layout),

@@ -21,13 +21,13 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from edge.errors import InputError
 from edge.statistics import wilson
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of, types_of
+from train.progress import bar as progress_bar
 from train.projection import Spectrum
 from train.scaling import centred_and_scaled, widths_of
 
@@ -353,7 +353,9 @@ def evaluate(
         for test in tests
     )
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
-    bar = tqdm(results, total=len(pairs), desc=progress, unit=" fits", disable=progress is None)
+    bar = progress_bar(
+        results, total=len(pairs), desc=progress, unit=" fits", disable=progress is None
+    )
     choices = {
         task: [
             choice

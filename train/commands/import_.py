@@ -14,13 +14,13 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
 from edge.recording import Recording, load, save
 from train.commands.thresholds import count_contacts, proposed
 from train.importers import names
+from train.progress import bar
 
 ZERO_FRAMES = 3
 
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"{arguments.file}: no such file or folder")
     trials = import_module(f"train.importers.{arguments.format}").trials(arguments.file, arm)
     count, without_threshold = 0, []
-    for name, recording in tqdm(trials, desc="importing", unit=" trials"):
+    for name, recording in bar(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
             raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
         path = arguments.out / f"{name}.npz"

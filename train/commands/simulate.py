@@ -53,11 +53,12 @@ def run(arguments: argparse.Namespace) -> int:
 
         print(explain(scene))
     if arguments.out:
-        from tqdm import tqdm
-
+        from train.progress import bar as progress_bar
         from train.simulate.run import total_trials, write
 
-        with tqdm(total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr) as bar:
+        with progress_bar(
+            total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr
+        ) as bar:
             written = write(
                 scene,
                 arguments.out,

@@ -11,13 +11,13 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from edge.files import parsing
 from edge.recording import Recording, save
 from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
 from train.dataset import labels_of, read
+from train.progress import bar
 
 LEAD_S = 0.25
 """Kept of the time before a contact, as far as no other contact lies there."""
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     raw = read(arguments.data, progress=True)
     count = 0
     pairs = list(zip(raw.paths, raw.recordings, strict=True))
-    for path, recording in tqdm(pairs, desc="splitting", unit=" recordings"):
+    for path, recording in bar(pairs, desc="splitting", unit=" recordings"):
         with parsing(str(path), "a recording to split"):
             contacts = split(recording)
         for i, contact in enumerate(contacts):

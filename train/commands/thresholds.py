@@ -17,6 +17,7 @@ from edge.recording import Recording
 from edge.touch.layout import for_device
 from edge.touch.track import ContactTracker
 from train.dataset import contacts, read, with_thresholds
+from train.progress import bar
 
 QUIET_S = 0.1
 """The time from the start of each recording that is taken to lie before the contact."""
@@ -65,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         low, high = (min(round(factor * level), 65534) for level in (threshold, onset))
         rows.append((name, low, high))
     print(f"{'':<11}threshold  onset  recordings with a contact  contacts")
-    for name, low, high in tqdm(rows, desc="following", leave=False):
+    for name, low, high in bar(rows, desc="following", leave=False):
         touched, total = count_contacts(recordings, low, high)
         tqdm.write(
             f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  {total:>8}"

@@ -8,7 +8,8 @@ from typing import Any
 
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
+
+from train.progress import bar
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Workers:
             n_jobs=self.jobs, backend=self.cluster, return_as="generator", max_nbytes=None
         )
         results = run(delayed(_single)(function, case) for case in cases)
-        return list(tqdm(results, total=len(cases), desc=f"{what:<22}", disable=not self.progress))
+        return list(bar(results, total=len(cases), desc=f"{what:<22}", disable=not self.progress))
 
 
 def _single(function: Callable[..., Any], case: tuple[Any, ...]) -> Any:

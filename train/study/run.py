@@ -10,11 +10,10 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from tqdm import tqdm
-
 from edge.errors import InputError
 from train.cluster import on_cluster
 from train.dataset import load_trials
+from train.progress import bar
 from train.report.page import write
 from train.report.section import Numbers, Section, counted
 from train.report.work import Workers
@@ -94,7 +93,7 @@ def study(
         sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
         every = [_numbers(sections)]
         if source is not None:
-            every += [_again(context, source, i) for i in tqdm(range(1, seeds), desc="data sets")]
+            every += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
     shown = [conclude(context, every) for conclude in CONCLUSIONS] + sections
     name = source.name if source is not None else Path(data[0]).name
     written = write(

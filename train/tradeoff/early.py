@@ -9,12 +9,12 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from edge.model.stopping import StoppingRule
 from train.evaluate import Labels, Result, evaluate, stratified_folds
 from train.evaluate import SearchGrid as Grid
 from train.pipeline import Choice, ContactClassifier
+from train.progress import bar
 from train.stopping import (
     FEWER_FOLDS,
     MANY_TRIALS,
@@ -220,7 +220,7 @@ def compare_stopping(
         for k in range(FOLDS)
     )
     answered = Parallel(n_jobs=jobs, return_as="generator")(work)
-    held_out = list(tqdm(answered, total=FOLDS, desc="deciding early"))
+    held_out = list(bar(answered, total=FOLDS, desc="deciding early"))
     comparisons = {}
     for task, labels in y.items():
         named = np.empty(X.shape[:2], dtype=labels.dtype)

@@ -1,0 +1,38 @@
+"""Progress on stderr: a bar on a terminal, few lines in a log."""
+
+import sys
+
+import pytest
+
+from train import progress
+
+
+def test_short_work_says_nothing_in_a_log(capsys):
+    assert list(progress.bar(range(1000), desc="working")) == list(range(1000))
+
+    assert capsys.readouterr().err == ""
+
+
+def test_long_work_says_so_in_a_log(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "LOG_S", 0.0)
+
+    list(progress.bar(range(10), desc="working"))
+
+    assert "working" in capsys.readouterr().err
+
+
+def test_a_terminal_has_a_bar(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+
+    list(progress.bar(range(10), desc="working"))
+
+    assert "working: 100%" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_bar_that_is_switched_off_stays_so(capsys, monkeypatch, terminal):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+
+    list(progress.bar(range(10), desc="working", disable=True))
+
+    assert capsys.readouterr().err == ""

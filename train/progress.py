@@ -1,0 +1,24 @@
+"""Progress on stderr."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+from tqdm import tqdm
+
+LOG_S = 10.0
+"""Between two lines of progress in a log."""
+
+
+def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
+    """A progress bar; where stderr is no terminal, a line every ten seconds at most.
+
+    Args:
+        iterable: what is worked through; None where `update` counts.
+        options: of tqdm.
+    """
+    if not sys.stderr.isatty():
+        options = {"delay": LOG_S, "mininterval": LOG_S, "maxinterval": LOG_S, **options}
+    return tqdm(iterable, **options)
