@@ -12,7 +12,6 @@ from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load
-from edge.touch.features import feature_vector
 from export.__main__ import main as export
 
 ROOT = Path(__file__).parents[1]
@@ -56,7 +55,7 @@ def asked(built):
 
 def bench_decision_of_all_tasks(against, note, asked):
     model, series = asked
-    vector = feature_vector(series, model.info.window_s, model.info.samples, model.info.features)
+    vector = model.info.vector(series)
     share = against(lambda: model.decide(vector), {}) / FRAME_S
     note("a 10 ms frame", share, "at most 0.01")
 

@@ -14,7 +14,6 @@ from edge.events import Decided
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load
-from edge.touch.features import feature_vector
 
 REPEATS = 20
 
@@ -27,13 +26,13 @@ def main() -> None:
     contact = first_series(recording, model)
     assert contact is not None, "the recording has no contact"
     series = contact[1]
-    vector = feature_vector(series, info.window_s, info.samples, info.features)
+    vector = info.vector(series)
     model.decide(vector)
     for _ in range(REPEATS):
         mark()
         mark()
         mark()
-        feature_vector(series, info.window_s, info.samples, info.features)
+        info.vector(series)
         mark()
         mark()
         model.decide(vector)

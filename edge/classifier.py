@@ -16,7 +16,6 @@ from edge.model.model import Decision, Model, require_joints
 from edge.model.stopping import NOVELTY_RATE, UNKNOWN, StoppingRule, check_rate
 from edge.recording import Recording
 from edge.touch.contact import Contact
-from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -261,7 +260,7 @@ class Classifier:
             for task in waiting.tasks
         ]  # fmt: skip
         try:
-            vector = feature_vector(series, window_s, info.samples, info.features)
+            vector = info.vector(series, window_s)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
         except InputError:
             answers = [replace(answer, flags=(*flags, OUT_OF_RANGE)) for answer in answers]

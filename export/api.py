@@ -19,7 +19,6 @@ from edge.files import write_whole
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
 from edge.touch import measures
-from edge.touch.features import feature_vector
 from export import golden
 from export.graph import to_onnx
 from train.choose import TRIAL, Candidate, Chosen
@@ -102,6 +101,7 @@ def describe(
         motion_frame="skin" if dataset.chain is None else "world",
         chain=dataset.chain,
         joints=dataset.joints,
+        kernels=dataset.kernels,
         rows=len(dataset.trials),
         data_digest=dataset.digest,
         versions={
@@ -309,8 +309,8 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
         task: full.labels(task)
         for task in {*choices, *(t for c in choices.values() for t in c.targets)}
     }
-    X = full.features(fitted.window_s, fitted.samples, names)
     part = full.of(names)
+    X = part.features(fitted.window_s, fitted.samples)
     classifier = ContactClassifier(choices, names, part.widths(fitted.samples)).fit(X, y)
     data = to_onnx(classifier, describe(part, classifier, {}, fitted.window_s, fitted.samples))
     with tempfile.TemporaryDirectory() as folder:
@@ -320,6 +320,6 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     series, taken = full.trials[0].series, []
     for _ in range(CALLS):
         began = time.perf_counter()
-        model.decide(feature_vector(series, fitted.window_s, fitted.samples, names))
+        model.decide(model.info.vector(series))
         taken.append(time.perf_counter() - began)
     return 1e6 * statistics.median(taken), len(data) / 1024

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from edge.model.model import Model
 from edge.model.verify import first_series, outputs, outputs_at_points, parts
 from edge.recording import Recording, save_arrays
-from edge.touch.features import feature_vector
 from train.dataset import DataSet
 
 TRIALS = 24
@@ -81,9 +80,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         pieces.append(part)
         contacts.append(series)
     rng = np.random.default_rng(20120101)
-    own = np.stack(
-        [feature_vector(s, info.window_s, info.samples, info.features) for _, s in contacts]
-    )
+    own = np.stack([info.vector(s) for _, s in contacts])
     rows = X[rng.permutation(len(X))[: VECTORS // 2]]
     pairs = rng.integers(0, len(X), (VECTORS // 2, 2))
     weight = rng.uniform(-0.5, 1.5, (len(pairs), 1))
@@ -109,9 +106,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     if info.decision_points_s:
         arrays["decision_point_vectors"] = at_decision_points = np.stack(
             [
-                np.stack(
-                    [feature_vector(s, window, info.samples, info.features) for _, s in contacts]
-                )
+                np.stack([info.vector(s, window) for _, s in contacts])
                 for window in info.decision_points_s
             ]
         )

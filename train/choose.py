@@ -34,6 +34,8 @@ PLAIN = (
     ("contact", "moments"),
     ("taxels",),
     ("sqrt_taxels",),
+    ("kernels",),
+    ("moments", "zone_kernels"),
 )
 """Combinations of feature sets that are candidates for recordings without joint angles."""
 WITH_JOINTS = (
@@ -45,6 +47,8 @@ WITH_JOINTS = (
     ("sqrt_taxels",),
     ("contact", "joints", "posture"),
     ("moments", "joints", "posture"),
+    ("kernels", "joints"),
+    ("moments", "zone_kernels", "joints"),
 )
 """Those for recordings with joint angles, whose changes show how far the thing gave way."""
 QUICK = 3
@@ -258,7 +262,7 @@ class Choosing:
 
         Without groups, both are the answers to left-out trials.
         """
-        X = self._dataset.features(window_s, self._samples)
+        X = self._dataset.with_kernels(window_s).features(window_s, self._samples)
         grids = [grid for candidate in self._tried for grid in candidate.grids]
         answers = partial(
             evaluate,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,19 @@ from edge.recording import LARGEST_BYTES, Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
+from edge.touch.features import (
+    FEATURES,
+    SAMPLES,
+    WINDOW_S,
+    feature_vector,
+    kernel_channels,
+    widths,
+)
 from edge.touch.frame import Frame
+from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
+from train.kernels import MOST_TOUCHES, kernel_table
 from train.progress import bar
 
 NO_CONTACT = "none"
@@ -78,6 +87,7 @@ class DataSet:
         tasks: keys of the labels, sorted; every trial has them all.
         left_out: {missing label or joint angles: recordings left out for lack of it}.
         unused: recordings with more contacts than were used.
+        kernels: {feature: its table} of the features that are made of kernels, see `with_kernels`.
     """
 
     trials: tuple[Trial, ...]
@@ -91,6 +101,7 @@ class DataSet:
     tasks: tuple[str, ...]
     left_out: dict[str, tuple[Path, ...]]
     unused: tuple[Path, ...]
+    kernels: Mapping[str, KernelTable] = field(default_factory=dict)
 
     def untouched_labels(self, task: str) -> list[str]:
         """The labels for a task of the recordings in which no contact was found."""
@@ -123,7 +134,24 @@ class DataSet:
             names: some of the features measured; all where None.
         """
         names = self.names if names is None else tuple(names)
-        return np.stack([feature_vector(t.series, window_s, samples, names) for t in self.trials])
+        return np.stack(
+            [feature_vector(t.series, window_s, samples, names, self.kernels) for t in self.trials]
+        )
+
+    def with_kernels(self, window_s: float) -> DataSet:
+        """The same trials with the tables that features of kernels need, for a window."""
+        every = -(-len(self.trials) // MOST_TOUCHES)
+        felt = [trial.series.felt(window_s) for trial in self.trials[::every]]
+        tables = {
+            name: kernel_table(
+                [kernel_channels(series, window_s, name) for series in felt],
+                measures.KERNELS[name],
+                alike=name == "taxel_kernels",
+            )
+            for name in self.names
+            if name in measures.KERNELS
+        }
+        return replace(self, kernels=tables)
 
     def of(self, names: Sequence[str]) -> DataSet:
         """The same trials with some of the features measured, in the order of `self.names`."""
@@ -134,6 +162,7 @@ class DataSet:
             names=taken,
             chain=self.chain if any(feature.moves for feature in types) else None,
             joints=self.joints if any(feature.of_joints for feature in types) else 0,
+            kernels={name: table for name, table in self.kernels.items() if name in taken},
         )
 
     @property

@@ -167,6 +167,7 @@ def fit(
         windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
     window_s, notes = choosing.window(windows)
     chosen, trials = choosing.choose(window_s)
+    dataset = dataset.with_kernels(window_s)
     choices = {task: settings.choice for task, settings in chosen.items()}
     measured = dataset
     dataset = measured.of([name for choice in choices.values() for name in choice.features])

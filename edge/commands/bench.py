@@ -35,7 +35,6 @@ from edge.files import write_whole
 from edge.model.model import Model
 from edge.skin.file import SkinFile, frame_rate, load
 from edge.skin.loop import garbage_aside
-from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
@@ -145,7 +144,7 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
         return largest_region(counts, layout.threshold_counts, wraps=layout.wraps)
 
     def vector(_: int = 0) -> NDArray[np.float64]:
-        return feature_vector(series, info.window_s, info.samples, info.features)
+        return info.vector(series)
 
     once, calls = vector(), range(rounds)
     model.decide(once)

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
 from edge.model.stopping import Novelty, Stopping
 from edge.touch import measures
 from edge.touch.arm import Chain
-from edge.touch.features import widths
+from edge.touch.contact import FeatureSeries
+from edge.touch.features import channels_of, feature_vector, widths
+from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
 
@@ -72,6 +78,8 @@ class ModelInfo:
     """The limits of novelty; None without decision points."""
     joints: int = 0
     """Joint angles of a frame, where a feature is made of them."""
+    kernels: Mapping[str, KernelTable] = field(default_factory=dict)
+    """{feature: its table} of the features that are made of kernels."""
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -82,6 +90,11 @@ class ModelInfo:
     def width(self) -> int:
         """Length of a feature vector."""
         return sum(self.widths)
+
+    def vector(self, series: FeatureSeries, window_s: float | None = None) -> NDArray[np.float64]:
+        """The model's features of a contact, by default at the full window: `feature_vector`."""
+        window_s = window_s or self.window_s
+        return feature_vector(series, window_s, self.samples, self.features, self.kernels)
 
     @property
     def dof(self) -> int | None:
@@ -118,6 +131,7 @@ class ModelInfo:
                 "stopping": {task: rules.to_dict() for task, rules in self.stopping.items()},
                 "novelty": self.novelty.to_dict(),
             }
+        kernels = {name: vars(table) for name, table in self.kernels.items()}
         return json.dumps(
             {
                 **calibration,
@@ -132,6 +146,7 @@ class ModelInfo:
                 "motion_frame": self.motion_frame,
                 "arm": None if self.chain is None else self.chain.to_dict(),
                 **({"joints": self.joints} if self.joints else {}),
+                **({"kernels": kernels} if self.kernels else {}),
                 "rows": self.rows,
                 "data_digest": self.data_digest,
                 "versions": self.versions,
@@ -160,13 +175,15 @@ class ModelInfo:
             points = meta.numbers("decision_points_s", default=())
             rules = meta.table("stopping") if points else ConfigTable({}, where)
             novelty = meta.table("novelty") if points else None
+            layout = SkinLayout.from_dict(meta.get("skin"), where=where)
+            names = meta.texts("features")
             info = cls(
                 tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
-                layout=SkinLayout.from_dict(meta.get("skin"), where=where),
+                layout=layout,
                 tracking=TrackSettings(tracking.whole("debounce", allowed=range(1, 1001))),
                 window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
                 samples=meta.whole("samples", allowed=range(2, 10_001)),
-                features=meta.texts("features"),
+                features=names,
                 units={str(k): str(v) for k, v in meta.table("units").raw.items()},
                 motion_frame=meta.choice("motion_frame", ("world", "skin")),
                 chain=Chain.from_dict(meta.get("arm"), where=where) if meta.has("arm") else None,
@@ -179,6 +196,15 @@ class ModelInfo:
                 },
                 novelty=None if novelty is None else Novelty.from_table(novelty, len(points)),
                 joints=meta.whole("joints", 0, allowed=range(0, 1001)),
+                kernels={
+                    name: KernelTable.from_table(
+                        meta.table("kernels").table(name),
+                        channels_of(name, layout),
+                        measures.KERNELS[name],
+                    )
+                    for name in names
+                    if name in measures.KERNELS
+                },
             )
             tracking.done()
         except InputError as error:

@@ -34,7 +34,6 @@ from edge.errors import InputError
 from edge.model.model import Model, require_joints
 from edge.recording import Recording, load_arrays, load_meta
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
 
@@ -139,7 +138,7 @@ def _path(
             continue
         onsets[i], series = contact
         for j, window_s in enumerate(windows):
-            vectors[j, i] = feature_vector(series, window_s, info.samples, info.features)
+            vectors[j, i] = info.vector(series, window_s)
         lengths[i] = len(series.integers)
         if series.integers.shape[1] != expected.shape[1]:
             raise ValueError(f"series_counts has {expected.shape[1]} columns")

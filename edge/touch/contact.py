@@ -43,6 +43,7 @@ class FeatureSeries:
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
         turn: columns of a full turn where the skin wraps, or None.
         taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`), or None.
+        kernel_cells: (n, cells) likewise, of the fewer cells that kernels take, or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or None.
         threshold_counts: a taxel above it is active.
         pitch: distance between rows of taxels, metres; 1 taxel where it is unknown.
@@ -60,6 +61,7 @@ class FeatureSeries:
     force_motion: NDArray[np.float64] | None = None
     turn: int | None = None
     taxels: NDArray[np.int64] | None = None
+    kernel_cells: NDArray[np.int64] | None = None
     joints: NDArray[np.float64] | None = None
     threshold_counts: int = 0
     pitch: float = 1.0
@@ -94,7 +96,7 @@ class FeatureSeries:
     @property
     def integers(self) -> NDArray[np.int64]:
         """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
-        cells = [] if self.taxels is None else [self.taxels]
+        cells = [c for c in (self.taxels, self.kernel_cells) if c is not None]
         return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *cells])
 
 
@@ -106,6 +108,7 @@ class _Row(NamedTuple):
     force_motion: float
     counted: NDArray[np.int64]
     taxels: NDArray[np.int64] | None
+    kernel_cells: NDArray[np.int64] | None
     joints: NDArray[np.float64] | None
 
 
@@ -169,9 +172,12 @@ class Contact:
         elif self._rows:
             motion, force_motion = self._rows[-1].motion, self._rows[-1].force_motion
         counted = np.array(plain + zones, dtype=np.int64)
-        cells = None if measurer.cells is None else measurer.cells.read(frame)
+        cells, coarse = (
+            None if cells is None else cells.read(frame)
+            for cells in (measurer.cells, measurer.kernel_cells)
+        )
         joints = self._joints_of(frame) if measurer.joints else None
-        self._rows.append(_Row(age_s, motion, force_motion, counted, cells, joints))
+        self._rows.append(_Row(age_s, motion, force_motion, counted, cells, coarse, joints))
         self.age_s = age_s
 
     def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
@@ -241,7 +247,10 @@ class Contact:
             zones={zone: zones[:, columns] for zone, columns in measurer.columns.items()},
             force_motion=force_motion if measurer.force_motion else None,
             turn=self.layout.cols if self.layout.wraps else None,
-            taxels=None if measurer.cells is None else np.array([row.taxels for row in rows]),
+            taxels=np.array([row.taxels for row in rows]) if measurer.cells else None,
+            kernel_cells=(
+                np.array([row.kernel_cells for row in rows]) if measurer.kernel_cells else None
+            ),
             joints=np.array([row.joints for row in rows]) if measurer.joints else None,
             threshold_counts=self.layout.threshold_counts,
             pitch=self.layout.pitch[0],

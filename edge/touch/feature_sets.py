@@ -43,6 +43,15 @@ spread over decades; their square roots lie evenly, as those of counts do.
 | `taxel_force_mean`, `taxel_force_deviation` | newton (count) | the same, over the window |
 | `taxel_force_roughness` | newton (count) | its mean change from sample to sample |
 
+`kernels`: the share of the window in which kernels of nine samples, applied to sums of the skin's
+cells, lie above values that training gave (`edge.touch.kernels`). `zone_kernels`: the same of the
+eight whole numbers of each zone (`edge.touch.measures.ZONE_WIDTH`), which goes with `moments`.
+
+| feature | unit | from |
+|---|---|---|
+| `taxel_kernels`, 1,008 of them | 1 | the sums of counts of at most 32 cells |
+| `zone_kernels`, 504 of them | 1 | the sums of `contact`, `skin`, `left` and `right` |
+
 `joints`: how far each joint yields, which depends on the object touched. `posture`: the angles
 themselves. They give a gripper the object's size, and an arm its place. Where each object stood in
 its own place, posture recognises it for a reason that holds in that room only.
@@ -89,6 +98,8 @@ SETS: dict[str, tuple[str, ...]] = {
     ),
     "taxels": _TAXELS,
     "sqrt_taxels": tuple(f"sqrt_{name}" for name in _TAXELS),
+    "kernels": ("taxel_kernels",),
+    "zone_kernels": ("zone_kernels",),
     "joints": ("joint_change@10", "joint_change_rate@10"),
     "posture": ("joint_angle@10",),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
 from typing import Any
@@ -12,18 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch import measures
-from edge.touch.contact import FeatureSeries
+from edge.touch import kernels, measures
+from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
+from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import (
     AREA,
     COLS,
     COLS_COLS,
     FORCE,
+    KERNEL_CELLS,
+    KERNELS,
     PEAK,
     ROWS,
     ROWS_COLS,
     ROWS_ROWS,
+    ZONE_WIDTH,
+    ZONES,
     Cells,
     Feature,
 )
@@ -54,7 +59,9 @@ def widths(
     """
     types = [measures.feature(name) for name in names]
     cells = Cells(layout).count if any(f.quantity == "taxel_force" for f in types) else 0
-    rows = [joints if f.of_joints else cells if f.wide else 1 for f in types]
+    rows = [
+        joints if f.of_joints else KERNELS.get(f.quantity, cells) if f.wide else 1 for f in types
+    ]
     return tuple(
         n if f.single else n * (f.samples or samples) for f, n in zip(types, rows, strict=True)
     )
@@ -65,6 +72,7 @@ def feature_vector(
     window_s: float,
     samples: int = SAMPLES,
     features: Sequence[str] = FEATURES,
+    tables: Mapping[str, KernelTable] | None = None,
 ) -> NDArray[np.float64]:
     """The features of the window from onset to onset + window, one after another.
 
@@ -94,14 +102,15 @@ def feature_vector(
         window_s: seconds from onset, above 0.
         samples: times per feature, at least 2.
         features: names, see `edge.touch.measures`; the series must have been measured for them.
+        tables: {feature: its table} of those that are made of kernels.
 
     Returns:
         (sum of `widths`,) float64: by default max_force in newtons (or counts),
         contact_area in taxels, contact_motion in metres, each at `samples` times.
 
     Raises:
-        InputError: the window or the number of samples makes no sense, the series is empty, or
-            a feature does not exist or was not measured.
+        InputError: the window or the number of samples makes no sense, the series is empty, a
+            feature does not exist or was not measured, or its table is missing.
     """
     if not (math.isfinite(window_s) and window_s > 0.0):
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
@@ -111,7 +120,7 @@ def feature_vector(
     series = series.felt(window_s)
     if series.t.size == 0:
         raise InputError("the contact has no frame")
-    course = _Course(series, window_s)
+    course = _Course(series, window_s, tables or {})
     # Overflow to infinity is refused by `_Course.sampled` and by the model.
     with np.errstate(over="ignore"):
         return np.concatenate(
@@ -128,8 +137,10 @@ def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
 class _Course:
     """What was measured on a contact, at times of its window."""
 
-    def __init__(self, series: FeatureSeries, window_s: float) -> None:
-        self._series, self._window_s = series, window_s
+    def __init__(
+        self, series: FeatureSeries, window_s: float, tables: Mapping[str, KernelTable]
+    ) -> None:
+        self._series, self._window_s, self._tables = series, window_s, tables
         self._scale = series.counts_per_newton or 1.0
         self._zones = {name: _Zone(sums, series) for name, sums in series.zones.items()}
         self._force_floor = (series.threshold_counts + 1) / self._scale
@@ -138,6 +149,11 @@ class _Course:
     def block(self, group: tuple[Feature, ...], samples: int) -> NDArray[np.float64]:
         """Values of features of one kind, one after another."""
         first = group[0]
+        if first.name in KERNELS:
+            channels = kernel_channels(self._series, self._window_s, first.name)
+            if first.name not in self._tables:
+                raise InputError(f"{first.name} needs a table that training made")
+            return kernels.shares(channels, self._tables[first.name])
         samples = first.samples or samples
         step = self._window_s / (samples - 1)
         values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
@@ -221,6 +237,36 @@ class _Course:
         if values is None:
             raise _not_measured(feature)
         return values
+
+
+def kernel_channels(series: FeatureSeries, window_s: float, name: str) -> NDArray[np.int64]:
+    """(channels, `edge.touch.kernels.SAMPLES`) what the kernels of a feature are applied to.
+
+    The last value before each time is held, and nothing is interpolated, so all are whole numbers.
+
+    Args:
+        series: the contact, as `FeatureSeries.felt` gives it.
+        window_s: seconds from onset.
+        name: of the feature.
+
+    Raises:
+        InputError: the feature was not measured.
+    """
+    rows: NDArray[np.int64] | None = series.kernel_cells
+    if name == "zone_kernels":
+        measured = len(series.zones) == len(ZONES)
+        rows = np.column_stack(list(series.zones.values())) if measured else None
+    if rows is None:
+        raise _not_measured(measures.feature(name))
+    times = np.arange(kernels.SAMPLES) * (window_s / (kernels.SAMPLES - 1)) + CLOCK_ROUNDING_S
+    return np.asarray(rows[series.t.searchsorted(times, side="right") - 1].T)
+
+
+def channels_of(name: str, layout: SkinLayout) -> int:
+    """How many channels the kernels of a feature are applied to."""
+    if name == "zone_kernels":
+        return ZONE_WIDTH * len(ZONES)
+    return Cells(layout, KERNEL_CELLS).count
 
 
 def _not_measured(feature: Feature) -> InputError:

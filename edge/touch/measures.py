@@ -52,12 +52,17 @@ ALONE = {
     "force_motion": ("contact", "force_motion"),
     "stiffness": ("skin", "stiffness"),
     "taxel_force": ("skin", "taxel_force"),
+    "taxel_kernels": ("skin", "taxel_kernels"),
+    "zone_kernels": ("skin", "zone_kernels"),
     "joint_change": ("arm", "joint_change"),
     "joint_angle": ("arm", "joint_angle"),
 }
 """Names that are not a zone and a quantity."""
-WIDE = ("taxel_force", "joint_change", "joint_angle")
-"""Quantities of many values a frame: one for each cell of the skin (`Cells`) or each joint."""
+KERNELS = {"taxel_kernels": 1008, "zone_kernels": 504}
+"""Quantities that kernels make (`edge.touch.kernels`), and how many values each has. They are
+applied to the skin's cells, at most `KERNEL_CELLS`, and to the whole numbers of all zones."""
+WIDE = ("taxel_force", *KERNELS, "joint_change", "joint_angle")
+"""Quantities of many values: one for each cell of the skin (`Cells`), kernel or joint."""
 MOVING = ("motion", "force_motion", "stiffness")
 """Quantities that are measured in the world's frame where joint angles are known."""
 SIGNED = ("around", "slant", "joint_change", "joint_angle")
@@ -76,6 +81,8 @@ _NAME = re.compile(
 MOST_SAMPLES = 10_000
 MOST_CELLS = 256
 """A skin of more taxels is pooled into cells."""
+KERNEL_CELLS = 32
+"""The same, for kernels."""
 PEAK, AREA, FORCE, ROWS, COLS, ROWS_ROWS, ROWS_COLS, COLS_COLS = range(8)
 """Columns of the whole numbers of a zone: largest count, taxels, sum of counts, and the sums of
 counts times row, column, row squared, row times column, column squared."""
@@ -115,6 +122,7 @@ class Feature:
             "slant": "taxel^2",
             "joint_change": "radian",
             "joint_angle": "radian",
+            **dict.fromkeys(KERNELS, "1"),
         }.get(self.quantity, "taxel")
         for transform in self.transforms:
             unit = "1" if transform == "relative" else f"{transform}({unit})"
@@ -137,8 +145,8 @@ class Feature:
 
     @property
     def single(self) -> bool:
-        """Whether it is one number for the window (for each cell or joint)."""
-        return self.summary not in ("", "rate")
+        """Whether it is one number for the window (for each cell, kernel or joint)."""
+        return self.summary not in ("", "rate") or self.quantity in KERNELS
 
     @property
     def zones(self) -> tuple[str, ...]:
@@ -147,6 +155,8 @@ class Feature:
             return "skin", "contact"
         if self.quantity == "force_motion":
             return ("contact",)
+        if self.quantity == "zone_kernels":
+            return ZONES
         with_region = self.zone == "contact" and self.quantity in ("max_force", "area")
         return () if with_region or self.quantity not in QUANTITIES else (self.zone,)
 
@@ -182,6 +192,8 @@ def feature(name: str) -> Feature:
         raise InputError(
             f"the feature {name!r} may be negative and has no logarithm; take sqrt_{base}"
         )
+    if quantity in KERNELS and base != name:
+        raise InputError(f"{base} takes no transform, summary or number of times, as in {name!r}")
     if times and not 2 <= int(times) <= MOST_SAMPLES:
         raise InputError(f"the feature {name!r} must be taken at 2 to {MOST_SAMPLES} times")
     return Feature(name, zone, quantity, transforms, summary, int(times or 0))
@@ -206,16 +218,16 @@ class Cells:
 
     A cell's value is the sum of all its counts, those below the threshold included; taxels that
     could not be read are left out. The side of a block is the smallest power of two that leaves at
-    most `MOST_CELLS` of them. Blocks without a living taxel are no cells.
+    most so many of them. Blocks without a living taxel are no cells.
 
     Attributes:
         side: taxels along a block's side; 1 where every taxel is a cell.
         count: number of cells, row by row.
     """
 
-    def __init__(self, layout: SkinLayout) -> None:
+    def __init__(self, layout: SkinLayout, most: int = MOST_CELLS) -> None:
         side = 1
-        while math.ceil(layout.rows / side) * math.ceil(layout.cols / side) > MOST_CELLS:
+        while math.ceil(layout.rows / side) * math.ceil(layout.cols / side) > most:
             side *= 2
         self.side = side
         self._rows = np.arange(0, layout.rows, side)
@@ -243,6 +255,7 @@ class Measurer:
         width: how many whole numbers `measure` returns for a frame.
         columns: {zone: its part of them}.
         cells: the skin's cells where a feature needs them, else None.
+        kernel_cells: the same, for kernels.
         joints: number of joint angles kept of each frame; 0 where no feature needs them.
     """
 
@@ -252,6 +265,8 @@ class Measurer:
         self.motion = any(f.quantity == "motion" for f in types)
         self.force_motion = any(f.quantity in ("force_motion", "stiffness") for f in types)
         self.cells = Cells(layout) if any(f.quantity == "taxel_force" for f in types) else None
+        kernels = any(f.quantity == "taxel_kernels" for f in types)
+        self.kernel_cells = Cells(layout, KERNEL_CELLS) if kernels else None
         self.joints = joints if any(f.of_joints for f in types) else 0
         self.zones = tuple(zone for zone in ZONES if any(zone in f.zones for f in types))
         self.width = ZONE_WIDTH * len(self.zones)

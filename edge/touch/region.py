@@ -255,9 +255,14 @@ class ActiveTaxels:
         self.bits = self._grid.pack(padded)
 
     @cached_property
-    def _components(self) -> list[int]:
-        """The bits of each region."""
-        components, rest = [], self.bits
+    def _lone(self) -> int:
+        """The active taxels without an active neighbour."""
+        return self.bits & ~self._grid.neighbours(self.bits)
+
+    @cached_property
+    def _connected(self) -> list[int]:
+        """The bits of each region of several taxels."""
+        components, rest = [], self.bits ^ self._lone
         while rest:
             components.append(self._grid.flood(rest & -rest, rest))
             rest ^= components[-1]
@@ -266,7 +271,8 @@ class ActiveTaxels:
     @cached_property
     def regions(self) -> list[Region]:
         """All regions, as `find_regions` returns them."""
-        regions = map(self._region, self._components)
+        alone = map(self._grid.bit, np.flatnonzero(self._grid.unpack(self._lone)).tolist())
+        regions = map(self._region, [*self._connected, *alone])
         return sorted(regions, key=lambda region: (-region.area, -region.peak, region.index))
 
     def largest(self, previous: Region | None = None) -> Region | None:
@@ -278,9 +284,14 @@ class ActiveTaxels:
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
         if 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, int(self.counts.item(index)))
-        area = max(map(int.bit_count, self._components))
-        tied = [self._region(c) for c in self._components if c.bit_count() == area]
         before = 0 if previous is None else previous.bits
+        if not self._connected:
+            # A flickering skin may have nothing but lone taxels, a hundred and more of them.
+            lone = np.flatnonzero(self._grid.unpack(self._lone & before or self._lone))
+            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
+            return Region(self._grid, self._grid.bit(index), int(self.counts.item(index)))
+        area = max(map(int.bit_count, self._connected))
+        tied = [self._region(c) for c in self._connected if c.bit_count() == area]
         return min(tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index))
 
     def _region(self, bits: int) -> Region:

@@ -268,7 +268,7 @@ def test_zones_that_no_feature_calls_for_are_not_measured():
 
 def test_the_papers_three_are_the_default_and_come_first():
     assert FEATURES == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
-    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 6
+    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 8
     assert [feature(name).name for name in ALL] == ALL
 
 

@@ -1,0 +1,141 @@
+"""Convolution features in whole numbers: the share of a touch in which a kernel's sum is large.
+
+The kernels are those of MiniRocket (Dempster, Schmidt and Webb, 2021): nine taps, three of them of
+weight 2 and six of weight -1, at four dilations. Each is applied to the sum of a few channels of a
+touch. A feature is the share of the samples at which the result is above a bias, and biases are
+values that training touches had. Everything up to that share is a whole number below 2^21, so every
+machine finds the same bits.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from edge.config import ConfigTable
+
+SAMPLES = 40
+"""Times of the window at which a channel is taken."""
+TAPS = 9
+BITS = 14
+"""Of a channel's values; larger ones are cut off."""
+BIAS_BITS = 21
+"""Of a bias: 9 channels times 12, the sum of a kernel's weights, times 2^`BITS`."""
+KERNELS = np.array(
+    [[2 if tap in heavy else -1 for tap in range(TAPS)] for heavy in combinations(range(TAPS), 3)],
+    dtype=np.int32,
+)
+"""(84, 9) weights."""
+DILATIONS = (1, 2, 3, 4)
+"""Samples from one tap to the next."""
+BIASES = {1008: (5, 3, 2, 2), 504: (3, 1, 1, 1)}
+"""Numbers of biases that a feature may have, and how many of them a kernel has at each dilation."""
+CONVOLUTIONS = len(DILATIONS) * len(KERNELS)
+MIXED = (1, 1, 1, 2, 2, 3, 4, 6, 9)
+"""How many channels a convolution may sum up; each entry is as likely as the others."""
+SEED = 2021
+"""Of the channels that each convolution sums up."""
+
+
+@dataclass(frozen=True)
+class KernelTable:
+    """What training says about the kernels of one feature.
+
+    Attributes:
+        shifts: of each channel: its values are multiplied by 2^shift, fractions cut off.
+        biases: of every kernel, in the order of `convolution_of_bias`.
+    """
+
+    shifts: tuple[int, ...]
+    biases: tuple[int, ...]
+
+    @classmethod
+    def from_table(cls, table: ConfigTable, channels: int, biases: int) -> KernelTable:
+        """Read what `vars` of a table gave to a model's metadata.
+
+        Raises:
+            InputError: the numbers are not those of so many channels and biases.
+        """
+        shifts = table.numbers("shifts", channels, low=-48, high=BITS)
+        limits = table.numbers("biases", biases, low=-(2**BIAS_BITS), high=2**BIAS_BITS)
+        table.done()
+        return cls(tuple(map(int, shifts)), tuple(map(int, limits)))
+
+
+@lru_cache
+def convolution_of_bias(biases: int) -> NDArray[np.int64]:
+    """(biases,) the convolution that each of so many biases belongs to."""
+    each = np.repeat(BIASES[biases], len(KERNELS))
+    return np.repeat(np.arange(CONVOLUTIONS), each)
+
+
+@lru_cache
+def _inside() -> NDArray[np.bool_]:
+    """(convolutions, samples) whether a sample counts.
+
+    Every other kernel counts only where all its taps lie inside the window; the rest count
+    everywhere, with zeros beyond the window's ends.
+    """
+    inside = np.ones((len(DILATIONS), len(KERNELS), SAMPLES), dtype=np.bool_)
+    for i, dilation in enumerate(DILATIONS):
+        reach = dilation * (TAPS // 2)
+        inside[i, 1 - i % 2 :: 2, :reach] = inside[i, 1 - i % 2 :: 2, -reach:] = False
+    return inside.reshape(CONVOLUTIONS, SAMPLES)
+
+
+@lru_cache
+def _mixes(channels: int) -> NDArray[np.float32]:
+    """(convolutions, channels) 1 where a convolution takes a channel.
+
+    Python promises that `random` gives the same numbers in every version.
+    """
+    draw = random.Random(SEED).random
+    mixes = np.zeros((CONVOLUTIONS, channels), dtype=np.float32)
+    for row in mixes:
+        rest = list(range(channels))
+        for _ in range(min(MIXED[int(draw() * len(MIXED))], channels)):
+            row[rest.pop(int(draw() * len(rest)))] = 1.0
+    return mixes
+
+
+def shifted(channels: NDArray[np.int64], shifts: Sequence[int]) -> NDArray[np.int32]:
+    """Channels (c, samples) times powers of two, cut off at what `BITS` hold."""
+    by = np.array(shifts)[:, None]
+    moved = np.minimum(channels, 1 << 48) << np.maximum(by, 0) >> np.maximum(-by, 0)
+    return np.asarray(np.minimum(moved, (1 << BITS) - 1), dtype=np.int32)
+
+
+def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(convolutions, samples) results of `shifted` channels (c, samples)."""
+    # Sums of nine such numbers are below 2^18: float32 holds them exactly, whatever the order.
+    mixed = (_mixes(len(channels)) @ channels.astype(np.float32)).astype(np.int32)
+    mixed = mixed.reshape(len(DILATIONS), len(KERNELS), SAMPLES)
+    results = np.empty_like(mixed)
+    for dilation, rows, result in zip(DILATIONS, mixed, results, strict=True):
+        reach = dilation * (TAPS // 2)
+        padded = np.zeros((len(KERNELS), SAMPLES + 2 * reach), dtype=np.int32)
+        padded[:, reach:-reach] = rows
+        taps = sliding_window_view(padded, 2 * reach + 1, axis=1)[..., ::dilation]
+        np.einsum("kt,kst->ks", KERNELS, taps, out=result)
+    return results.reshape(CONVOLUTIONS, SAMPLES)
+
+
+def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float64]:
+    """(biases,) share of the samples at which each kernel's result is above its bias.
+
+    Args:
+        channels: (c, samples) whole numbers from 0.
+        table: of training.
+    """
+    own = convolution_of_bias(len(table.biases))
+    inside = _inside()[own]
+    above = convolved(shifted(channels, table.shifts))[own] > np.array([table.biases], np.int32).T
+    counts = np.count_nonzero(above & inside, axis=1)
+    return np.asarray(counts / np.count_nonzero(inside, axis=1))

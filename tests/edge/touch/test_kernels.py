@@ -1,0 +1,138 @@
+"""Kernels against a loop of Python's own integers."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from edge.config import ConfigTable
+from edge.errors import InputError
+from edge.touch import kernels
+from edge.touch.features import channels_of, feature_vector, kernel_channels
+from edge.touch.frame import Frame
+from edge.touch.kernels import SAMPLES, KernelTable, convolution_of_bias, shares
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import feature
+from edge.touch.track import ContactTracker
+
+SKIN = SkinLayout(16, 24, threshold_counts=9)
+HEAVY = list(combinations(range(9), 3))
+
+
+def by_hand(channels, table):
+    """(above, counted) of every bias, in Python's integers."""
+    moved = [
+        [min(value << shift if shift > 0 else value >> -shift, (1 << 14) - 1) for value in row]
+        for row, shift in zip(channels.tolist(), table.shifts, strict=True)
+    ]
+    taken = kernels._mixes(len(moved)).tolist()
+    seen = []
+    for bias, convolution in zip(
+        table.biases, convolution_of_bias(len(table.biases)).tolist(), strict=True
+    ):
+        dilation, kernel = divmod(convolution, 84)
+        dilation += 1
+        mixed = [
+            sum(row[t] for row, take in zip(moved, taken[convolution], strict=True) if take)
+            for t in range(SAMPLES)
+        ]
+        padded = (dilation - 1 + kernel) % 2 == 0
+        reach = 0 if padded else 4 * dilation
+        above = 0
+        for t in range(reach, SAMPLES - reach):
+            at = [t + (tap - 4) * dilation for tap in range(9)]
+            inside = [mixed[i] if 0 <= i < SAMPLES else 0 for i in at]
+            total = sum(
+                (2 if tap in HEAVY[kernel] else -1) * value for tap, value in enumerate(inside)
+            )
+            above += total > bias
+        seen.append((above, SAMPLES - 2 * reach))
+    return seen
+
+
+@pytest.mark.parametrize(("biases", "channels"), [(1008, 1), (504, 5), (504, 32)])
+def test_every_share_is_that_of_a_loop_of_whole_numbers(biases, channels):
+    rng = np.random.default_rng(biases + channels)
+    values = rng.integers(0, 1 << 20, (channels, SAMPLES)) * rng.integers(0, 2, SAMPLES)
+    table = KernelTable(
+        tuple(rng.integers(-9, 3, channels).tolist()),
+        tuple(rng.integers(-(1 << 15), 1 << 15, biases).tolist()),
+    )
+    expected = [above / counted for above, counted in by_hand(values, table)]
+    assert shares(values, table).tolist() == expected
+    assert len(set(expected)) > 20
+
+
+def test_the_largest_values_stay_exact():
+    values = np.full((32, SAMPLES), 1 << 60)
+    values[:, ::2] = 0
+    table = KernelTable((14,) * 32, (0,) * 504)
+    assert shares(values, table).tolist() == [a / n for a, n in by_hand(values, table)]
+
+
+def test_a_convolution_takes_one_to_nine_channels_the_same_on_every_machine():
+    mixes = kernels._mixes(32)
+    assert set(mixes.sum(axis=1).tolist()) == {1, 2, 3, 4, 6, 9}
+    assert np.flatnonzero(mixes[3]).tolist() == [1, 13, 16, 20, 23, 27]
+    assert (kernels._mixes(1) == 1).all()
+
+
+def touch(layout=SKIN):
+    """A press that grows; its frames come 40 ms apart and a little late."""
+    frames = []
+    for i in range(40):
+        counts = np.zeros(layout.shape, dtype=np.uint16)
+        counts[2:5, 3:6] = 10 + 7 * i % 50
+        frames.append(Frame(5.0 + 0.04 * i + 1e-9 * (i % 3), counts))
+    return frames
+
+
+def series_of(frames, *wanted):
+    tracker = ContactTracker(SKIN, features=wanted)
+    for frame in frames:
+        (contact,) = tracker.push(frame) or [None]
+    return contact.series()
+
+
+@pytest.mark.parametrize(("name", "channels"), [("taxel_kernels", 24), ("zone_kernels", 32)])
+def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
+    frames = touch()
+    held = kernel_channels(series_of(frames, name), 1.56, name)
+    assert held.shape == (channels, SAMPLES) == (channels_of(name, SKIN), SAMPLES)
+    # Frame i is 0.04 s i after the onset, at which sample i is taken.
+    forces = [int(frame.counts.sum()) for frame in frames]
+    sums = held.sum(axis=0) if name == "taxel_kernels" else held[10]
+    assert sums.tolist() == forces
+    table = KernelTable((0,) * channels, (0,) * {"taxel_kernels": 1008, "zone_kernels": 504}[name])
+    vector = feature_vector(series_of(frames, name), 1.56, features=[name], tables={name: table})
+    assert vector.tolist() == shares(held, table).tolist()
+
+
+def test_kernels_without_their_table_or_their_measurements_are_refused():
+    series = series_of(touch(), "taxel_kernels")
+    with pytest.raises(InputError, match="taxel_kernels needs a table that training made"):
+        feature_vector(series, 1.0, features=["taxel_kernels"])
+    with pytest.raises(InputError, match="zone_kernels was not measured"):
+        kernel_channels(series, 1.0, "zone_kernels")
+
+
+@pytest.mark.parametrize("name", ["sqrt_zone_kernels", "zone_kernels_mean", "taxel_kernels@10"])
+def test_kernels_have_no_transform_summary_or_times(name):
+    with pytest.raises(InputError, match="takes no transform, summary or number of times"):
+        feature(name)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"shifts": [0], "biases": [0] * 504},
+        {"shifts": [0, 0], "biases": [0] * 503},
+        {"shifts": [0, 60], "biases": [0] * 504},
+        {"shifts": [0, 0], "biases": [1 << 22] * 504},
+    ],
+)
+def test_a_damaged_table_is_refused(wrong):
+    right = KernelTable((0, -3), (5,) * 504)
+    assert KernelTable.from_table(ConfigTable(vars(right), "m"), 2, 504) == right
+    with pytest.raises(InputError, match="^m: "):
+        KernelTable.from_table(ConfigTable(wrong, "m"), 2, 504)
