@@ -23,7 +23,8 @@ from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS, COLUMN
 
 START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
 RATE_DEG_S = 20.0
-LEAD_S, LASTS_S, RATE_HZ, STEP_S = 0.3, 2.1, 100, 0.001
+LEAD_S, TOUCH_S, RATE_HZ, STEP_S = 0.3, 1.8, 100, 0.001
+"""Seconds before the arm meets a rigid thing, and after that at the usual speed."""
 PLACE_M = 0.10
 COUNTS_PER_NEWTON, THRESHOLD_COUNTS, ONSET_COUNTS = 1000.0, 40, 60
 RADIUS_M = 0.04604
@@ -37,6 +38,7 @@ SOLIMP, RIGID = 0.95, "-1e6 -2e3"
 """MuJoCo's contact is SOLIMP / (1 - SOLIMP) times as stiff as solref times the mass."""
 ABOVE_FLOOR_M = 0.30
 """Height of the middle of the contact."""
+RIGID_KINDS = ("box", "drum", "drawer", "door")
 FOOT_M = 0.16
 """Length of a thing's foot along the push."""
 
@@ -46,7 +48,7 @@ class Thing:
     """The thing that is touched.
 
     Attributes:
-        kind: box, drum, foam, cushion, bale or plant.
+        kind: box, drum, drawer, door, foam, cushion, bale, cloth, limb or plant.
         mass_kg, floor, skin: its mass, and its friction on the floor and on the skin.
         height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
         below_m: how far a rigid face reaches below the middle of the contact (default: the floor).
@@ -54,6 +56,7 @@ class Thing:
         sideways: the layer's shear stiffness divided by modulus times thickness.
         stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the contact.
         seed: of a plant's shape.
+        joint: MuJoCo's joint between a movable thing and the room.
     """
 
     kind: str
@@ -69,11 +72,12 @@ class Thing:
     stems: int = 8
     stem_n_m: float = 10.0
     seed: int = 0
+    joint: str = "<freejoint/>"
 
     @property
     def soft(self) -> bool:
         """Whether it yields."""
-        return self.kind not in ("box", "drum")
+        return self.kind not in RIGID_KINDS
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ class Touch:
         aside_m, yaw_rad: the thing's distance beside the push, and its turn.
         slope_rad: slope of the table along the push.
         taxel_n_m: stiffness of the pads.
+        speed, stiffness: of the arm, in units of Cody's; its damping ratio stays.
         noise: standard deviation in counts, and its stream.
     """
 
@@ -97,6 +102,8 @@ class Touch:
     yaw_rad: float = 0.0
     slope_rad: float = 0.0
     taxel_n_m: float = 10e3
+    speed: float = 1.0
+    stiffness: float = 1.0
     noise: tuple[float, np.random.Generator] | None = None
 
 
@@ -154,7 +161,8 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
     for i, joint in enumerate(chain.joints):
         axis = " ".join(map(str, joint.axis))
         xml += f'<body pos="{at}" gravcomp="1"><joint name="j{i}" axis="{axis}" '
-        xml += f'damping="{CODY_DAMPING[i]}" armature="0.004"/>'
+        damping = CODY_DAMPING[i] * math.sqrt(touch.stiffness)
+        xml += f'damping="{damping}" armature="0.004"/>'
         mass, centre = masses.get(i, (0.05, "0 0 0"))
         size = "0.03 0.09" if i in masses else "0.02 0.01"
         xml += f'<geom type="capsule" size="{size}" pos="{centre}" mass="{mass}" '
@@ -193,12 +201,11 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     skin = f'friction="{thing.skin} 0.005 0.0001"'
     floor = f'friction="{thing.floor} 0.005 0.0001"'
     between, layer, back = "", "", FOOT_M / 2
-    if thing.kind in ("box", "drum"):
+    if not thing.soft:
         shape = (
-            f'type="box" size="{FOOT_M / 2} {width / 2} {half}" pos="{FOOT_M / 2} 0 {middle}"'
-            if thing.kind == "box"
-            else f'type="cylinder" size="{width / 2 + 0.08} {half}" '
-            f'pos="{width / 2 + 0.08} 0 {middle}"'
+            f'type="cylinder" size="{width / 2 + 0.08} {half}" pos="{width / 2 + 0.08} 0 {middle}"'
+            if thing.kind == "drum"
+            else f'type="box" size="{FOOT_M / 2} {width / 2} {half}" pos="{FOOT_M / 2} 0 {middle}"'
         )
         parts = f'<geom {shape} mass="{thing.mass_kg * 0.2}" contype="2" conaffinity="1" {skin}/>'
     elif thing.kind == "plant":
@@ -211,7 +218,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     foot = f'<geom type="box" size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" '
     foot += f'pos="{back} 0 0.004" mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" '
     foot += f"{floor}/>"
-    free = "" if touch.fixed else "<freejoint/>"
+    free = "" if touch.fixed else thing.joint
     return (
         f'<body name="thing" pos="{x} {y} {base}" axisangle="0 0 1 {push}">{free}{foot}{parts}'
         f'</body><geom type="plane" size="4 4 0.1" pos="0 0 {base}" contype="8" conaffinity="4" '
@@ -235,8 +242,8 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     mujoco.set_mju_user_warning(lambda text: None)
     chain = Chain.cody()
     start = np.radians(START_DEG) + np.array(touch.start_rad)
-    rate = swing(chain)
-    first = start - lag(rate)
+    rate = swing(chain, touch)
+    first = start - lag(rate, touch)
     pose, later = chain.pose(first + rate * LEAD_S), chain.pose(first + rate * (LEAD_S + 0.01))
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
     point = (pose @ on)[:3]
@@ -250,7 +257,8 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
         touch, point + ahead * (RADIUS_M + 0.001) + aside, heading + touch.yaw_rad
     )
     gains = "".join(
-        f'<position joint="j{i}" kp="{k}"/>' for i, k in enumerate(CODY_STIFFNESS[: chain.dof])
+        f'<position joint="j{i}" kp="{k * touch.stiffness}"/>'
+        for i, k in enumerate(CODY_STIFFNESS[: chain.dof])
     )
     slope, g = touch.slope_rad, 9.81
     fall = (*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope))
@@ -262,16 +270,16 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     return model, start, where
 
 
-def swing(chain: Chain) -> NDArray[np.float64]:
+def swing(chain: Chain, touch: Touch) -> NDArray[np.float64]:
     """(dof,) rad/s of the equilibrium point."""
     rate = np.zeros(chain.dof)
-    rate[0] = math.radians(RATE_DEG_S)
+    rate[0] = math.radians(RATE_DEG_S * touch.speed)
     return rate
 
 
-def lag(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+def lag(rate: NDArray[np.float64], touch: Touch) -> NDArray[np.float64]:
     """(dof,) radians by which each joint trails its equilibrium point in free motion."""
-    return np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) * rate
+    return np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) / math.sqrt(touch.stiffness) * rate
 
 
 def simulate(touch: Touch) -> Touched:
@@ -284,9 +292,9 @@ def simulate(touch: Touch) -> Touched:
     import mujoco
 
     chain, thing = Chain.cody(), touch.thing
-    rate, dof = swing(chain), chain.dof
+    rate, dof = swing(chain, touch), chain.dof
     data = mujoco.MjData(model)
-    data.qpos[:dof] = start - lag(rate)
+    data.qpos[:dof] = start - lag(rate, touch)
     data.qvel[:dof] = rate
     springs = [model.joint(f"p{i}").qposadr[0] for i in range(len(where))]
     row, column = np.array(where).T
@@ -294,7 +302,9 @@ def simulate(touch: Touch) -> Touched:
     mujoco.mj_forward(model, data)
     rub = mujoco_layer.Rub(model, touch.thing.skin) if is_layer(touch) else None
     frames, joints, forces, places = [], [], [], []
-    for _ in range(round(LASTS_S * RATE_HZ) + 1):
+    # A soft thing is felt later, the more so the slower the arm.
+    lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
+    for _ in range(round(lasts_s * RATE_HZ) + 1):
         loads = np.zeros((ROWS, len(COLUMN_ANGLES_DEG)))
         loads[row, column] = np.maximum(-pad_n_m(touch) * data.qpos[springs], 0.0)
         counts = loads * COUNTS_PER_NEWTON

@@ -1,8 +1,9 @@
 """`make transfer`: does a model trained on a simulated scene hold in another physics engine?
 
-MuJoCo makes trials of the paper's kind with parameters of its own (`bench/mujoco_touch.py`), and
-the model is scored on them. They are a test set: nothing in train/ reads them, and nothing may be
-tuned to one set of them; `--seed` makes another.
+MuJoCo makes trials of the paper's kind with parameters of its own (`bench/mujoco_touch.py`), also
+with arms and skins of other habits and of odd things, and the model is scored on them. They are a
+test set: nothing in train/ reads them, and nothing may be tuned to one set of them; `--seed` makes
+another.
 """
 
 from __future__ import annotations
@@ -11,7 +12,11 @@ import argparse
 import math
 import sys
 from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
@@ -25,22 +30,34 @@ from train.progress import bar
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
-EACH = 6
+EACH = 2
 """Trials of each object; every other trial is fixed."""
+ODD = "odd things"
+HABITS: dict[str, dict[str, float]] = {
+    "as in the paper": {},
+    "arm speed x 0.5": {"speed": 0.5},
+    "arm speed x 1.5": {"speed": 1.5},
+    "arm stiffness x 0.5": {"stiffness": 0.5},
+    "arm stiffness x 2": {"stiffness": 2.0},
+    "taxels x 0.4": {"taxel_n_m": 0.4},
+    "taxels x 2.5": {"taxel_n_m": 2.5},
+    ODD: {},
+}
+"""Factors of what `draw_touch` draws. The objects take turns."""
 SLIDES_M, WINDOW_S = 0.02, 1.2
 """A movable object has moved this far by the end of the window, as in the scenes and the paper."""
 DRAWS = 50
 FALSE_ALARMS = (0.02, 0.05, 0.1)
+
+Answers = dict[str, list[tuple[str, str]]]
+"""{task: (true, decided) of each trial}."""
 
 
 def draw_object(rng: np.random.Generator) -> Thing:
     """One object's properties, from other ranges than those of any scene in train/."""
     kind = str(rng.choice(["box", "drum", "foam", "cushion", "plant", "bale"]))
     soft = {"foam": (3e3, 18e3), "cushion": (1.2e3, 5e3), "bale": (5e3, 12e3)}
-
-    def between(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
+    between = partial(log_uniform, rng)
     return Thing(
         kind=kind,
         mass_kg=between(0.25, 2.2),
@@ -56,9 +73,47 @@ def draw_object(rng: np.random.Generator) -> Thing:
     )
 
 
-def draw_touch(thing: Thing, fixed: bool, rng: np.random.Generator) -> Touch:
-    """One touch: how the object stands before the arm, and how the arm begins."""
-    return Touch(
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A draw, even in its logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def draw_odd(rng: np.random.Generator) -> Thing:
+    """A door, a drawer, a thick cloth over something light, or a person's arm."""
+    between = partial(log_uniform, rng)
+    kind = str(rng.choice(["door", "drawer", "cloth", "limb"]))
+    plain = Thing(
+        kind,
+        mass_kg=between(1.0, 3.0),
+        floor=float(rng.uniform(0.25, 0.6)),
+        skin=float(rng.uniform(0.25, 0.65)),
+        height_m=float(rng.uniform(0.12, 0.45)),
+        breadth_m=float(rng.uniform(0.1, 0.4)),
+    )
+    slide = f'<joint type="slide" axis="1 0 0" frictionloss="{between(0.5, 4.0)}" damping="2"/>'
+    hinge = (
+        f'<joint type="hinge" axis="0 0 1" pos="0 {rng.choice([-1, 1]) * between(0.3, 0.7)} 0" '
+        f'frictionloss="{between(0.2, 1.5)}" damping="0.5"/>'
+    )
+    changes: dict[str, dict[str, Any]] = {
+        "door": {"joint": hinge},
+        "drawer": {"joint": slide, "mass_kg": between(1.0, 6.0)},
+        "cloth": {"modulus_pa": between(1.5e3, 5e3), "thick_m": between(0.03, 0.06)},
+        "limb": {
+            "joint": slide,
+            "height_m": float(rng.uniform(0.07, 0.11)),
+            "modulus_pa": between(8e3, 35e3),
+            "thick_m": float(rng.uniform(0.02, 0.04)),
+        },
+    }
+    return replace(plain, **changes[kind])
+
+
+def draw_touch(
+    thing: Thing, fixed: bool, rng: np.random.Generator, habit: Mapping[str, float]
+) -> Touch:
+    """One touch: how the object stands before the arm, how the arm begins, a habit's factors."""
+    touch = Touch(
         thing=thing,
         fixed=fixed,
         start_rad=tuple(np.radians(rng.normal(0.0, (0.5, 1.0, 1.0, 3.0, 3.0)))),
@@ -69,6 +124,7 @@ def draw_touch(thing: Thing, fixed: bool, rng: np.random.Generator) -> Touch:
         taxel_n_m=float(np.exp(rng.uniform(np.log(5e3), np.log(1.5e4)))),
         noise=(6.0, rng),
     )
+    return replace(touch, **{name: getattr(touch, name) * by for name, by in habit.items()})
 
 
 def moved(touched: Touched) -> float:
@@ -78,34 +134,47 @@ def moved(touched: Touched) -> float:
     return float(touched.moved_m[last])
 
 
-def make_trials(folder: Path, count: int, seed: int) -> tuple[list[Path], int]:
-    """`count` recordings, six of each object, and how many objects had to be drawn again.
+def make_trials(folder: Path, count: int, seed: int) -> tuple[dict[str, list[Path]], int]:
+    """{habit: recordings}, `count` in all, and how many objects had to be drawn again.
 
-    An object is drawn again where a trial that is called movable did not move. Recordings that an
-    earlier run has made are used again.
+    Each habit has a folder, and each object `EACH` recordings. An object is drawn again
+    where a trial that is called movable did not move. Recordings that an earlier run has made are
+    used again.
 
     Raises:
         InputError: an object did not move, however often it was drawn.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     objects = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
-    work = (delayed(_touch_object)(folder, i, numbers, seed) for i, numbers in enumerate(objects))
+    habits = [list(HABITS)[i % len(HABITS)] for i in range(len(objects))]
+    work = (
+        delayed(_touch_object)(folder / habit.replace(" ", "-"), i, numbers, seed, habit)
+        for i, (habit, numbers) in enumerate(zip(habits, objects, strict=True))
+    )
     done = Parallel(n_jobs=cpu_count(), return_as="generator")(work)
-    made = list(bar(done, total=len(objects), unit=" objects", desc="MuJoCo"))
-    return [path for paths, _ in made for path in paths], sum(again for _, again in made)
+    paths: dict[str, list[Path]] = {habit: [] for habit in HABITS}
+    redrawn = 0
+    shown = bar(done, total=len(objects), unit=" objects", desc="MuJoCo")
+    for habit, (made, again) in zip(habits, shown, strict=True):
+        paths[habit] += made
+        redrawn += again
+    return paths, redrawn
 
 
-def _touch_object(folder: Path, index: int, numbers: range, seed: int) -> tuple[list[Path], int]:
+def _touch_object(
+    folder: Path, index: int, numbers: range, seed: int, habit: str
+) -> tuple[list[Path], int]:
     """The recordings of one object, and how often it was drawn again."""
+    folder.mkdir(parents=True, exist_ok=True)
     earlier = sorted(folder.glob(f"*-{index:02d}-*.npz"))
     if len(earlier) == len(numbers):
         return earlier, 0
     for attempt in range(DRAWS):
-        thing = draw_object(streams.stream(seed, f"object.{attempt}", "transfer", index))
+        draw = draw_odd if habit == ODD else draw_object
+        thing = draw(streams.stream(seed, f"object.{attempt}", "transfer", index))
         touches: dict[Path, Touched] = {}
         for number in sorted(numbers, key=lambda n: n % 2 == 0):
             rng = streams.stream(seed, f"trial.{attempt}", "transfer", number)
-            touched = simulate(draw_touch(thing, number % 2 == 0, rng))
+            touched = simulate(draw_touch(thing, number % 2 == 0, rng, HABITS[habit]))
             if number % 2 == 1 and moved(touched) < SLIDES_M:
                 break
             condition = touched.recording.labels["mobility"]
@@ -118,15 +187,13 @@ def _touch_object(folder: Path, index: int, numbers: range, seed: int) -> tuple[
     raise InputError(f"transfer: object {index} was drawn {DRAWS} times and never moved")
 
 
-def decide(
-    model: edge.Model, paths: list[Path]
-) -> tuple[dict[str, list[tuple[str, str]]], list[float]]:
-    """({task: (true, decided) of each trial}, rate of false alarms at which each is unknown).
+def decide(model: edge.Model, paths: list[Path]) -> tuple[Answers, list[float]]:
+    """The answers, and the rate of false alarms at which each trial is unknown.
 
     A contact without a decision counts as wrong. The rates are empty where the model has no
     decision points, and so calls nothing unknown.
     """
-    answers: dict[str, list[tuple[str, str]]] = {t: [] for t in TASKS if t in model.info.tasks}
+    answers: Answers = {t: [] for t in TASKS if t in model.info.tasks}
     novelty, rates = model.info.novelty, []
     for path in paths:
         recording = load(path)
@@ -149,12 +216,25 @@ def share(count: int, total: int) -> str:
     return f"{100 * count / total:6.1f} %  ({100 * low:.0f} to {100 * high:.0f})"
 
 
-def report(answers: dict[str, list[tuple[str, str]]], rates: list[float]) -> str:
-    """Accuracies, shares called unknown, and the confusion of each task."""
-    lines = []
-    for task, pairs in answers.items():
-        right = sum(true == decided for true, decided in pairs)
-        lines.append(f"{task:<10}{share(right, len(pairs))} of {len(pairs)} trials")
+def report(by_habit: dict[str, list[Path]], answers: Answers, rates: list[float]) -> str:
+    """Accuracies in all and by habit, shares called unknown, and the confusion of each task.
+
+    Args:
+        by_habit: the trials, in the order of the answers.
+        answers, rates: of `decide`.
+    """
+    lines = [f"{'right':<20}" + "".join(f"{task:>26}" for task in answers)]
+    first = 0
+    spans = {"all": slice(None)}
+    for habit, paths in by_habit.items():
+        spans[habit] = slice(first, first + len(paths))
+        first += len(paths)
+    for habit, span in spans.items():
+        right = [[true == decided for true, decided in pairs[span]] for pairs in answers.values()]
+        if right[0]:
+            cells = "".join(f"{share(sum(each), len(each)):>26}" for each in right)
+            lines.append(f"{habit:<20}{cells} of {len(right[0])}")
+    lines.append("")
     for alarms in FALSE_ALARMS if rates else ():
         count = sum(rate <= alarms for rate in rates)
         lines.append(f"unknown   {share(count, len(rates))} at {alarms:.0%} false alarms")
@@ -173,7 +253,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="bench.transfer", description=__doc__.split("\n\n")[0])
     parser.add_argument("--model", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=Path("build/transfer"))
-    parser.add_argument("--trials", type=int, default=120)
+    parser.add_argument("--trials", type=int, default=128)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
     try:
@@ -181,7 +261,7 @@ def main(arguments: list[str] | None = None) -> int:
             options.out / f"seed{options.seed}", options.trials, options.seed
         )
         model = edge.Model(options.model)
-        text = report(*decide(model, paths))
+        text = report(paths, *decide(model, [path for each in paths.values() for path in each]))
     except InputError as error:
         print(f"transfer: {error}", file=sys.stderr)
         return 2

@@ -16,7 +16,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
-from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, without_folds
+from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, kinds_of, without_folds
 from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
@@ -134,7 +134,8 @@ def fit(
         dataset = data
     else:
         raw = read([data] if isinstance(data, str | Path) else data, progress=progress)
-        every = candidates({}, joints=raw.joints, features=features, quick=quick)
+        drawn = kinds_of(raw.recordings) is not None
+        every = candidates({}, joints=raw.joints, drawn=drawn, features=features, quick=quick)
         if window_s is None and not quick:
             windows = _windows([float(r.t[-1] - r.t[0]) for r in raw.recordings])
         dataset = load_trials(
@@ -155,6 +156,7 @@ def fit(
     tried = candidates(
         y,
         joints=dataset.joints > 0,
+        drawn=kinds_of([trial.recording for trial in dataset.trials]) is not None,
         features=features,
         projection=projection,
         scaling=scaling,

@@ -1,6 +1,7 @@
 """The candidates, their order of cost, and the choice of the window."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import train
 from edge.recording import save
 from edge.touch.feature_sets import expand
-from train.choose import PLAIN, WITH_JOINTS, candidates, costs, groupable, products
+from train.choose import PLAIN, WITH_JOINTS, candidates, costs, groupable, kinds_of, products
 from train.pipeline import Choice
 
 TASKS = {
@@ -52,6 +53,47 @@ def test_whole_objects_can_be_left_out_where_each_class_has_several():
     assert groupable(np.repeat(["x", "y"], 6), objects)
     assert not groupable(np.repeat(["x", "y"], [8, 4]), objects)
     assert not groupable(np.full(12, "x"), objects)
+
+
+def drawn_touches(make_touch, kinds=("box", "bin", "post"), numbered=True):
+    """{object: a touch of it}, as of a scene with two objects of each kind and category."""
+    touches = {}
+    for seed, (category, kind, i) in enumerate(product(("hard", "soft"), kinds, (1, 2))):
+        thing = f"{category} {kind} {i:02d}" if numbered else f"{category} {kind} {'ab'[i - 1]}"
+        one = make_touch(kind=category, seed=seed)
+        labels = {"category": category, "object": thing}
+        touches[thing] = replace(one, meta={**one.meta, "labels": labels, "simulation": {}})
+    return touches
+
+
+def test_simulated_things_that_a_scene_numbers_are_of_kinds(make_touch):
+    touches = drawn_touches(make_touch)
+    kinds = kinds_of(list(touches.values()))
+    assert kinds.tolist() == [name[:-3] for name in touches]
+    assert kinds_of(list(drawn_touches(make_touch, numbered=False).values())) is None
+    recorded = replace(touches["hard box 01"], meta={"labels": {"object": "box 03"}})
+    assert kinds_of([*touches.values(), recorded]) is None
+
+
+def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
+    for joints in (False, True):
+        tried = candidates(TASKS, joints=joints, drawn=True)
+        assert not {"posture", "taxels", "sqrt_taxels"} & {s for one in tried for s in one.sets}
+        assert min(min(grid.shrinkages) for one in tried for grid in one.grids) == 0.3
+    assert min(min(grid.shrinkages) for one in candidates(TASKS) for grid in one.grids) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("kinds", "left_out"), [(("box", "bin", "post"), "kind"), (("box", "bin"), "object")]
+)
+def test_entire_kinds_are_left_out_where_every_class_has_three(
+    kinds, left_out, make_touch, tmp_path
+):
+    for thing, one in drawn_touches(make_touch, kinds).items():
+        save(tmp_path / f"{thing}.npz", one)
+    fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
+    assert fitted.chosen["category"].left_out == left_out
+    assert fitted.chosen["object"].left_out == "trial"
 
 
 def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
