@@ -150,7 +150,8 @@ def fit(
     y = {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
     n = len(dataset.trials)
     if n < FEWEST_TRIALS:
-        raise InputError(f"{n} trials are too few to fit; record more")
+        counted = "1 trial is" if n == 1 else f"{n} trials are"
+        raise InputError(f"{counted} too few to fit; record at least {FEWEST_TRIALS}")
     if k is not None and not 1 <= k <= n - 1:
         raise InputError(f"k must be 1 to {n - 1} with {n} trials, not {k}")
     tried = candidates(

@@ -299,6 +299,7 @@ class Recorder:
             **({"frames_without_joints": without} if 0 < without < len(frames) else {}),
             "missing_taxels": trial.valid is not None,
             "complete": complete,
+            **({} if complete else {"reason": "reading stopped before the contact's end"}),
         }
         self.lines.write([event])
         return path, trial
