@@ -15,6 +15,11 @@ from edge.i2c.chip import FakeChip
 from edge.i2c.tca9548a import FakeTCA9548A
 
 
+def _another(control: bytes) -> bytes:
+    """A mux's control byte that selects the next channel."""
+    return bytes([control[0] << 1 & 0xFF or 1])
+
+
 class FakeBus:
     """A bus with chips and muxes.
 
@@ -117,6 +122,12 @@ class FakeBus:
         route, chips = self._route(address)
         fault = self.script.next(route, self.now())
         self.transactions += 1
+        if fault is not None and fault.kind == "foreign":
+            for chip in self.chips.values():
+                if isinstance(chip, FakeTCA9548A):
+                    chip.write(_another(chip.read(1, 0.0)), 0.0)
+                    chip.stop()
+            route, chips = self._route(address)
         if fault is not None and fault.kind == "error":
             self._spend(11 if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
             if fault.code == errno.ETIMEDOUT and self.timed:
@@ -173,7 +184,7 @@ class FakeBus:
             data = message.buffer.tobytes()
             to_mux = any(isinstance(chip, FakeTCA9548A) for chip in chips)
             if fault is not None and fault.kind == "misroute" and to_mux:
-                data = bytes([data[0] << 1 & 0xFF or 1])
+                data = _another(data)
             for chip in chips:
                 chip.write(data, t)
             return

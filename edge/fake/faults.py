@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-Kind = Literal["error", "flip", "misroute", "reset", "hold", "break"]
+Kind = Literal["error", "flip", "misroute", "foreign", "reset", "hold", "break"]
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,10 @@ class Fault:
 
     Attributes:
         kind: `error` fails it with `code`; `flip` turns one bit of the bytes read; `misroute`
-            makes a write to a mux select another channel; `reset` resets the chip first; `hold`
-            makes the chip serve its former bytes; `break` lets go of the wire at a random byte
-            of those read, from which on all bits are 1.
+            makes a write to a mux select another channel; `foreign` is another program that
+            selects another channel first; `reset` resets the chip first; `hold` makes the chip
+            serve its former bytes; `break` lets go of the wire at a random byte of those read,
+            from which on all bits are 1.
         code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
             bus from being opened again while the fault lasts.
         at: numbers of transactions on the bus, counted from 0 when the script starts.

@@ -49,9 +49,9 @@ class TCA9548A:
         Args:
             bus: the bus that it is on.
             address: 0x70 to 0x77.
-            verify: read the control byte back whenever a channel is selected. It costs 20 bits
-                (1.9 % of a frame of 32 AD7147) and catches a wrong channel, whose data would
-                look plausible.
+            verify: read the control byte back whenever a channel is selected. It catches a wrong
+                channel, whose data would look plausible. Whoever calls `kept` after its
+                transactions may switch it off meanwhile.
             beside: other muxes on the same bus, of which at most one may have a channel open.
 
         Raises:
@@ -65,6 +65,7 @@ class TCA9548A:
         self._control = bus.prepare(read(address, 1))
         self._beside = beside
         self._open: bool | None = None
+        self._expected = 0
         for mux in beside:
             mux._beside = (*mux._beside, self)
         self.disconnect()
@@ -96,6 +97,17 @@ class TCA9548A:
         self._set(self._select[n], 1 << n)
         self._open, self.selected = True, n
 
+    def kept(self) -> bool:
+        """Whether the channel selected last, and no other, is still connected.
+
+        Another program may have selected a channel in the meantime.
+
+        Raises:
+            BusError: the mux does not answer.
+        """
+        self.bus.transfer(self._control)
+        return bool(self._control.buffer[0] == self._expected)
+
     def forget(self) -> None:
         """Take the connected channel as unknown, which it is after any error."""
         self.selected = self._open = None
@@ -110,11 +122,10 @@ class TCA9548A:
 
     def _set(self, control: Transfer, expected: int) -> None:
         self.forget()
+        self._expected = expected
         self.bus.transfer(control)
-        if self.verify:
-            self.bus.transfer(self._control)
-            if self._control.buffer[0] != expected:
-                raise bus_error(errno.EIO, self.bus.name, self.address)
+        if self.verify and not self.kept():
+            raise bus_error(errno.EIO, self.bus.name, self.address)
 
 
 class Channel:

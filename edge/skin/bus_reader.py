@@ -1,8 +1,9 @@
 """The chips of one bus: read in every frame, and brought back after a failure.
 
 A failed transaction is sent again as `edge.i2c.bus.RESPONSES` says. A chip that still fails is
-down; it is tried again at once and then every 0.1 s. While a chip is being set up, the others are
-read in every third frame, and the time saved goes to it, one transaction at a time.
+down; it is tried again at once and then every 0.1 s, or every 0.3 s if it hangs, or fails again
+within a second of its return. While a chip is being set up, the others are read in every fourth
+frame, and the time saved goes to it, one transaction at a time.
 """
 
 from __future__ import annotations
@@ -10,18 +11,21 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.bus import Bus, BusError, BusGone, BusRefused, BusTimeout, response
+from edge.i2c.bus import Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout, response
 from edge.i2c.chip import Chip, ChipSpec
 from edge.i2c.tca9548a import TCA9548A
 from edge.skin.wiring import BusSpec
 
-PAUSE_S = 0.1
-"""Time between two attempts to bring the same chip back, and from a timeout to the next attempt
-on its bus."""
+PAUSE_S, LONG_PAUSE_S = 0.1, 0.3
+"""Time between two attempts to bring the same chip back; the longer one also from a timeout to the
+next attempt on its bus. All taxels must be back 0.5 s after a fault's end."""
+FLAPS_S = 1.0
+"""A chip that fails again so soon after its return is not tried again at once."""
 LONGEST_PAUSE_S = 1.0
 """Time between two attempts to open a lost bus again, at most: a tenth of the time since the loss,
 and no less than `PAUSE_S`."""
@@ -31,7 +35,7 @@ SET_UP_AFTER, SET_UP_EVERY = 16, 64
 row, and then every so many; a conversion takes at most four frames at 100 Hz."""
 LONGEST_STEP_S = 0.0015
 """A step of a set-up takes no longer at 400 kHz; none begins so shortly before a frame's end."""
-OLDEST_FRAMES = 3
+OLDEST_FRAMES = 4
 """While a chip is being set up, each of the others is read in one frame of so many. A taxel stays
 valid for as long."""
 NEVER = -1.0e9
@@ -72,7 +76,7 @@ class Slot:
         self.recoveries = 0
         self.has_settings = False
         """The settings were written and read back, and no loss was seen since."""
-        self.retry_at = -math.inf
+        self.retry_at = self.back_at = -math.inf
         self.steps: Iterator[None] | None = None
         """The steps left until it runs."""
 
@@ -151,9 +155,8 @@ class BusReader:
             share = -(-len(slots) // OLDEST_FRAMES)
             first = self._frame % OLDEST_FRAMES * share
             slots = slots[first : first + share]
-        for slot in slots:
-            if slot.running:
-                self._read(slot)
+        for _, channel in groupby(slots, key=lambda slot: (slot.spec.mux, slot.spec.channel)):
+            self._read_channel([*channel])
         if self._frame % self._recheck == 0:
             running = [slot for slot in self.slots if slot.running]
             if running:
@@ -165,8 +168,46 @@ class BusReader:
     def _setting_up(self) -> bool:
         return any(slot.state is ChipState.STARTING for slot in self.slots)
 
-    def _read(self, slot: Slot) -> None:
-        """Check a chip where its last bytes made no sense, and read it."""
+    def _read_channel(self, slots: Sequence[Slot]) -> None:
+        """Read the chips on one channel of a mux, or on the bus itself.
+
+        The mux's control byte is read after them: with the wrong channel, or one that another
+        program selected, their bytes would look plausible. They are then read again, once.
+        """
+        mux = self._muxes.get(slots[0].spec.mux or 0)
+        if mux is None or not self._verify:
+            for slot in slots:
+                self._read(slot)
+            return
+        mux.verify = False
+        for _ in range(2):
+            kept = [self._read(slot, mux) for slot in slots]
+            if all(kept) and (not any(slot.good for slot in slots) or self._kept(mux)):
+                break
+            mux.forget()
+            for slot in slots:
+                slot.good = False
+        mux.verify = True
+
+    def _kept(self, mux: TCA9548A) -> bool:
+        for _ in range(2):
+            try:
+                return mux.kept()
+            except BusTimeout:
+                break
+            except BusError:
+                continue
+        return False
+
+    def _read(self, slot: Slot, mux: TCA9548A | None = None) -> bool:
+        """Check a chip where its last bytes made no sense, and read it.
+
+        Returns:
+            False if a chip did not answer because the mux no longer had its channel connected.
+        """
+        kept = True
+        if not slot.running:
+            return kept
         assert slot.chip is not None
         slot.good = False
         if slot.damaged == 1 and not self._setting_up():
@@ -181,12 +222,15 @@ class BusReader:
             try:
                 slot.chip.read()
                 slot.good, slot.at = True, self.bus.now()
-                return
+                break
             except BusError as error:
+                if mux is not None and isinstance(error, BusNack):
+                    kept = kept and self._kept(mux)
                 if tries >= response(error.errno).retries or self._retries == 0:
                     self._fail(slot, error)
                 tries += 1
                 self._retries -= 1
+        return kept
 
     def _check(self, slot: Slot) -> None:
         """Set a running chip up again if it has lost its settings."""
@@ -207,17 +251,19 @@ class BusReader:
         now = self.bus.now()
         for mux in self._muxes.values():
             mux.forget()
-        failed = [slot]
-        if isinstance(error, BusTimeout):
+        failed, hung = [slot], isinstance(error, BusTimeout)
+        if hung:
             self._timeouts += 1
-            self._rest_until = now + PAUSE_S
+            self._rest_until = now + LONG_PAUSE_S
         if isinstance(error, BusGone):
             self.bus.close()
         if isinstance(error, BusGone) or self._timeouts > 1:
             failed = self.slots
         for slot in failed:
+            flaps = now - slot.back_at < FLAPS_S
+            pause = LONG_PAUSE_S if hung or flaps else PAUSE_S
             # A running chip is tried again at once.
-            slot.retry_at = now if slot.running else now + PAUSE_S
+            slot.retry_at = now if slot.running and not flaps else now + pause
             slot.good, slot.state, slot.error, slot.steps = False, ChipState.DOWN, error, None
 
     def _bring_back(self, deadline: float) -> None:
@@ -259,7 +305,8 @@ class BusReader:
         try:
             next(slot.steps)
         except StopIteration:
-            slot.recoveries += slot.error is not None
+            if slot.error is not None:
+                slot.recoveries, slot.back_at = slot.recoveries + 1, self.bus.now()
             slot.state, slot.error, slot.steps = ChipState.RUNNING, None, None
             self._lost_at, self._reopen_at = math.inf, -math.inf
         except BusError as error:

@@ -36,6 +36,7 @@ KINDS = {
     "reset": Fault("reset"),
     "a frame that breaks off": Fault("break"),
     "a wrong mux channel": Fault("misroute"),
+    "another program's mux channel": Fault("foreign"),
 }
 """Faults that the protocol can tell."""
 
@@ -251,6 +252,8 @@ def scripts():
     yield "a wrong mux channel, 10 % of selections", cody, wrong, {}
     blind = replace(cody, reading=replace(cody.reading, verify_mux=False))
     yield "the same without reading back *", blind, wrong, {}
+    foreign = [Fault("foreign", rate=0.005, **lasting)]
+    yield "another program selects a mux channel", cody, foreign, {}
     flip = [Fault("flip", rate=0.02, **lasting)]
     yield "bit flips in 2 % of reads, AD7147 *", cody, flip, {}
     yield "the same, MPR121 *", pad, flip, {}
