@@ -178,18 +178,6 @@ def test_tasks_of_one_space_share_its_projection_and_rows(export):
     assert [o.domain for o in proto.opset_import] == [""]
 
 
-@pytest.mark.parametrize("n", [100, 1400])
-def test_one_at_a_time_or_all_at_once_gives_the_same_bits(export, n):
-    X = features(n)
-    _, model = export(X, {"t": Choice("II", 20, 4)})
-    queries = np.concatenate([X[:20], features(30, seed=3)])
-    together = model.run(queries)
-    assert not together["t_distances"][:20, 0].any()  # a training row lies at distance 0
-    for i in range(50):
-        for name, value in model.run(queries[i : i + 1]).items():
-            assert value.tobytes() == together[name][i : i + 1].tobytes()
-
-
 def test_features_within_the_training_set_are_in_range_and_far_ones_are_not(export):
     """Cut off at 4 to 8 times the largest difference, and at coordinates of twice the longest
     row: the graph says by how much, over all spaces."""
@@ -215,11 +203,3 @@ def test_vectors_that_are_not_finite_have_no_label_and_spoil_no_other(export, k)
     assert (answer["t_label"][[1, 2, 3, 4]] == -1).all()
     assert not answer["t_scores"][[1, 2, 3, 4]].any()
     assert (answer["t_label"][[0, 5, 6, 7]] == model.run(X[[0, 5, 6, 7]])["t_label"]).all()
-
-
-def test_trials_that_are_all_equal_lie_at_distance_zero(export):
-    X = np.repeat(features(1), 12, axis=0)
-    _, model = export(X, {"t": Choice("IV", 5, 3)})
-    answer = model.run(np.concatenate([X[:1], features(1, seed=1)]))
-    assert answer["t_neighbours"].tolist() == [[0, 1, 2]] * 2
-    assert not answer["t_distances"].any()

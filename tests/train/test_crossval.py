@@ -14,12 +14,7 @@ from train.projection import Projection, Spectrum, principal_axes
 
 def sklearn_table(X, y, scaling, components, ks):
     search = GridSearchCV(
-        Pipeline(
-            [
-                ("project", Projection(scaling)),
-                ("knn", NearestNeighbours()),
-            ]
-        ),
+        Pipeline([("project", Projection(scaling)), ("knn", NearestNeighbours())]),
         {"project__components": components, "knn__k": ks},
         cv=LeaveOneOut(),
         scoring="accuracy",
@@ -46,7 +41,7 @@ def overlapping(n=24, seed=0):
 @pytest.mark.parametrize("scaling", ["none", "IV"])
 def test_the_table_is_that_of_grid_search(scaling):
     X, y = overlapping()
-    components, ks = [1, 2, 3, 7, 20], [1, 2, 3, 4, 9, 20]
+    components, ks = [1, 3, 20], [1, 2, 4, 20]
     ours = leave_one_out(X, y, scaling=scaling)
     theirs = sklearn_table(X, y, scaling, components, ks)
     assert ours.shape == (20, 20)

@@ -69,11 +69,7 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
 
 
 @pytest.mark.parametrize(
-    ("given", "word"),
-    [
-        ({"k": 99}, "k must be 1 to 15"),
-        ({"tasks": ["colour"]}, "label 'colour'"),
-    ],
+    ("given", "word"), [({"k": 99}, "k must be 1 to 15"), ({"tasks": ["colour"]}, "label 'colour'")]
 )
 def test_what_cannot_be_fitted_is_one_sentence(given, word, recordings):
     with pytest.raises(InputError, match=word):

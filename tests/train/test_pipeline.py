@@ -69,10 +69,3 @@ def test_a_classifier_answers_every_task_by_the_rules():
 def test_choices_that_make_no_sense_are_named(choice, word):
     with pytest.raises(InputError, match=word):
         ContactClassifier({"t": choice}).fit(data(), {"t": np.repeat(["a", "b"], 15)})
-
-
-def test_a_trial_that_is_not_finite_is_named():
-    X = data()
-    X[17, 3] = np.nan
-    with pytest.raises(InputError, match="trial 17"):
-        ContactClassifier({"t": Choice("none", 2, 1)}).fit(X, {"t": np.repeat(["a", "b"], 15)})

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from tests.hard_cases import exact
-from train.projection import Projection, Spectrum, coordinate_bits, on_grid, principal_axes
+from train.projection import Projection, Spectrum, coordinate_bits, principal_axes
 from train.scaling import SCALINGS
 
 
@@ -80,7 +80,7 @@ def test_coordinates_are_those_of_whole_numbers_in_any_order(seed, scaling, offs
 
 
 @pytest.mark.parametrize("kind", ["pca", "lda"])
-@pytest.mark.parametrize("columns", [1, 2, 3, 24, 120, 1024, 4096])
+@pytest.mark.parametrize("columns", [1, 3, 120, 4096])
 def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
     """For features at their limit with the signs of the weights, the worst that can come."""
     X = np.random.default_rng(columns).normal(size=(30, columns))
@@ -89,12 +89,6 @@ def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
     weights = exact.multiples(p.weights_, exact.smallest_bit(p.weights_))
     assert max(map(abs, weights.ravel())) <= 2**24
     assert max(sum(abs(weights)) * 2**24) < 2**53
-
-
-def test_weights_that_are_all_equal_add_up_exactly_too():
-    """1,024 of 1/32 have the largest sum that a column of length 1 can have."""
-    weights = on_grid(np.full((1024, 1), 1.0 / 32.0))
-    assert np.ravel(weights).tolist() == [1.0 / 32.0] * 1024
 
 
 @pytest.mark.parametrize(
@@ -122,15 +116,6 @@ def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
     true = (X - p.mean_).astype(np.longdouble) @ axes[:20].T.astype(np.longdouble)
     longest = np.linalg.norm(X - p.mean_, axis=1).max()
     assert float(np.abs(p.transform(X) - true).max()) < 2.0**-20 * longest
-
-
-def test_features_are_cut_off_far_outside_the_training_set():
-    X = data()
-    p = Projection("none", 5).fit(X)
-    largest = np.abs(X - p.mean_).max()
-    once, twice = (p.transform(p.mean_[None] + f * largest * np.eye(120)[:1]) for f in (9.0, 18.0))
-    assert (once == twice).all()
-    assert (p.transform(p.mean_[None] + 4.0 * largest * np.eye(120)[:1]) != once).any()
 
 
 def exact_distances(rows, labels, shrinkage):

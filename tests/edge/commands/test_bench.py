@@ -52,11 +52,8 @@ def test_wire_time_is_the_busiest_bus_at_its_clock(board):
 
 
 def test_percentiles_are_by_nearest_rank():
-    assert summary([float(i) for i in range(1, 201)]) == {
-        "median_us": 100.5,
-        "p99_us": 198.0,
-        "n": 200,
-    }
+    expected = {"median_us": 100.5, "p99_us": 198.0, "n": 200}
+    assert summary([float(i) for i in range(1, 201)]) == expected
 
 
 def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):

@@ -71,17 +71,15 @@ def test_run_needs_the_joint_angles_that_its_model_was_made_with(edge, exported,
     assert all("skin_motion" in e["flags"] for e in decisions)
 
 
-def test_run_flags_a_decision_whose_joints_never_came(edge, exported, recordings, monkeypatch):
+@pytest.mark.parametrize(
+    ("options", "flag"), [((), "missing_pose"), (("--without-joints", "skin"), "skin_motion")]
+)
+def test_run_flags_a_decision_whose_joints_never_came(edge, exported, recordings, options, flag):
     """A model with an arm, a sender that is silent."""
-    arguments = ("run", "--model", exported / "model.onnx", "--fake", recordings / "hard_0.npz",
-                 "--joints", "udp:0")  # fmt: skip
-    status, events, _ = edge(*arguments)
-    flags = [e["flags"] for e in events if e["event"] == "decision"]
+    given = ("--model", exported / "model.onnx", "--fake", recordings / "hard_0.npz")
+    status, events, _ = edge("run", *given, "--joints", "udp:0", *options)
     assert status == 0
-    assert [f[:1] for f in flags] == [["missing_pose"]] * 2
-    events = edge(*arguments, "--without-joints", "skin")[1]
-    flags = [e["flags"] for e in events if e["event"] == "decision"]
-    assert [f[:1] for f in flags] == [["skin_motion"]] * 2
+    assert [e["flags"][0] for e in events if e["event"] == "decision"] == [flag] * 2
 
 
 def test_run_takes_joints_from_stdin(exported, recordings):

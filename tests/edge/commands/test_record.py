@@ -70,19 +70,20 @@ def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(tmp_path,
     assert caplog.messages == [f"{tmp_path}/box-001.npz: 1 of 2 frames have no joint angles"]
 
 
-def test_a_skin_without_an_arm_is_not_warned_of(tmp_path, caplog):
-    with recorder(tmp_path) as mine:
-        mine.save(frames(None, None), complete=True)
-    assert load(tmp_path / "box-001.npz").joints is None
-    assert caplog.messages == []
+@pytest.fixture
+def record(edge, recordings, tmp_path):
+    """Record a touch, labelled object=foam, into a folder."""
+
+    def run(*options, fake=recordings / "soft_1.npz", out=tmp_path / "trials"):
+        return edge("record", "--fake", fake, "--label", "object=foam", "--out", out, *options)
+
+    return run
 
 
-def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
+def test_record_saves_a_trial_with_its_lead_in(record, recordings):
     source = load(recordings / "soft_1.npz")
-    out = tmp_path / "trials"
-    status, (event,), _ = edge("record", "--fake", recordings / "soft_1.npz", "--out", out,
-                               "--label", "object=foam", "--label", "category=soft-fixed",
-                               "--lead", 0.1, "--length", 1.3)  # fmt: skip
+    given = ("--label", "category=soft-fixed", "--lead", 0.1, "--length", 1.3)
+    status, (event,), _ = record(*given)
     assert (status, event["complete"], event["joints"]) == (0, True, True)
     trial = load(event["file"])
     assert trial.labels == {"object": "foam", "category": "soft-fixed"}
@@ -95,18 +96,18 @@ def test_record_saves_a_trial_with_its_lead_in(edge, recordings, tmp_path):
     assert trial.valid is None
 
 
-def test_record_keeps_the_names_of_a_recordings_joints(edge, recordings, tmp_path):
+def test_record_keeps_the_names_of_a_recordings_joints(record, recordings, tmp_path):
     source = load(recordings / "soft_1.npz")
     names = [f"joint {i}" for i in range(source.joints.shape[1])]
     path = tmp_path / "named.npz"
     save(path, replace(source, meta={**source.meta, "joint_names": names}))
-    _, (event,), _ = edge("record", "--fake", path, "--label", "object=foam", "--out", tmp_path)
+    _, (event,), _ = record(fake=path)
     assert load(event["file"]).joint_names == tuple(names)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
-    edge, recordings, tmp_path, monkeypatch, number
+    record, recordings, monkeypatch, number
 ):
     push, pushed = Trials.push, []
 
@@ -117,8 +118,7 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
         return push(trials, frame)
 
     monkeypatch.setattr(Trials, "push", interrupted)
-    status, (event,), _ = edge("record", "--fake", recordings / "soft_1.npz", "--label",
-                               "object=foam", "--out", tmp_path, "--lead", 0.1)  # fmt: skip
+    status, (event,), _ = record("--lead", 0.1)
     assert (status, event["complete"], len(pushed)) == (0, False, 61)
     # Onset is at frame 20.
     source = load(recordings / "soft_1.npz").frames
@@ -133,13 +133,9 @@ def test_a_hangup_is_ignored_where_it_was_ignored_at_the_start():
         signal.signal(signal.SIGHUP, before)
 
 
-def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(
-    edge, recordings, tmp_path
-):
+def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(record):
     began = time.monotonic()
-    status, (event,), err = edge("record", "--fake", recordings / "soft_1.npz", "--label", "o=a",
-                                 "--out", tmp_path, "--joints", "udp:0", "--dof", 5,
-                                 "--seconds", 0.5)  # fmt: skip
+    status, (event,), err = record("--joints", "udp:0", "--dof", 5, "--seconds", 0.5)
     assert (status, event["joints"]) == (1, False)
     assert "--joints gave no angles at the times of the frames" in err
     assert time.monotonic() - began > 0.4  # it plays in real time, as angles come in real time
@@ -169,40 +165,28 @@ def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
     assert "lines could not be sent to stdout: nobody reads them" in err
 
 
-def test_record_saves_one_trial_a_contact_and_never_overwrites(edge, parted, tmp_path):
-    arguments = ("record", "--fake", parted, "--loop", "--label", "object=a b/c",
-                 "--out", tmp_path / "t", "--length", 1.2, "--trials")  # fmt: skip
-    assert len(edge(*arguments, 2)[1]) == 2
-    assert len(edge(*arguments, 1)[1]) == 1
-    names = sorted(p.name for p in (tmp_path / "t").iterdir())
-    assert names == ["a_b_c-001.npz", "a_b_c-002.npz", "a_b_c-003.npz"]
+def test_record_saves_one_trial_a_contact_and_never_overwrites(record, parted, tmp_path):
+    options = ("--loop", "--label", "kind=a b/c", "--length", 1.2, "--trials")
+    assert [len(record(*options, n, fake=parted)[1]) for n in (2, 1)] == [2, 1]
+    names = sorted(p.name for p in (tmp_path / "trials").iterdir())
+    assert names == [f"foam-a_b_c-00{n}.npz" for n in (1, 2, 3)]
 
 
-def test_record_refuses_a_file_that_exists_before_it_waits(edge, recordings, tmp_path):
+def test_record_refuses_a_file_that_exists_before_it_waits(record, tmp_path):
     path = tmp_path / "one.npz"
-    arguments = (
-        "record",
-        "--fake",
-        recordings / "hard_1.npz",
-        "--label",
-        "object=a",
-        "--out",
-        path,
-    )
-    assert edge(*arguments)[0] == 0
+    assert record(out=path)[0] == 0
     kept = path.read_bytes()
-    status, _, err = edge(*arguments)
+    status, _, err = record(out=path)
     assert status == 2
     assert f"{path}: exists already" in err
     assert path.read_bytes() == kept
 
 
-def test_record_without_contact_saves_nothing(edge, quiet, tmp_path):
-    status, events, err = edge("record", "--fake", quiet, "--label", "object=a", "--out",
-                               tmp_path / "t")  # fmt: skip
+def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
+    status, events, err = record(fake=quiet)
     assert (status, events) == (1, [])
     assert "there was no contact; nothing was saved" in err
-    assert not list((tmp_path / "t").iterdir())
+    assert not list((tmp_path / "trials").iterdir())
 
 
 @pytest.mark.parametrize(
@@ -220,9 +204,8 @@ def test_record_says_what_it_needs(edge, quiet, options, said):
     assert said in err
 
 
-def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(edge, recordings, tmp_path):
-    status, (event,), _ = edge("record", "--fake", recordings / "hard_0.npz", "--label", "o=a",
-                               "--out", tmp_path, "--seconds", 1.0)  # fmt: skip
+def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(record):
+    status, (event,), _ = record("--seconds", 1.0)
     assert (status, event["complete"], event["seconds"]) == (0, False, 0.99)
 
 

@@ -64,10 +64,6 @@ def test_the_caption_is_for_a_person():
     )
 
 
-def test_a_screen_overwrites_line_by_line():
-    assert terminal.screen(["a\nb", "c"]) == "\x1b[Ha\x1b[K\nb\x1b[K\nc\x1b[K\n"
-
-
 def test_a_skin_that_feels_everything_or_nothing_is_drawn():
     for counts in (0, 65535):
         f = Frame(t=0.0, counts=np.full((3, 5), counts, dtype=np.uint16))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from edge.fake.bus import FakeBus
-from edge.fake.clock import VirtualClock
 from edge.fake.faults import Fault
 from edge.i2c.bus import BusGone, BusNack, BusRefused, BusTimeout, fetch, read, send, write
 from edge.i2c.tca9548a import FakeTCA9548A
@@ -89,17 +88,6 @@ def test_time_advances_by_the_bits_only_where_it_is_asked_for():
         assert fake.bits == 1 + 18 + 1 + 45 + 1
     assert still.now() == 0.0
     assert timed.now() == pytest.approx(66 / 100_000)
-
-
-def test_buses_run_side_by_side_on_one_clock():
-    clock = VirtualClock()
-    a, b = bus(clock=clock, timed=True), bus(clock=clock, timed=True)
-    for _ in range(3):
-        send(a, 0x10, [0])
-    send(b, 0x10, [0])
-    assert [a.now(), b.now(), clock.now()] == pytest.approx([150e-6, 50e-6, 150e-6])
-    clock.sleep_until(0.0)
-    assert b.now() == a.now()
 
 
 def test_faults_by_position_hit_those_transactions_and_no_others():

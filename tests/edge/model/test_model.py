@@ -48,11 +48,7 @@ def test_metadata_says_what_the_board_needs(model, forearm):
     assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
     assert info.layout == forearm
     assert (info.window_s, info.samples, info.rows) == (1.2, 40, 16)
-    assert info.units == {
-        "max_force": "newton",
-        "contact_area": "taxel",
-        "contact_motion": "metre",
-    }
+    assert info.units == {"max_force": "newton", "contact_area": "taxel", "contact_motion": "metre"}
     assert info.motion_frame == "world"
     assert info.chain.dof == 5
     assert len(info.data_digest) == 64

@@ -6,14 +6,7 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.stopping import (
-    TEST_SHARE,
-    Novelty,
-    Stopping,
-    StoppingRule,
-    check_rate,
-    margin,
-)
+from edge.model.stopping import TEST_SHARE, Novelty, Stopping, StoppingRule, check_rate, margin
 
 
 class TestMargin:

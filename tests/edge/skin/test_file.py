@@ -21,12 +21,6 @@ def test_cody_is_384_taxels_on_three_buses():
     assert {chip.kind.name for chip in cody.chips} == {"ad7147"}
 
 
-def test_the_mpr121_example_covers_its_pad():
-    pad = skinfile.load(skinfile.shipped("mpr121"))
-    assert (pad.layout.shape, pad.uncovered, len(pad.chips)) == ((8, 12), 0, 8)
-    assert {chip.sign for chip in pad.chips} == {-1}
-
-
 def test_what_is_not_said_has_a_default():
     assert skinfile.parse(SMALL).reading == Reading()
 
@@ -121,12 +115,6 @@ def test_a_damaged_calibration_is_refused(key, value):
     text = SMALL + "[calibration]\n" + "".join(f"{k} = {v}\n" for k, v in rows.items())
     with pytest.raises(InputError, match=rf"calibration.{key}"):
         skinfile.parse(text)
-
-
-def test_a_calibration_may_lie_at_the_ends_of_what_a_chip_gives():
-    ends = "[" + "[0, 65535, 0, 0, 0, 0]," * 4 + "]"
-    text = SMALL + f"[calibration]\nbaseline = {ends}\nnoise = {ends}\n"
-    assert skinfile.parse(text).calibration.baseline[:, :2].tolist() == [[0, 65535]] * 4
 
 
 def test_saving_a_calibration_keeps_the_old_file(tmp_path):

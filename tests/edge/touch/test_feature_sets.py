@@ -16,7 +16,7 @@ from edge.touch.feature_sets import SETS, expand
 from edge.touch.features import FEATURES, feature_vector, widths
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import TRANSFORMS, feature, names
+from edge.touch.measures import TRANSFORMS, feature
 from edge.touch.track import ContactTracker
 
 SKIN = SkinLayout(
@@ -129,38 +129,9 @@ def test_summaries_are_one_number_of_the_transformed_samples():
     deviation = math.sqrt(math.fsum((r - mean) ** 2 for r in roots) / 5)
     steps = [abs(b - a) for a, b in pairwise(roots)]
     seen = vector_of(
-        touch(PEAKS),
-        "sqrt_max_force_mean",
-        "sqrt_max_force_deviation",
-        "sqrt_max_force_roughness",
+        touch(PEAKS), "sqrt_max_force_mean", "sqrt_max_force_deviation", "sqrt_max_force_roughness"
     )
     assert seen == pytest.approx([mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15)
-
-
-@pytest.mark.parametrize("threshold", [0, 9, 60000])
-@pytest.mark.parametrize("scale", [None, 1e-6, 1e12])
-@pytest.mark.parametrize("pitch", [None, 1e-6, (1e3, 2.0)])
-def test_every_logarithm_is_finite_where_nothing_is(threshold, scale, pitch):
-    """After the contact's end every force, area and motion is 0."""
-    layout = replace(
-        SKIN, threshold_counts=threshold, onset_counts=None, counts_per_newton=scale, pitch_m=pitch
-    )
-    counts = np.zeros(SKIN.shape, dtype=np.uint16)
-    counts[1, 1] = 65535
-    still = np.zeros_like(counts)
-    frames = [Frame(i / 10, counts if i < 2 else still) for i in range(11)]
-    wanted = []
-    for name in names():
-        try:
-            wanted.append(feature(f"log_{name}").name)
-        except InputError:
-            continue
-    assert len(wanted) > 35
-    series = series_of(frames, wanted, layout)
-    assert (series.peak[2:] == 0).all()
-    with np.errstate(all="raise"):
-        vector = feature_vector(series, 1.0, 5, wanted)
-    assert np.isfinite(vector).all()
 
 
 def test_the_floor_of_a_logarithm_is_the_least_that_is_in_contact():

@@ -294,12 +294,9 @@ def test_units_are_those_of_the_skin():
     ("wanted", "sentence"),
     [
         (["skin_forse"], "no feature 'skin_forse'; the nearest are skin_force"),
-        (["contact_max_force"], "no feature 'contact_max_force'"),
         (["max_force_rate_rate"], "no feature"),
         ([""], "no feature ''"),
-        (["log_"], "no feature 'log_'"),
         (["max_force@1"], "must be taken at 2 to 10000 times"),
-        (["max_force@x"], "no feature 'max_force@x'"),
         (["log_sqrt_log_max_force"], "applies one transform twice"),
         (["sqrt_log_joint_change"], "may be negative and has no logarithm; take sqrt_joint_change"),
         (["log_skin_slant_mean"], "may be negative"),
@@ -333,10 +330,7 @@ def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(shape, side
 
 
 @settings(max_examples=40)
-@given(
-    seed=st.integers(0, 1 << 32),
-    shape=st.sampled_from([(3, 5), (16, 24), (17, 31), (1, 700)]),
-)
+@given(seed=st.integers(0, 1 << 32), shape=st.sampled_from([(3, 5), (16, 24), (17, 31), (1, 700)]))
 def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(seed, shape):
     rng = np.random.default_rng(seed)
     rows, cols = shape

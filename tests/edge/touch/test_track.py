@@ -167,10 +167,10 @@ def test_times_that_are_not_finite_are_refused(t):
         ContactTracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
 
 
-@pytest.mark.parametrize("settings", [{"debounce": 0}, {"debounce": 1.5}])
-def test_settings_that_make_no_sense_are_named(settings):
-    with pytest.raises(InputError, match=next(iter(settings))):
-        TrackSettings(**settings)
+@pytest.mark.parametrize("debounce", [0, 1.5])
+def test_settings_that_make_no_sense_are_named(debounce):
+    with pytest.raises(InputError, match="debounce"):
+        TrackSettings(debounce=debounce)
 
 
 def test_another_scale_brings_the_thresholds_along():

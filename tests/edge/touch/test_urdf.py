@@ -31,21 +31,6 @@ def test_the_chain_runs_from_base_to_tip_whatever_the_order_of_the_file(joints):
     assert joints(ARM, "upper", "upper") == []
 
 
-def test_a_joint_keeps_its_numbers(joints):
-    assert joints(ARM)[1] == {
-        "name": "elbow",
-        "type": "revolute",
-        "axis": [0.0, 1.0, 0.0],
-        "origin_xyz": [0.3, 0.0, -1e-3],
-        "origin_rpy": [0.0, 1.5, 0.0],
-        "limits": [-2.5, 0.0],
-    }
-
-
-def test_what_a_file_leaves_out_is_urdf_s_default(joints):
-    assert joints(ARM)[0] == {"name": "shoulder", "type": "continuous", "axis": [1.0, 0.0, 0.0]}
-
-
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -12,7 +12,7 @@ from edge.recording import load
 from edge.touch.arm import Chain
 from train.__main__ import main
 from train.dataset import load_trials
-from train.importers import names, sdh2
+from train.importers import sdh2
 
 MASK = "\n".join(["011110"] * 5 + ["111111"] * 8)
 
@@ -95,7 +95,6 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
     [
         (b"BZh9 no bzip2", "Invalid data stream"),
         (bz2.compress(dsa().encode())[:-20], "file ended before the end-of-stream marker"),
-        (b"", "file ended before"),
         (dsa()[:-20], "unclosed token"),
         ('<!DOCTYPE x [<!ENTITY a "b">]>' + dsa(), "declares a document type"),
         (dsa(frames=[], stamps=()), "has no frame"),
@@ -103,7 +102,6 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
         (dsa(mask="01"), "static_mask must be a 0 or 1 for each"),
         (dsa(width="-1"), "texel_width must be"),
         (dsa(frames=[[-485]], stamps=(0,)), "does not unpack to 486"),
-        (dsa(frames=[[-485, 1e6]], stamps=(0,)), "does not unpack to 486"),
         (dsa(frames=[[-485, 0.5]], stamps=(0,)), "no whole number"),
         (dsa(frames=[[float("nan")]], stamps=(0,)), "no whole number"),
         (dsa().replace("C3F30000", "C3F3"), "buffer size must be a multiple of element size"),
@@ -156,7 +154,3 @@ def test_every_published_grasp_has_frames_and_joint_angles(real):
         assert recording.joints.shape == (len(recording.t), 7)
         assert np.isfinite(recording.joints).all()
         assert (recording.frames[:, ~recording.valid] == 0).all()
-
-
-def test_a_format_is_a_module_of_its_name():
-    assert names() == ["csv_frames", "mcap", "rosbag", "sdh2"]
