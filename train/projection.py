@@ -1,8 +1,8 @@
 """Projection of scaled feature vectors to a few whole-number coordinates.
 
-All arithmetic after the scaling is in whole numbers that float64 holds exactly, so every machine
-and every engine gives the same bits in any order of summation. `export/build.py` writes a fitted
-`Projection` down as ONNX operators.
+After the scaling, all arithmetic is in whole numbers that float64 holds exactly. So every machine
+and every engine gives the same bits, whatever the order of summation. `export/build.py` turns a
+fitted `Projection` into ONNX operators.
 """
 
 from __future__ import annotations
@@ -21,46 +21,48 @@ from edge.touch.features import FEATURES
 from train.scaling import centred_and_scaled, column_means
 
 FEATURE_BITS = 22
-"""Of the largest scaled difference from the mean in training."""
+"""Bits of the largest scaled difference from the mean in training."""
 RANGE = 4
-"""A query's differences are cut off at this many times 2^`FEATURE_BITS` steps, which is 4 to 8
-times the training set's largest difference."""
+"""A query's differences are clipped at `RANGE` times 2^`FEATURE_BITS` steps. This is 4 to 8 times
+the largest difference in training."""
 MOST_STEPS = RANGE * 2.0**FEATURE_BITS
 WEIGHT_BITS = 24
-"""Of the largest weight at most: float32 holds them exactly."""
+"""Most bits of the largest weight; float32 holds such weights exactly."""
 COORDINATE_BITS = 22
-"""Of the longest training row at most."""
+"""Most bits of the longest training row."""
 EXACT_BITS = 53
 """Whole numbers up to 2^`EXACT_BITS` are exact in float64."""
 FEWEST_UNITS = 256
-"""Median distance from a training row to its nearest other, in units of the coordinates' grid,
-below which one row far outside leaves too few steps to tell the others apart."""
+"""Smallest median distance from a training row to its nearest other, in units of the coordinates'
+grid. Below it, one row far outside leaves too few steps to separate the others."""
 CLOSE_EIGENVALUES = 1e-6
+"""Relative gap below which two eigenvalues count as equal."""
 WELL_CONDITIONED = 1e-8
-"""Variance, as a part of the largest, down to which eigenvectors of a covariance are trusted."""
+"""Smallest share of the largest variance for which an eigenvector of a covariance is trusted."""
 SAME_SIZE = 1e-6
+"""Relative difference below which two entries of an axis count as equally large."""
 KINDS = ("pca", "lda")
 """Principal components, and discriminants."""
 NO_DISTANCE = 1e-6
-"""Separation of the classes in a direction, as a part of all spread, below which it is rounding."""
+"""Separation of the classes along a direction, as a share of the spread, that may be rounding."""
 
 
 def _centred(
     X: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Mean (p,), X without it, and which columns have no variance (p,)."""
+    """Mean (p,), X minus the mean, and whether each column has no variance (p,)."""
     mean = column_means(X)
     centred = X - mean
-    # A constant column leaves nothing but the rounding of its mean.
+    # In a constant column only the rounding of its mean is left.
     still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)
-    # The mean of a large offset is rounded, which would leave the same direction in every row.
+    # The mean of a large offset is rounded, which would leave a constant in every row.
     centred -= centred.mean(axis=0)
     centred[:, still] = 0.0
     return mean, centred, still
 
 
 def _signs(axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(c,) the sign of the largest entry of each of (c, p), of nearly equal ones the first."""
+    """(c,) the sign of each axis' largest entry; the first of nearly equal entries counts."""
     sizes = np.abs(axes)
     top = np.argmax(sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True), axis=1)
     return np.asarray(np.sign(axes[np.arange(len(axes)), top]))
@@ -71,9 +73,9 @@ def principal_axes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Mean, components and singular values of X (n, p), as many as its numerical rank.
 
-    By a full singular value decomposition in float64, which keeps small singular values that the
-    covariance loses. Each component's largest entry is positive, so that files are the same; of
-    entries that are equal but for rounding (two features against each other) the first counts.
+    They come from a full singular value decomposition in float64, which keeps small singular
+    values that a covariance loses. Each component's largest entry is made positive, so that files
+    are the same everywhere. Of entries that differ only by rounding, the first counts.
 
     Returns:
         (p,), (rank, p) and (rank,), the largest singular value first.
@@ -89,10 +91,10 @@ def principal_axes(
 
 
 class Spectrum:
-    """The eigenvectors of centred rows' scatter: axes for any count, shrinkage and labels.
+    """Principal axes and discriminants of rows, for any number of axes, shrinkage and labels.
 
-    They come from the scatter (p, p) or from its dual (n, n), whichever is smaller, and are
-    right to 1e-16 of its largest eigenvalue.
+    They are derived from the eigenvectors of the scatter (p, p) or of its dual (n, n), whichever
+    is smaller. These are accurate to 1e-16 of the largest eigenvalue.
 
     Args:
         X: (n, p) rows.
@@ -124,19 +126,18 @@ class Spectrum:
         return np.asarray(self.rows.T @ (self._vectors @ over))
 
     def scores_of(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, r) coordinates of other rows (m, p), less the mean of the given, along the same."""
+        """(m, r) coordinates along the eigenvectors of rows (m, p), which are centred already."""
         if not self._dual:
             return np.asarray(rows @ self._vectors)
         return np.asarray((rows @ self.rows.T) @ (self._vectors / np.sqrt(self.values)))
 
     def leading(self, count: int) -> NDArray[np.float64]:
-        """(c, p) the first principal axes up to sign, quicker than `principal_axes`.
+        """(c, p) the first principal axes up to sign, faster than by `principal_axes`.
 
-        As long as the last of them has more than `WELL_CONDITIONED` of the first one's variance,
-        and no two eigenvalues are within `CLOSE_EIGENVALUES`: an axis is then right to
-        1e-16 / `WELL_CONDITIONED` over the relative gap of its eigenvalue. Where small singular
-        values would drown, and where any axes of equal variance would do, by `principal_axes`, so
-        that they are those of a `Projection`.
+        The fast way is taken if the last axis has more than `WELL_CONDITIONED` of the first one's
+        variance, and no two eigenvalues are closer than `CLOSE_EIGENVALUES`. An axis is then
+        accurate to 1e-16 / `WELL_CONDITIONED` over the relative gap of its eigenvalue. Otherwise
+        `principal_axes` is used, so that the axes are always those of a `Projection`.
         """
         top = self.values[: count + 1]
         if (
@@ -149,14 +150,15 @@ class Spectrum:
         return principal_axes(self._given)[1][:count]
 
     def discriminants(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
-        """(p, c) the directions in which classes lie apart, at most classes - 1.
+        """(p, c) the directions that separate the classes, at most classes - 1.
 
-        The eigenvectors of (W + s I)^-1 B for the within-class and between-class scatter W, B,
-        with s = `shrinkage` times the mean squared length of the centred rows; each is scaled to
-        the variance 1 within the classes, shrunk alike (Fisher's discriminant with a ridge;
-        Friedman, Regularized discriminant analysis, 1989). They are those of (W + B + s I)^-1 B
-        too, whose inverse is a division along the scatter's own eigenvectors: no inverse of W is
-        taken, so one trial a class, more columns than trials and equal trials do no harm.
+        They are the eigenvectors of (W + s I)^-1 B, where W and B are the within-class and
+        between-class scatter and s is `shrinkage` times the mean squared length of the centred
+        rows. Each is scaled to a shrunk variance of 1 within the classes (Fisher's discriminant
+        with a ridge; Friedman, Regularized discriminant analysis, 1989). The matrix
+        (W + B + s I)^-1 B has the same eigenvectors, and its inverse is a division along the
+        eigenvectors of the scatter. As W is never inverted, the classes may have one trial each,
+        trials may be equal, and there may be more columns than trials.
 
         Args:
             labels: (n,) class indices.
@@ -166,7 +168,7 @@ class Spectrum:
         return np.asarray(weights * _signs(weights.T))
 
     def directions(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
-        """(r, c) `discriminants` among the eigenvectors: `scores` times them are coordinates."""
+        """(r, c) the `discriminants` in the eigenvectors' basis, to be multiplied by `scores`."""
         n = len(labels)
         ridge = shrinkage * float(self.values.sum()) / n
         root = 1.0 / np.sqrt(self.values + ridge)
@@ -174,7 +176,7 @@ class Spectrum:
         if not sizes.all():
             sizes, labels = sizes[sizes > 0], np.unique(labels, return_inverse=True)[1]
         members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
-        # The rows are centred, so the members' indicators need not be.
+        # The indicators of the members need no centring, as the rows are centred.
         means = root[:, None] * (self.scores.T @ (members / np.sqrt(sizes)))
         left, separation, _ = np.linalg.svd(means, full_matrices=False)
         keep = separation[: len(sizes) - 1] > NO_DISTANCE
@@ -188,16 +190,16 @@ class Spectrum:
 def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights (p, c) rounded to whole multiples of one power of two.
 
-    The multiples of a column add up to less than 2^29 in absolute value, since by Cauchy and
-    Schwarz they are at most sqrt(p) times its length. Their products with features of up to
-    `MOST_STEPS` = 2^24 therefore add up to less than 2^53: exactly. Principal
-    components have length 1, so their grid does not depend on how many of them there are.
+    The absolute multiples of a column add up to less than 2^29, since by Cauchy and Schwarz their
+    sum is at most sqrt(p) times the column's length. So their products with features of up to
+    `MOST_STEPS` = 2^24 add up to less than 2^53, which is exact. Principal components have length
+    1, so their grid does not depend on their number.
     """
     p = max(len(weights), 1)
     most = 2.0**EXACT_BITS / MOST_STEPS
     bits = min(WEIGHT_BITS, int(np.floor(np.log2((most - p) / np.sqrt(p)))))
     length = np.sqrt((weights**2).sum(axis=0)).max(initial=0.0)
-    # A length of 1 may be rounded up a little.
+    # Rounding may have made a length of 1 a little larger.
     power = bits - int(np.ceil(np.log2(length) - 1e-9)) if length > 0.0 else bits
     rounded = np.rint(np.ldexp(weights, power))
     if np.abs(rounded).sum(axis=0).max(initial=0.0) >= most:
@@ -208,21 +210,22 @@ def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
 def coordinate_bits(components: int) -> int:
     """Bits of coordinates whose squared distances stay below 2^`EXACT_BITS`.
 
-    A training row b is at most 2^bits long; each of a query's c coordinates q is clipped at twice
-    that. Then (|b| + |q|)^2 <= (1 + 2 sqrt(c))^2 2^(2 bits). A hundredth is left for b's rounding.
+    A training row b is at most 2^bits long, and each of a query's c coordinates q is clipped at
+    2^(bits + 1). So (|b| + |q|)^2 <= (1 + 2 sqrt(c))^2 2^(2 bits). One percent is added for the
+    rounding of b.
     """
     spread = 1.01 * (1.0 + 2.0 * np.sqrt(components)) ** 2
     return min(COORDINATE_BITS, int((EXACT_BITS - np.log2(spread)) / 2.0))
 
 
 def _power_of_two(value: float) -> float:
-    """The smallest power of two that is not below a value; 1 for 0."""
+    """The smallest power of two that is at least a value; 1 for 0."""
     return float(2.0 ** np.ceil(np.log2(value))) if value > 0.0 else 1.0
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Steps of features and of coordinates, all powers of two.
+    """The step of features and the unit of coordinates, both powers of two.
 
     Attributes:
         step: scaled differences from the mean are rounded to its multiples.
@@ -255,7 +258,7 @@ class Grid:
 
     @property
     def limit(self) -> float:
-        """Units at which a query's coordinates are clipped."""
+        """The limit, in units, at which a query's coordinates are clipped."""
         return float(2.0 ** (self.bits + 1))
 
     def project(self, d: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -271,8 +274,8 @@ class Grid:
 class Projection(TransformerMixin, BaseEstimator):
     """A few whole-number coordinates of feature vectors, the same bits on every machine.
 
-    Each column's mean is subtracted and its feature type's gain multiplied. The result is rounded
-    to 22 bits, multiplied with weights of at most 24 bits, and the sums, which are exact, are
+    Each column's mean is subtracted, and the difference is multiplied by its feature type's gain,
+    rounded to 22 bits and multiplied by weights of at most 24 bits. The sums are exact, and are
     rounded to 22 bits (`Grid`, `on_grid`). The directions are principal components, or the
     discriminants of the labels (`Spectrum.discriminants`).
 
@@ -281,20 +284,21 @@ class Projection(TransformerMixin, BaseEstimator):
 
     Args:
         scaling: one of `train.scaling.SCALINGS`.
-        components: most coordinates wanted; at most the numerical rank, and one less than the
-            classes, are kept.
+        components: most coordinates to keep. There are no more of them than the numerical rank,
+            nor, with `lda`, than one less than the classes.
         features: names of the feature types, in the order of X.
         kind: one of `KINDS`.
-        shrinkage: of the within-class scatter; `lda` alone uses it.
-        widths: columns of each feature type; equal where None.
+        shrinkage: of the within-class scatter; only `lda` uses it.
+        widths: columns of each feature type; None if equal.
 
     Attributes:
-        mean_: (p,) subtracted first.
-        gain_: (p,) multiplied next.
-        grid_: steps of features and coordinates.
-        weights_: (p, c), of `on_grid`.
-        rank_: how many coordinates there could be.
-        gap_: smallest relative gap of squared singular values at any cut up to c; 1 of `lda`.
+        mean_: (p,) is subtracted first.
+        gain_: (p,) multiplies the differences.
+        grid_: the steps of features and coordinates.
+        weights_: (p, c), from `on_grid`.
+        rank_: the largest possible number of coordinates.
+        gap_: the smallest relative gap between successive squared singular values, up to c; 1 for
+            `lda`.
     """
 
     def __init__(
@@ -314,13 +318,13 @@ class Projection(TransformerMixin, BaseEstimator):
         self.widths = widths
 
     def fit(self, X: NDArray[np.float64], y: NDArray[Any] | None = None) -> Projection:
-        """Fit to X (n, p), and to the labels y (n,) or (n, tasks) where `kind` is `lda`.
+        """Fit to X (n, p) and, if `kind` is `lda`, to the labels y (n,) or (n, tasks).
 
-        The discriminants of several tasks stand side by side.
+        The discriminants of several tasks are put side by side.
 
         Raises:
-            InputError: the scale of the features is beyond what distances hold; the kind is
-                unknown, or needs labels.
+            InputError: the features are too large or too small for distances, the kind is
+                unknown, or it needs labels.
         """
         X = np.asarray(X, dtype=np.float64)
         self.n_features_in_ = X.shape[1]

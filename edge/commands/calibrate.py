@@ -106,7 +106,7 @@ def unusable(
     """(rows, cols), True for working taxels without a usable rest value.
 
     They were valid in less than `MIN_SHARE` of the frames, or rest at an end of the chip's range:
-    a saturated input, or 0, which only a block's values may have at rest.
+    a saturated input, or 0 on a chip that does not rest there.
 
     Args:
         file: the skin's.
@@ -118,9 +118,9 @@ def unusable(
     for chip in file.chips:
         taxels = [taxel for taxel in chip.taxels if taxel != UNUSED]
         served[taxels] = True
-        bad[taxels] |= (rest[taxels] >= chip.highest) | (chip.kind.name != "block") & (
-            rest[taxels] == 0
-        )
+        bad[taxels] |= rest[taxels] >= chip.highest
+        if not chip.kind.rests_at_zero:
+            bad[taxels] |= rest[taxels] == 0
     unusable: NDArray[np.bool_] = (served & bad).reshape(baseline.shape) & file.layout.alive
     return unusable
 

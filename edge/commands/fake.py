@@ -10,12 +10,12 @@ program can read them, until Ctrl-C.
 from __future__ import annotations
 
 import argparse
-import signal
 from contextlib import ExitStack
 from pathlib import Path
 
 from edge.commands.options import within
 from edge.commands.output import Output
+from edge.commands.source import ending_signals
 from edge.errors import InputError
 from edge.fake.clock import PacedClock
 from edge.fake.player import fake_buses, playback
@@ -61,16 +61,17 @@ def plug(file: SkinFile, recording: str, output: Output) -> int:
 
     Args:
         file: the skin.
-        recording: the path of what the chips feel, over and over; nothing where it is empty.
+        recording: the path of the recording that the chips feel over and over; without one (an
+            empty path) they feel nothing.
         output: where to print the device of each bus.
     """
     for spec in file.buses:
         if spec.serial:
-            raise InputError(f"{spec.device} is a serial port; --plug carries I2C buses alone")
+            raise InputError(f"{spec.device} is a serial port; --plug carries only I2C buses")
     felt = load_recording(recording) if recording else still(file, STILL_S)
     scene = playback(file, felt, loop=True)
     clock = PacedClock()
-    with stop_on(signal.SIGINT, signal.SIGTERM) as stop, ExitStack() as adapters:
+    with stop_on(*ending_signals()) as stop, ExitStack() as adapters:
         for bus in fake_buses(file, scene, clock):
             device = adapters.enter_context(plugged(UsbAdapter(bus)))
             output.event(

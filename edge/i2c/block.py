@@ -212,4 +212,5 @@ KIND = ChipKind(
     most_taxels=MOST_TAXELS,
     unchanged_frames=UNCHANGED_FRAMES,
     serial=True,
+    rests_at_zero=True,
 )

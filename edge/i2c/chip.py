@@ -198,6 +198,7 @@ class ChipKind:
         unchanged_frames: readings with the same bytes after which the chip hangs for certain;
             None where bytes at rest may stay the same.
         serial: whether it can be on a serial port.
+        rests_at_zero: whether 0 is a usable value at rest, and no sign of a broken input.
     """
 
     name: str
@@ -216,3 +217,4 @@ class ChipKind:
     most_taxels: int = 4000
     unchanged_frames: int | None = None
     serial: bool = False
+    rests_at_zero: bool = False

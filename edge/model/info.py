@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,9 +36,9 @@ class Task:
         scaling: "none" or "I" to "V" (paper, Eqs. 1 to 5).
         accuracy: nested accuracy of the whole choice at export, 0 to 1.
         projection: "pca" (principal components) or "lda" (discriminants).
-        features: those that it takes, in the order of the model's; all where empty.
+        features: the features that it takes, in the model's order; empty for all.
         left_out: the groups left out to score the accuracy: "trial", or a label such as "object".
-        no_contact: the answer where a recording ends without a contact, or None.
+        no_contact: the answer for a recording that ends without a contact, or None.
     """
 
     labels: tuple[str, ...]
@@ -71,19 +71,19 @@ class ModelInfo:
     data_digest: str
     versions: dict[str, str] = field(default_factory=dict)
     decision_points_s: tuple[float, ...] = ()
-    """Windows at which the model can be asked, the last the full one; none without calibration."""
+    """Windows for which the model can decide, the full one last; empty without calibration."""
     stopping: dict[str, Stopping] = field(default_factory=dict)
-    """The stopping rules of each task; none without decision points."""
+    """The stopping rules of each task; empty without decision points."""
     novelty: Novelty | None = None
     """The limits of novelty; None without decision points."""
     joints: int = 0
-    """Joint angles of a frame, where a feature is made of them."""
+    """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
     """{feature: its table} of the features that are made of kernels."""
 
     @property
     def widths(self) -> tuple[int, ...]:
-        """How many values of a feature vector each feature takes, in their order."""
+        """Number of values of each feature in a feature vector, in their order."""
         return widths(self.features, self.samples, self.layout, self.joints)
 
     @property
@@ -98,13 +98,13 @@ class ModelInfo:
 
     @property
     def dof(self) -> int | None:
-        """Joint angles that a frame must bring; None where the model needs none."""
+        """Number of joint angles that a frame must have; None if the model needs none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
 
     def tracker(
         self, layout: SkinLayout, *, max_contacts: int = 1, motion_on_skin: bool = False
     ) -> ContactTracker:
-        """A fresh tracker that follows contacts on a skin by the model's rules, for its features.
+        """A new tracker for a skin, with the model's rules and features.
 
         The last two arguments are those of `ContactTracker`.
 
@@ -123,13 +123,13 @@ class ModelInfo:
         )
 
     def to_json(self) -> str:
-        """As the model file carries it."""
+        """The metadata as JSON text, as the model file holds it."""
         calibration: dict[str, Any] = {}
         if self.decision_points_s and self.novelty is not None:
             calibration = {
                 "decision_points_s": self.decision_points_s,
-                "stopping": {task: rules.to_dict() for task, rules in self.stopping.items()},
-                "novelty": self.novelty.to_dict(),
+                "stopping": {task: asdict(rules) for task, rules in self.stopping.items()},
+                "novelty": asdict(self.novelty),
             }
         kernels = {name: vars(table) for name, table in self.kernels.items()}
         return json.dumps(
@@ -168,8 +168,8 @@ class ModelInfo:
             meta = ConfigTable(parse_json(text, where), where)
             if meta.whole("format") != FORMAT:
                 raise InputError(
-                    f"{where} is of format {shown(meta.raw['format'])}, this edge-classify reads "
-                    f"{FORMAT}"
+                    f"{where} is of format {shown(meta.raw['format'])}, but this edge-classify "
+                    f"reads {FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
             points = meta.numbers("decision_points_s", default=())
@@ -223,7 +223,7 @@ class ModelInfo:
         of_joints = any(feature.of_joints for feature in types)
         dof = self.joints if self.chain is None else self.chain.dof
         if self.joints != (dof if of_joints else 0) or of_joints > (self.joints > 0):
-            raise InputError(f"{name}: its features and its joints disagree; export it again")
+            raise InputError(f"{name}: its features contradict its joints; export it again")
         if not self.tasks:
             raise InputError(f"{name}: its metadata names no task; export it again")
         if self.decision_points_s:
@@ -236,9 +236,9 @@ class ModelInfo:
                 or self.novelty is None
                 or self.novelty.task not in self.tasks
             ):
-                raise InputError(f"{name}: its decision points make no sense; export it again")
+                raise InputError(f"{name}: its decision points are impossible; export it again")
         if (self.motion_frame == "world") != (self.chain is not None):
-            raise InputError(f"{name}: its motion frame and its arm disagree; export it again")
+            raise InputError(f"{name}: its motion frame contradicts its arm; export it again")
 
 
 def _task(table: ConfigTable) -> Task:

@@ -1,4 +1,4 @@
-"""model.onnx on the board: decisions."""
+"""A model.onnx on the board, and its decisions."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Model:
                 f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
             )
         self.path = name
-        # An older format is named before its operators, which are others.
+        # First the format: an older one has other operators, but is named by its number.
         self.info = ModelInfo.from_json(text, name)
         onnx_file.check(contents, name)
         runtime = _onnxruntime()
@@ -82,11 +82,11 @@ class Model:
         # One thread is fastest for models of this size.
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 3
-        # Converts the constants that are stored in float32 once; there is no more to optimise.
+        # Converts the constants that are stored in float32 once. More would change nothing.
         options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
         options.enable_cpu_mem_arena = False
         try:
-            # By its name: from bytes, it would hold the file in memory twice, and keep one.
+            # By its name, as a session made from bytes keeps a second copy of the file.
             self._session = runtime.InferenceSession(
                 name, options, providers=["CPUExecutionProvider"]
             )
@@ -163,7 +163,7 @@ class Model:
 
     @property
     def decision_points_s(self) -> tuple[float, ...]:
-        """Windows at which the model can be asked; the full one alone without calibration."""
+        """Windows for which the model can decide; without calibration, only the full one."""
         return self.info.decision_points_s or (self.info.window_s,)
 
     def run(
@@ -173,7 +173,7 @@ class Model:
 
         Args:
             vectors: measured over the window of the decision point.
-            decision_point: place in `decision_points_s`; the last where None.
+            decision_point: index in `decision_points_s`; None for the last.
         """
         given: dict[str, NDArray[Any]] = {"features": vectors}
         if self.info.decision_points_s:
@@ -195,11 +195,11 @@ class Model:
 
         Args:
             vector: (width,) measured over the window of the decision point.
-            decision_point: place in `decision_points_s`; the last, the full window, where None.
+            decision_point: index in `decision_points_s`; None for the last, the full window.
 
         Raises:
-            InputError: the vector has another length, or a value that is not finite, or that is
-                not once it is scaled; the model has no such decision point, or its file is damaged.
+            InputError: the vector has another length, or a value that is not finite before or
+                after scaling; the model has no such decision point, or its file is damaged.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != self._shape:
@@ -251,22 +251,22 @@ class Model:
 
 
 def require_joints(model: Model, dof: int | None, where: str) -> None:
-    """Refuse a source whose joint angles are not what the model's motion is measured with.
+    """Refuse a source without the joint angles that the model needs.
+
+    Args:
+        model: the model.
+        dof: the number of joint angles of the source, or None.
+        where: names the source in the error.
 
     Raises:
-        InputError: the sentence names `where`.
+        InputError: the source has no joint angles, or another number of them.
     """
     needed = model.info.dof
-    if needed is None:
-        return
-    if dof is None:
-        what = "is made of" if model.info.chain is None else "measures motion with"
+    if needed is not None and dof != needed:
         raise InputError(
-            f"{where}: has no joint angles, the model {what} {needed}; "
+            f"{where}: has {dof or 'no'} joint angles, but the model needs {needed} of each frame; "
             "record them, or export a model without joints"
         )
-    if dof != needed:
-        raise InputError(f"{where}: has {dof} joint angles, the model's arm has {needed}")
 
 
 class _Answer(NamedTuple):

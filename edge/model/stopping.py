@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from edge.config import ConfigTable
 from edge.errors import InputError
@@ -22,10 +21,10 @@ which errs more or less often than the folds' models do on average."""
 
 
 def check_rate(value: float, what: str) -> float:
-    """The value where it is a rate inside (0, 1).
+    """The value, if it is a rate inside (0, 1).
 
     Raises:
-        InputError: it is not; the sentence names `what`.
+        InputError: it is not; the sentence begins with `what`.
     """
     if not 0.0 < value < 1.0:
         raise InputError(f"{what} must be above 0 and below 1, not {value:g}")
@@ -40,8 +39,8 @@ def margin(distances: Sequence[float], label: int) -> float:
         label: index of the label.
 
     Returns:
-        The difference of the roots; minus infinity where the label's own trials are infinitely
-        far away, and 0 where there is no other label.
+        The difference of the roots. It is minus infinity if the label's own trials are infinitely
+        far away, and 0 if there is no other label.
     """
     own = math.sqrt(distances[label])
     others = [d for other, d in enumerate(distances) if other != label]
@@ -57,8 +56,8 @@ class StoppingRule:
     Attributes:
         error: certified: decisions are wrong at most this often.
         mean_s: mean seconds from onset to decision, on the calibration trials.
-        confidence: decide from this confidence on; above 1 none is enough, which makes the rule a
-            fixed window.
+        confidence: decide from this confidence on. Above 1 no confidence is enough, so the rule
+            waits for a fixed window.
         last: decision point at which to decide in any case.
     """
 
@@ -69,20 +68,20 @@ class StoppingRule:
 
     @property
     def fixed(self) -> bool:
-        """The rule is to wait for a fixed window."""
+        """Whether the rule waits for a fixed window."""
         return self.confidence > 1.0
 
 
 @dataclass(frozen=True)
 class Stopping:
-    """What a model knows about deciding one task early; see `train.stopping` for how it is made.
+    """The calibration of one task's early decisions, which `train.stopping` makes.
 
     Attributes:
         slopes, intercepts: of each decision point: the probability that the label is right is the
             logistic function of slope * `margin` + intercept.
         rules: rising in error, falling in mean time.
-        trials: that the rules were certified with.
-        wrong: how many of them were decided wrongly at the full window.
+        trials: number of trials that certify the rules.
+        wrong: number of these that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
     """
 
@@ -105,7 +104,7 @@ class Stopping:
         return 0.5 + 0.5 * math.tanh(0.5 * x)
 
     def rule(self, error: float) -> StoppingRule | None:
-        """The fastest rule that is certified for an error rate; None where there is none."""
+        """The fastest rule that is certified for an error rate; or None."""
         able = [rule for rule in self.rules if rule.error <= error]
         return able[-1] if able else None
 
@@ -129,16 +128,12 @@ class Stopping:
         needed = max(math.ceil(-math.log(level) / divergence), self.trials + 1)
         return f"{known}; {error:g} needs about {needed} trials"
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it."""
-        return asdict(self)
-
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Stopping:
-        """Read `to_dict`, of a model that has so many decision points.
+        """Read the table that a model with so many decision points holds.
 
         Raises:
-            InputError: it is not what `to_dict` gives.
+            InputError: the table is damaged.
         """
         trials = table.whole("trials", allowed=range(1, 1 << 31))
         return cls(
@@ -177,7 +172,7 @@ class Novelty:
     limits: tuple[tuple[float, ...], ...]
 
     def rate(self, decision_point: int, distance: float) -> float:
-        """The smallest novelty rate at which the distance counts as unknown; 1 at none."""
+        """The smallest novelty rate at which the distance counts as unknown; 1 if there is none."""
         smallest = 1.0
         for rate, limit in zip(self.rates, self.limits[decision_point], strict=True):
             if distance > limit:
@@ -185,22 +180,18 @@ class Novelty:
         return smallest
 
     def withholds(self, task: str, rate: float, asked: float = NOVELTY_RATE) -> bool:
-        """Whether a task names nothing, where the contact counts as unknown from a rate on.
+        """Whether a task gives no label, for a contact that counts as unknown from `rate` on.
 
         A new object can still be called soft or movable; only the object itself has no name.
         """
         return task == self.task and rate <= asked
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it."""
-        return asdict(self)
-
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Novelty:
-        """Read `to_dict`, of a model that has so many decision points.
+        """Read the table that a model with so many decision points holds.
 
         Raises:
-            InputError: it is not what `to_dict` gives.
+            InputError: the table is damaged.
         """
         rates, rows = table.numbers("rates"), table.get("limits")
         if not rates or not isinstance(rows, list | tuple) or len(rows) != points:

@@ -22,10 +22,11 @@ MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: a fixed step (`origin`), the motion about or along `axis`, another fixed step.
+    """A joint: a fixed step (`origin`), then motion about or along `axis`, then a fixed step.
 
-    A URDF gives `origin_xyz` and `origin_rpy`. An arm written as "turn, then go on", like Cody's,
-    gives `translate`. Lengths are in metres, angles in radians; `limits` are those of the angle.
+    The step before the motion is `origin_xyz` and `origin_rpy`, as in a URDF. The step after it is
+    `translate`, as in `edge/arms/cody.toml`. Lengths are in metres, angles in radians. `limits` are
+    the lowest and highest value of the joint's angle.
     """
 
     name: str
@@ -38,17 +39,17 @@ class Joint:
 
 
 class _Link(NamedTuple):
-    """A moving joint in plain numbers: its axis, and the fixed step before it."""
+    """A moving joint as plain numbers: its axis, and the fixed step before it."""
 
     slides: bool
     direction: Vector
     turn: tuple[float, ...] | None
-    """(9,) rows of the fixed step's rotation; None where it does not turn."""
+    """(9,) the fixed step's rotation matrix, row by row; None if the step does not turn."""
     shift: tuple[float, ...]
 
 
 class Chain:
-    """Joints from a base to a tip.
+    """An arm: joints in a row from a base link to a tip link.
 
     >>> import edge
     >>> chain = edge.Chain.cody()
@@ -57,17 +58,17 @@ class Chain:
     """
 
     def __init__(self, joints: Sequence[Joint], base: str = "base", tip: str = "tip") -> None:
-        """Chain the joints; a `kind` of "fixed" takes no angle.
+        """Make a chain of joints; a joint of the kind "fixed" takes no angle.
 
         Raises:
-            InputError: a joint's axis is zero or a number is not finite.
+            InputError: a joint's axis is zero, or a number is not finite.
         """
         self.joints = tuple(joints)
         self.base, self.tip = base, tip
         self._moving: list[Joint] = []
         self._links: list[_Link] = []
-        # The step of a moving joint at angle q is S0 + f S1 + g S2. A turn about the axis has
-        # f = sin q and g = 1 - cos q (Rodrigues), a slide along it f = q and g = 0.
+        # A moving joint's step at angle q is S0 + f S1 + g S2. For a rotation f = sin q and
+        # g = 1 - cos q (Rodrigues). For a sliding joint f = q and g = 0.
         steps: list[tuple[NDArray[np.float64], ...]] = []
         fixed = np.eye(4)
         for joint in self.joints:
@@ -86,7 +87,7 @@ class Chain:
 
     @property
     def dof(self) -> int:
-        """How many angles `pose` takes."""
+        """Number of angles that `pose` takes."""
         return len(self._moving)
 
     @property
@@ -96,17 +97,17 @@ class Chain:
 
     @property
     def limits(self) -> tuple[tuple[float, float] | None, ...]:
-        """(lower, upper) of each moving joint in radians (metres where it slides), or None."""
+        """(lower, upper) of each moving joint in radians, or metres if it slides; or None."""
         return tuple(j.limits for j in self._moving)
 
     def pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pose of the tip in the base's frame.
 
-        Rotations by Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2, where 1 - cos(q)
-        is taken as 2 sin^2(q/2), which keeps its digits at small angles.
+        Rotations follow Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2. It is computed
+        with 1 - cos(q) = 2 sin^2(q/2), which loses no digits at small angles.
 
         Args:
-            q: (dof,) or (..., dof) radians (metres for a sliding joint), base to tip.
+            q: (dof,) or (..., dof) radians, or metres for a sliding joint, from base to tip.
 
         Returns:
             (4, 4) or (..., 4, 4) homogeneous transform, metres.
@@ -140,10 +141,9 @@ class Chain:
         return pose
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
-        """Where a point of the tip lies in the base's frame: `pose(q)` times it, in plain floats.
+        """A point of the tip in the base's frame: `pose(q)` times the point, as plain floats.
 
-        To turn one point joint by joint is much faster than to work out the pose, and rounds no
-        more.
+        Moving one point joint by joint is much faster than computing the pose, and as accurate.
 
         Args:
             q: (dof,) as for `pose`.
@@ -181,7 +181,7 @@ class Chain:
         return x, y, z
 
     def to_dict(self) -> dict[str, Any]:
-        """The chain as plain numbers, exact in JSON."""
+        """The chain as a JSON object, which keeps every number exactly."""
         joints = []
         for j in self.joints:
             entry: dict[str, Any] = {"name": j.name, "axis": list(j.axis), "type": j.kind}
@@ -195,10 +195,10 @@ class Chain:
 
     @classmethod
     def from_dict(cls, arm: Mapping[str, Any], where: str = "arm") -> Chain:
-        """Read what `to_dict` or an arm's TOML file gives.
+        """The chain that `to_dict` or an arm's TOML file describes.
 
         Raises:
-            InputError: a key is unknown or missing, or a value makes no sense.
+            InputError: a key is unknown or missing, or a value is impossible.
         """
         table = ConfigTable(arm, where)
         joints = [_joint_from(joint, i) for i, joint in enumerate(table.tables("joint", "joint"))]
@@ -211,27 +211,27 @@ class Chain:
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Chain:
-        """Read a chain from a TOML file like `edge/arms/cody.toml`.
+        """The chain of a TOML file like `edge/arms/cody.toml`.
 
         Raises:
-            InputError: the file cannot be read, or is not a chain.
+            InputError: the file cannot be read, or does not describe a chain.
         """
         return cls.from_dict(read_toml(path).raw, where=os.fspath(path))
 
     @classmethod
     def cody(cls) -> Chain:
-        """Right arm of Cody to the wrist frame that carries the skin: 5 angles."""
+        """Cody's right arm, up to the wrist frame that carries the skin: 5 angles."""
         return cls.from_toml(Path(__file__).parents[1] / "arms" / "cody.toml")
 
     @classmethod
     def from_file(
         cls, path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
     ) -> Chain:
-        """Read a chain from a TOML file, or from a URDF file between two of its links.
+        """The chain of a TOML file, or of a URDF file between two of its links.
 
         Raises:
-            InputError: as `from_toml` and `from_urdf`; links are given for a TOML file, or one
-                is not given for a URDF.
+            InputError: as `from_toml` and `from_urdf`; or links are given for a TOML file, or a
+                link is missing for a URDF.
         """
         if Path(path).suffix.lower() in (".urdf", ".xml"):
             if base is None or tip is None:
@@ -246,7 +246,7 @@ class Chain:
 
     @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Chain:
-        """Read the joints between two links of a URDF file.
+        """The chain between two links of a URDF file.
 
         Raises:
             InputError: the file cannot be read, or no chain leads from `base` to `tip`.
@@ -260,13 +260,13 @@ class Chain:
 
 
 def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
-    """For each joint wanted, its index among those given.
+    """The index of each wanted joint among the given ones.
 
     >>> joint_columns(["wheel", "elbow", "shoulder"], ["shoulder", "elbow"])
     [2, 1]
 
     Raises:
-        InputError: a joint is missing; the sentence names it and those given.
+        InputError: a joint is missing; the sentence names it and the given joints.
     """
     index = {name: i for i, name in enumerate(given)}
     missing = [name for name in wanted if name not in index]
@@ -308,7 +308,7 @@ def _direction(joint: Joint) -> Vector:
 
 
 def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """K and K^2 of a turn about the joint's axis; for a slide its direction and zero."""
+    """K and K^2 of a rotation about the joint's axis; if it slides, its direction and zero."""
     x, y, z = _direction(joint)
     first = np.zeros((4, 4))
     if joint.kind == "prismatic":

@@ -1,4 +1,4 @@
-"""Shape, geometry and scale of a skin: what a taxel's index means in metres and newtons."""
+"""Shape, geometry and scale of a skin: the place of a taxel in metres, a count in newtons."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from edge.config import ConfigTable
 from edge.errors import InputError
 
 RELEASE_S = 0.3
-"""Seconds. An arm that bounces off a rigid thing comes back sooner; a second tap comes later."""
+"""Longer than an arm bounces off a rigid object, and shorter than the time to a second tap."""
 LONGEST_RELEASE_S = 60.0
 
 
@@ -32,22 +32,22 @@ class SkinLayout:
     wraps: bool = False
     """The last column touches the first."""
     pitch_m: float | tuple[float, float] | None = None
-    """Distance between taxel centres, or (along rows, along columns); None where unknown."""
+    """Distance between taxel centres, or (along rows, along columns); None if unknown."""
     radius_m: float | None = None
     row0_z_m: float = 0.0
     """z of row 0 on a cylinder; z falls by the row pitch with each row (elbow to wrist)."""
     column_angles_deg: tuple[float, ...] | None = None
-    """Angle of each column about z from x on a cylinder; even steps from 0 where None."""
+    """Angle of each column about z, from x, on a cylinder; None: even steps from 0."""
     counts_per_newton: float | None = None
-    """None: force stays in counts."""
+    """None if unknown: forces are then in counts."""
     threshold_counts: int = 0
-    """A taxel above this is in contact (paper, section III-B); the contact ends at it."""
+    """A taxel with more counts is in contact (paper, section III-B)."""
     onset_counts: int | None = None
-    """A contact begins when its region's peak is above this; `threshold_counts` where None."""
+    """A contact begins when its region's peak exceeds this; None: `threshold_counts`."""
     dead: tuple[int, ...] = ()
     """Flat indices (row * cols + col) of taxels that can never be read."""
     release_s: float = RELEASE_S
-    """Seconds without any taxel above the threshold after which a contact ends."""
+    """A contact ends after so many seconds with no taxel above the threshold."""
 
     def __post_init__(self) -> None:
         if not (1 <= self.rows <= 1024 and 1 <= self.cols <= 1024):
@@ -91,32 +91,32 @@ class SkinLayout:
 
     @property
     def force_unit(self) -> str:
-        """`newton`, or `count` where the scale is unknown."""
+        """`newton`, or `count` if the scale is unknown."""
         return "count" if self.counts_per_newton is None else "newton"
 
     @property
     def length_unit(self) -> str:
-        """`metre`, or `taxel` where the pitch is unknown."""
+        """`metre`, or `taxel` if the pitch is unknown."""
         return "taxel" if self.pitch_m is None else "metre"
 
     @property
     def pitch(self) -> tuple[float, float]:
-        """Distance between taxels along the rows and along the columns; 1 where unknown."""
+        """Distance between taxels along the rows and along the columns; 1 if unknown."""
         return self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
 
     def position(self, row: float, col: float) -> NDArray[np.float64]:
-        """As `point`, (3,)."""
+        """The result of `point` as an array (3,)."""
         return np.array(self.point(row, col))
 
     def point(self, row: float, col: float) -> tuple[float, float, float]:
-        """Where a point of the surface lies in the link's frame.
+        """(x, y, z) of a point of the surface in the link's frame.
 
         Args:
-            row: 0 to rows - 1, fractions allowed.
-            col: 0 to cols (cols is column 0 again where the skin wraps), fractions allowed.
+            row: 0 to rows - 1, or between two rows.
+            col: 0 to cols, or between two columns; on a skin that wraps, cols is column 0 again.
 
         Returns:
-            Metres, or taxels where the pitch is unknown.
+            Metres, or taxels if the pitch is unknown.
         """
         along, around = self.pitch
         if self.radius_m is None:
@@ -129,7 +129,7 @@ class SkinLayout:
         )
 
     def _angle(self, col: float) -> float:
-        """Angle of a fractional column in radians; between columns the shorter way round."""
+        """Angle in radians of a place between columns, which lies on the shorter arc."""
         if self.column_angles_deg is None:
             return 2.0 * math.pi * col / self.cols
         left = math.floor(col)
@@ -152,7 +152,7 @@ class SkinLayout:
         """Read the `skin` object of metadata; unknown keys are ignored.
 
         Raises:
-            InputError: a value is missing or makes no sense; `where` names the file.
+            InputError: a value is missing or impossible; `where` names the file.
         """
         table = ConfigTable(skin, where, "skin.")
         known: dict[str, Any] = {}
@@ -181,22 +181,20 @@ class SkinLayout:
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
-    """The device's geometry and scale with the model's thresholds, in the device's counts.
+    """The device's layout with the model's thresholds, converted to the device's counts.
 
-    The dead taxels are the model's; any other taxel that the device cannot read counts as missing.
+    The dead taxels are those of the model. Any other taxel that the device cannot read is missing.
 
     Raises:
-        InputError: the device is another skin than the model's.
+        InputError: the device's skin has another shape or other units than the model's.
     """
-    for name, what in (("rows", "rows"), ("cols", "columns"), ("wraps", "wrap-around")):
-        ours, theirs = getattr(device, name), getattr(model, name)
-        if ours != theirs:
-            raise InputError(f"this skin has {what} {ours}, the model was made for {theirs}")
-    if device.force_unit != model.force_unit or device.length_unit != model.length_unit:
-        raise InputError(
-            f"this skin measures {device.force_unit} and {device.length_unit}, "
-            f"the model was made for {model.force_unit} and {model.length_unit}"
-        )
+    ours, theirs = (
+        f"{skin.rows} x {skin.cols} taxels, {'closed around' if skin.wraps else 'flat'}, with "
+        f"forces in {skin.force_unit}s and lengths in {skin.length_unit}s"
+        for skin in (device, model)
+    )
+    if ours != theirs:
+        raise InputError(f"this skin has {ours}, but the model was made for {theirs}")
     ratio = 1.0
     if device.counts_per_newton is not None and model.counts_per_newton is not None:
         ratio = device.counts_per_newton / model.counts_per_newton

@@ -11,8 +11,7 @@ from edge.files import parsing, read_bytes
 
 
 def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[dict[str, Any]]:
-    """The joints that lead from link `base` to link `tip`, in that order, as an arm's TOML file
-    has them (`edge.touch.arm.Chain.from_dict`).
+    """The joints from link `base` to link `tip`, as tables for `edge.touch.arm.Chain.from_dict`.
 
     Raises:
         InputError: the file cannot be read, or no chain leads from `base` to `tip`.
@@ -20,7 +19,7 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[di
     with parsing(os.fspath(path), "a URDF file"):
         root = ElementTree.fromstring(read_bytes(path))
     if root.tag != "robot":
-        raise InputError(f"{path}: not a URDF file: its root is <{root.tag}>, not <robot>")
+        raise InputError(f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>")
     links = [link.get("name") for link in root.findall("link")]
     for name in (base, tip):
         if name not in links:
@@ -33,7 +32,7 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[di
     while link != base:
         if link not in parents:
             raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
-        element = parents.pop(link)  # popped, so that a loop of links ends
+        element = parents.pop(link)  # taken out, so that a loop of links ends
         joints.append(_joint(path, element))
         link = _attribute(path, element, "parent", "link")
     return joints[::-1]

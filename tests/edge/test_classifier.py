@@ -175,10 +175,10 @@ def test_features_too_large_to_scale_give_no_label(model, make_touch):
 
 
 def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm):
-    with pytest.raises(InputError, match="columns 23"):
+    with pytest.raises(InputError, match="16 x 23"):
         Classifier(model, replace(forearm, cols=23))
     with pytest.raises(InputError, match="here: has no joint angles"):
         require_joints(model, None, "here")
-    with pytest.raises(InputError, match="here: has 3 joint angles, the model's arm has 5"):
+    with pytest.raises(InputError, match="here: has 3 joint angles, but the model needs 5"):
         require_joints(model, 3, "here")
     require_joints(model, 5, "here")

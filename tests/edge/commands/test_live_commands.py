@@ -63,7 +63,7 @@ def test_run_needs_the_joint_angles_that_its_model_was_made_with(edge, exported,
     recording.save(bare, make_touch(arm=False))
     status, _, err = edge("run", "--model", model, "--fake", bare)
     assert status == 2
-    assert "has no joint angles, the model measures motion with 5" in err
+    assert "has no joint angles, but the model needs 5 of each frame" in err
     status, events, _ = edge("run", "--model", model, "--fake", bare, "--without-joints", "skin")
     decisions = [e for e in events if e["event"] == "decision"]
     assert status == 0
@@ -111,7 +111,7 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         (["--skin", "no.toml"], "no.toml: cannot be read"),
         (["--fake", "REC", "--joints", "tcp:5"], "--joints: give stdin or udp:[HOST:]PORT"),
         (["--fake", "REC", "--joints", "udp:x"], "joints udp:x: give udp:PORT"),
-        (["--fake", "REC", "--skin", "PAD"], "this skin has rows 8, the model was made for 16"),
+        (["--fake", "REC", "--skin", "PAD"], "this skin has 8 x 12 taxels, flat, with"),
     ],
 )
 def test_a_bad_option_is_one_sentence(edge, exported, recordings, arguments, said):

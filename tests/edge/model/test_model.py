@@ -158,12 +158,12 @@ def another_task(proto):
 REFUSED = {
     no_metadata: "no edge-classify metadata",
     no_json: "its metadata: not JSON",
-    meta(format=99): "is of format 99, this edge-classify reads",
+    meta(format=99): "is of format 99, but this edge-classify reads",
     meta(samples=30): "takes .*120.* features, its metadata says 90",
     meta(samples=-3): "samples must be a whole number from 2 to 10000, not -3",
     meta(window_s="soon"): "window_s must be a number above 0, at most 3600, not 'soon'",
     meta(skin={"rows": 16}): "cols is missing",
-    meta(arm=None): "motion frame and its arm disagree",
+    meta(arm=None): "motion frame contradicts its arm",
     meta(tasks={}): "no task",
     meta(tasks=[]): "tasks must be a table",
     meta(tracking={"speed": 1}): "tracking.debounce is missing",
@@ -213,8 +213,8 @@ def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path
     with pytest.raises(InputError) as error:
         Model(path)
     assert str(error.value) == (
-        f"{path}: its metadata is of format {number}, this edge-classify reads {FORMAT}; export it "
-        "again"
+        f"{path}: its metadata is of format {number}, but this edge-classify reads {FORMAT}; "
+        "export it again"
     )
 
 

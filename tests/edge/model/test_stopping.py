@@ -1,6 +1,7 @@
 """Confidence from distances, rules by their certified error, refusals, and the unknown."""
 
 import math
+from dataclasses import asdict
 
 import pytest
 
@@ -86,7 +87,7 @@ def test_where_the_full_window_errs_more_often_trials_do_not_help():
 
 
 def table(stored):
-    return ConfigTable(stored.to_dict(), "model.onnx", "stopping.t.")
+    return ConfigTable(asdict(stored), "model.onnx", "stopping.t.")
 
 
 def test_what_is_stored_is_read_again():

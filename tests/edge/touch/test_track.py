@@ -189,11 +189,11 @@ def test_another_scale_brings_the_thresholds_along():
 @pytest.mark.parametrize(
     ("device", "word"),
     [
-        (SkinLayout(5, 6), "rows 5, the model was made for 4"),
-        (SkinLayout(4, 7), "columns 7"),
-        (SkinLayout(4, 6, wraps=True), "wrap-around"),
-        (SkinLayout(4, 6, counts_per_newton=1.0), "measures newton"),
-        (SkinLayout(4, 6, pitch_m=0.1), "and metre"),
+        (SkinLayout(5, 6), "5 x 6 taxels, flat.* made for 4 x 6"),
+        (SkinLayout(4, 7), "4 x 7"),
+        (SkinLayout(4, 6, wraps=True), "closed around"),
+        (SkinLayout(4, 6, counts_per_newton=1.0), "forces in newtons"),
+        (SkinLayout(4, 6, pitch_m=0.1), "lengths in metres"),
     ],
 )
 def test_another_skin_is_refused(device, word):
