@@ -128,19 +128,25 @@ def report(fitted: Fitted, prices: Sequence[tuple[float, float]] | None = None) 
         lines.append(f"{task}: {_accuracy(chosen)}")
         lines.append(f"  {_described(chosen.choice, fitted)}")
     dataset = fitted.dataset
-    lines += ["", ", ".join(f"{name} in {unit}" for name, unit in dataset.units.items())]
+    units: dict[str, list[str]] = {}
+    for name, unit in dataset.units.items():
+        units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(name)
+    lines += ["", *(f"{unit}: {', '.join(names)}" for unit, names in units.items())]
     if any(measures.feature(name).moves for name in dataset.names):
-        lines.append(f"motion in the {'skin' if dataset.chain is None else 'world'}'s frame")
+        frame = "along the skin" if dataset.chain is None else "in the world"
+        lines.append(f"contact motion is measured {frame}")
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
 
 
 def _accuracy(chosen: Chosen) -> str:
-    """The accuracy of a task, as a user reads it."""
+    """The accuracy of a task in words."""
     numbers = f"{_percent(chosen.accuracy)} of {chosen.accuracy.total} trials, nested"
     if chosen.left_out == TRIAL:
-        return numbers
-    left_out = f"{chosen.left_out} left out {numbers}"
-    return f"trial left out {chosen.by_trial.accuracy:.1%}, {left_out}"
+        return f"{numbers}, with the trial left out"
+    return (
+        f"{numbers}, with every trial of its {chosen.left_out} left out; "
+        f"{chosen.by_trial.accuracy:.1%} with the trial alone left out"
+    )
 
 
 def _percent(result: Result) -> str:
@@ -153,8 +159,9 @@ def _described(choice: Choice, fitted: Fitted) -> str:
     if choice.projection == "lda":
         how += f", shrinkage {choice.shrinkage:g}"
         if choice.targets:
-            how += f", of {' and '.join(choice.targets)} side by side"
-    return f"{how}, {choice.components} components, k = {choice.k}"
+            how += f", with the discriminants of {' and '.join(choice.targets)} side by side"
+    plural = "s" * (choice.components != 1)
+    return f"{how}, {choice.components} component{plural}, k = {choice.k}"
 
 
 def _name(choice: Choice, candidates: Sequence[Candidate]) -> str:
