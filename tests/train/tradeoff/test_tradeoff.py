@@ -258,6 +258,7 @@ def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, m
             touch = make_touch(kind=kind, seed=seed, rate=50.0)
             save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", touch)
     monkeypatch.setattr(running, "FEWEST", 28)
+    monkeypatch.setattr(running, "GRIDS", running.GRIDS[:1])
     monkeypatch.setattr(settings, "WINDOWS", (1.2,))
     monkeypatch.setattr(running, "DECISION_POINTS_S", (0.4, 1.2))
     digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
