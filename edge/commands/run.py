@@ -108,7 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
         touch_map = None if arguments.map is None else map_writer(arguments.map, model.info)
         if touch_map is not None:
             lines.add(touch_map)
-        page = stack.enter_context(open_page(arguments, opened))
+        page = stack.enter_context(open_page(arguments, opened, decides=True))
         poses = None if dof is None else joints
         loop = Loop(skin, joints=poses, lasts_s=opened.lasts_s, stop=stop)
 

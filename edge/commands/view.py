@@ -114,7 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
         with open_joints(arguments, opened, chain, dof) as joints, quit_on_q(stop) as look:
             poses = None if dof is None else joints
             loop = Loop(opened.skin, joints=poses, lasts_s=opened.lasts_s, stop=stop)
-            with open_page(arguments, opened) as page:
+            with open_page(arguments, opened, decides=model is not None) as page:
                 if page is None:
                     _show(opened.skin, model, loop, 1.0 / arguments.rate, look)
                     return 0

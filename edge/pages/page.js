@@ -141,6 +141,7 @@ function drawContact(picture) {
 
 function drawDecisions(picture) {
   const box = $("decisions");
+  $("decision-part").hidden = !picture.decides;
   if (!picture.decisions.length) {
     box.replaceChildren(element("p", picture.contact && !picture.contact.ended
       ? "Waiting for the window to end." : "No decision yet."));

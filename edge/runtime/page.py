@@ -43,6 +43,7 @@ class Page:
         title: str,
         folder: Path | None = None,
         labels: dict[str, str] | None = None,
+        decides: bool = False,
     ) -> None:
         """Serve a page.
 
@@ -52,6 +53,7 @@ class Page:
             title: names the skin.
             folder: of the trials that are recorded; None if none are.
             labels: of the first trials; without any, recording waits for a person to give some.
+            decides: a model decides on the contacts.
 
         Raises:
             InputError: the address cannot be used, or a trial in the folder cannot be read.
@@ -78,6 +80,7 @@ class Page:
             "scale": scale,
             "units": {"force": layout.force_unit, "motion": layout.length_unit},
             "folder": None if folder is None else str(folder),
+            "decides": decides,
         }
         self.server = WebServer(address, self._act)
 
@@ -135,15 +138,14 @@ class Page:
 
     def _curves(self) -> dict[str, Any] | None:
         """The last contact: its taxels, and its features since onset."""
-        contact = self._contact
-        if contact is None or contact.region is None:
+        contact, region = self._contact, self._tracker.region
+        if contact is None:
             return None
         series = contact.series()
         series = series.thinned(max(1, -(-series.t.size // CURVE_POINTS)))
-        ended = contact.ended
         return {
-            "ended": ended,
-            "taxels": [] if ended else contact.region.mask.ravel().nonzero()[0].tolist(),
+            "ended": contact.ended,
+            "taxels": [] if region is None else region.mask.ravel().nonzero()[0].tolist(),
             "t": series.t.round(4).tolist(),
             "force": (series.peak / (self._layout.counts_per_newton or 1.0)).round(4).tolist(),
             "area": series.area.tolist(),
