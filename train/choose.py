@@ -320,6 +320,25 @@ class Choosing:
             y = {task: y[task] for task in y if task in self._grouped}
         return trials, answers(y, self._group_folds, unseen, progress=bars[1])
 
+    def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
+        """{task: (n,) answers of the candidate that is best in plain cross-validation}."""
+        trials, groups = self._tables(window_s, False, f"{window_s:g} s")
+        right: dict[str, NDArray[np.bool_]] = {}
+        for task in self._y:
+            answers = (groups if task in self._grouped else trials).held_out(task)
+            right[task] = answers[choose(answers)]
+        return right
+
+    def accuracy(self, window_s: float) -> float:
+        """Mean accuracy of the tasks in plain cross-validation; missed touches count as wrong."""
+        results = [
+            _with_untouched(
+                self._dataset.untouched_labels(task), Result(int(right.sum()), len(right))
+            )
+            for task, right in self._right(window_s).items()
+        ]
+        return sum(result.accuracy for result in results) / len(results)
+
     def window(self, windows: Sequence[float]) -> tuple[float, list[str]]:
         """The shortest of some windows at which every task is about as accurate as at its best.
 
@@ -330,12 +349,8 @@ class Choosing:
         """
         if len(windows) == 1:
             return windows[0], []
-        right: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in self._y}
-        for window_s in windows:
-            trials, groups = self._tables(window_s, False, f"{window_s:g} s")
-            for task in self._y:
-                answers = (groups if task in self._grouped else trials).held_out(task)
-                right[task].append(answers[choose(answers)])
+        by_window = [self._right(window_s) for window_s in windows]
+        right = {task: [answers[task] for answers in by_window] for task in self._y}
         order = np.arange(len(windows))
         needed = [choose(np.array(each), order, margin=WINDOW_MARGIN) for each in right.values()]
         best = windows[max(needed)]

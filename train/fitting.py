@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
+from train import thresholds
 from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, kinds_of, without_folds
 from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
@@ -130,6 +132,7 @@ def fit(
     if window_s is None and decision_points_s:
         window_s = decision_points_s[-1]
     windows: tuple[float, ...] = (window_s or WINDOW_S,)
+    notes: list[str] = []
     if isinstance(data, DataSet):
         dataset = data
     else:
@@ -138,15 +141,34 @@ def fit(
         every = candidates({}, joints=raw.joints, drawn=drawn, features=features, quick=quick)
         if window_s is None and not quick:
             windows = _windows([float(r.t[-1] - r.t[0]) for r in raw.recordings])
-        dataset = load_trials(
+        load = partial(
+            load_trials,
             raw,
-            threshold=threshold,
-            onset=onset,
             horizon_s=windows[-1],
             features=expand([name for candidate in every for name in candidate.sets]),
             arm=arm,
             progress=progress,
         )
+        fixed = threshold is not None or onset is not None
+        if not fixed and "threshold_counts" not in raw.recordings[0].meta.get("skin", {}):
+            threshold, onset = thresholds.proposed(raw.recordings)
+            notes.append(
+                f"warning: the skin was saved without thresholds; a threshold of {threshold} and "
+                f"an onset of {onset} counts come from the noise before contact"
+            )
+        dataset = load(threshold=threshold, onset=onset)
+        if not (fixed or any("simulation" in r.meta for r in raw.recordings)):
+
+            def accuracy(of: DataSet) -> float:
+                y = {task: of.labels(task) for task in _tasks(of, tasks)}
+                few = candidates(y, joints=of.joints > 0, features=features, quick=True)
+                choosing = Choosing(of, y, few, samples, leave_out, quick=True, jobs=jobs)
+                return choosing.accuracy(windows[0])
+
+            dataset, lower = thresholds.chosen(
+                dataset, lambda low, high: load(threshold=low, onset=high), accuracy
+            )
+            notes += lower
     y = {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
     n = len(dataset.trials)
     if n < FEWEST_TRIALS:
@@ -168,7 +190,8 @@ def fit(
     choosing = Choosing(dataset, y, tried, samples, leave_out, quick, jobs, progress)
     if len(windows) > 1:
         windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
-    window_s, notes = choosing.window(windows)
+    window_s, why = choosing.window(windows)
+    notes += why
     chosen, trials = choosing.choose(window_s)
     dataset = dataset.with_kernels(window_s)
     choices = {task: settings.choice for task, settings in chosen.items()}

@@ -151,7 +151,7 @@ def skinned(recording, **skin):
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        (lambda r: skinned(r, wraps=False), "odd.npz: this skin has wrap-around False"),
+        (lambda r: skinned(r, wraps=False), "odd.npz: this skin has 16 x 24 taxels, flat"),
         (lambda r: skinned(r, counts_per_newton=None), "odd.npz: this skin measures count"),
         (
             lambda r: replace(r, joints=np.zeros((len(r.t), 3))),

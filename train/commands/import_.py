@@ -18,9 +18,9 @@ import numpy as np
 from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
 from edge.recording import Recording, load, save
-from train.commands.thresholds import count_contacts, proposed
 from train.importers import names
 from train.progress import bar
+from train.thresholds import count_contacts, proposed
 
 ZERO_FRAMES = 3
 

@@ -1,0 +1,84 @@
+"""Thresholds from noise, and lower ones where touches are missed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+import train
+from edge.recording import save
+from train.thresholds import count_contacts, proposed
+
+
+def noisy(recording, seed):
+    """With noise of up to 40 counts on every taxel."""
+    noise = np.random.default_rng(seed).integers(0, 41, recording.frames.shape).astype(np.uint16)
+    return replace(recording, frames=np.maximum(recording.frames, noise))
+
+
+def weaker(recording, share, **skin):
+    """With a share of its force, and other thresholds; an entry of None is taken out."""
+    skin = {**recording.meta["skin"], **skin}
+    kept = {key: value for key, value in skin.items() if value is not None}
+    frames = (recording.frames * share).astype(np.uint16)
+    return replace(recording, frames=frames, meta={**recording.meta, "skin": kept})
+
+
+def test_the_proposal_lies_above_the_noise_and_finds_every_contact(make_touch):
+    trials = [noisy(make_touch(seed=seed), seed) for seed in range(6)]
+    threshold, onset = proposed(trials)
+    assert 70 <= threshold <= 80
+    assert onset == round(1.5 * threshold)
+    assert count_contacts(trials, threshold, onset) == (6, 6)
+    assert count_contacts(trials, 60000, 60000) == (0, 0)
+
+
+def test_a_few_recordings_that_begin_in_contact_do_not_raise_it(make_touch):
+    trials = [noisy(make_touch(seed=seed), seed) for seed in range(12)]
+    begun = [noisy(make_touch(seed=99, lead_s=0.0), 99)]
+    assert proposed(trials + begun)[0] <= 80
+
+
+def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
+    trials = []
+    for seed in range(4):
+        touch = make_touch(seed=seed)
+        soft = weaker(touch, 70.0 / touch.frames.max())
+        trials.append(noisy(replace(soft, meta={**soft.meta, "labels": {"object": "down"}}), seed))
+    assert proposed(trials) == (40, 60)  # the touch peaks at 70
+    strong = [noisy(make_touch(seed=seed), seed) for seed in range(4)]
+    assert proposed(strong) == (80, 120)
+
+
+def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(make_touch):
+    touch = make_touch(seed=0, lead_s=0.0)
+    slow = replace(touch, t=np.arange(len(touch.t)) * 0.1)
+    slow.frames[0] = 3
+    assert proposed([replace(slow, meta={"skin": slow.meta["skin"]})]) == (6, 9)
+
+
+def saved(folder, make_touch, **skin):
+    for seed in range(20):
+        touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
+        save(folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin))
+    return str(folder)
+
+
+def test_lower_thresholds_are_taken_where_they_decide_better(make_touch, tmp_path):
+    high = {"threshold_counts": 150, "onset_counts": 200}
+    data = saved(tmp_path, make_touch, **high)
+    given = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
+    fitted = train.fit(data, **given)
+    assert fitted.dataset.layout.threshold_counts < 150
+    assert "recordings show no contact; in cross-validation" in fitted.notes[0]
+    assert not fitted.dataset.untouched
+    held = train.fit(data, **given, threshold=150)
+    assert held.dataset.layout.threshold_counts == 150
+    assert held.dataset.untouched
+
+
+def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp_path):
+    data = saved(tmp_path, make_touch, threshold_counts=None, onset_counts=None)
+    given = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
+    fitted = train.fit(data, **given)
+    assert "warning: the skin was saved without thresholds" in fitted.notes[0]
+    assert all(trial.onset_s > trial.recording.t[0] for trial in fitted.dataset.trials)
