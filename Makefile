@@ -126,10 +126,10 @@ $(BENCHVENV): $(READY)
 	$(PIP) --group bench
 	@touch $@
 
+# BENCH="-k region": only the benchmarks whose names contain this.
 bench: $(BENCHVENV)
 	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
-	  -o filterwarnings=default --benchmark-disable-gc --benchmark-warmup=off \
-	  --benchmark-columns=median,iqr,rounds
+	  -o filterwarnings=default $(BENCH)
 
 transfer: SCENE := train/scenes/household.toml
 transfer: $(BENCHVENV)

@@ -1,20 +1,24 @@
 """Time of the software on top of the wire, bits above the minimum, and the loop's period.
 
 An unmodified smbus2 runs over the tests' C stand-in for /dev/i2c-N, whose calls return at once, so
-that only the software takes time. `python -m bench.bench_bus --seconds 600` measures the loop's
-period over a longer run.
+that only the software takes time.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import json
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
+
+from smbus2 import SMBus, i2c_msg
+
+from edge.fake.player import calibrated, frame_bits
+from edge.skin import file as skinfile
+from edge.skin.loop import Loop
+from edge.skin.skin import Skin
 
 ROOT = Path(__file__).parents[1]
 LEAST_BITS = 8 * 20 + 32 * 255
@@ -23,26 +27,17 @@ WIRE_S = (12 * 255 + 3 * 20) / 400_000
 """The shortest time of a frame over three buses: 12 chips and 3 channels on the longest."""
 
 
-def _shim():
+def inside(folder: Path, function: str) -> dict:
+    """The result of a function of this module in a process of its own over the stand-in."""
     spec = importlib.util.spec_from_file_location("shim", ROOT / "tests/edge/i2c/shim/build.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def inside(*arguments: str) -> dict:
-    """The result of `measure` or `keep_period` in a process of its own over the stand-in."""
-    shim = _shim()
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [sys.executable, "-m", "bench.bench_bus", "--inside", *arguments],
-            env=shim.environment(shim.build(Path(folder))),
-            cwd=ROOT,
-            check=True,
-            capture_output=True,
-            text=True,
+    shim = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(shim)
+    code = f"import json; from bench import bench_bus; print(json.dumps(bench_bus.{function}()))"
+    return json.loads(
+        subprocess.check_output(
+            [sys.executable, "-c", code], env=shim.environment(shim.build(folder)), cwd=ROOT
         )
-    return json.loads(done.stdout)
+    )
 
 
 def _least_us(action, rounds=60, calls=20) -> float:
@@ -57,17 +52,11 @@ def _least_us(action, rounds=60, calls=20) -> float:
 
 
 def _skin():
-    from edge.fake.player import calibrated
-    from edge.skin import file as skinfile
-    from edge.skin.skin import Skin
-
     return Skin.open(calibrated(skinfile.load(skinfile.shipped("cody"))))
 
 
 def measure() -> dict:
     """Microseconds of one full frame over three buses, by part."""
-    from smbus2 import SMBus, i2c_msg
-
     with _skin() as skin:
         skin.read()
 
@@ -75,14 +64,6 @@ def measure() -> dict:
             for reader in skin.readers:
                 reader.read(reader.slots)
 
-        def assemble():
-            skin._assemble(skin.clock.now())
-
-        out = {
-            "buses": _least_us(buses_in_turn),
-            "frame": _least_us(assemble),
-            "threads": _least_us(skin.read),
-        }
         buses = [SMBus(spec.device) for spec in skin.file.buses]
 
         def plainly():
@@ -98,25 +79,27 @@ def measure() -> dict:
                     data = list(message)
                     [data[i] << 8 | data[i + 1] for i in range(0, 24, 2)]
 
-        out["plainly"] = _least_us(plainly)
-    return out
+        return {
+            "buses": _least_us(buses_in_turn),
+            "frame": _least_us(lambda: skin._assemble(skin.clock.now())),
+            "threads": _least_us(skin.read),
+            "plainly": _least_us(plainly),
+        }
 
 
-def keep_period(seconds: float) -> dict:
-    """Milliseconds of the loop's period at 100 Hz, by percentile."""
-    from edge.skin.loop import Loop
-
+def keep_period() -> dict:
+    """Milliseconds of the loop's period at 100 Hz, by percentile over 20 s."""
     with _skin() as skin:
-        loop = Loop(skin, lasts_s=seconds)
+        loop = Loop(skin, lasts_s=20.0)
         frames = sum(1 for _ in loop.frames())
         periods, missed = loop.schedule.periods, loop.schedule.missed
     out = {f"p{p:g}": 1e3 * periods.percentile(p) for p in (50, 99, 99.9)}
     return {**out, "longest": 1e3 * periods.longest, "frames": frames, "missed": missed}
 
 
-def bench_overhead_of_software(note):
+def bench_overhead_of_software(note, tmp_path):
     """An upper bound: one after another, the buses take more time than side by side."""
-    times = inside()
+    times = inside(tmp_path, "measure")
     ours = times["buses"] + times["frame"]
     note(f"the wire's {WIRE_S * 1e6:.0f} us at 400 kHz", ours / WIRE_S * 1e-6, "at most 0.02")
     note("reading with list(msg) and shifts", times["buses"] / times["plainly"], "-")
@@ -126,31 +109,12 @@ def bench_overhead_of_software(note):
 
 
 def bench_bits_on_the_wire(note):
-    from edge.fake.player import frame_bits
-    from edge.skin import file as skinfile
-
     bits = sum(frame_bits(skinfile.load(skinfile.shipped("cody")), 400)) / 400
     note(f"{LEAST_BITS}, the least", bits / LEAST_BITS, "at most 1.03")
 
 
-def bench_period(note):
-    periods = inside("--seconds", "20")
+def bench_period(note, tmp_path):
+    periods = inside(tmp_path, "keep_period")
     for name in ("p50", "p99", "p99.9", "longest"):
         note(f"ms, {name} of {periods['frames']}", periods[name], "10")
     note("ticks left out", periods["missed"], "0")
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--seconds", type=float)
-    arguments = parser.parse_args()
-    if arguments.inside:
-        result = measure() if arguments.seconds is None else keep_period(arguments.seconds)
-        print(json.dumps(result))
-        return
-    print(json.dumps(inside("--seconds", str(arguments.seconds or 60.0)), indent=2))
-
-
-if __name__ == "__main__":
-    main()

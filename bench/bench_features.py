@@ -9,41 +9,28 @@ from edge.touch.feature_sets import SETS
 from edge.touch.features import WINDOW_S, feature_vector
 from edge.touch.track import ContactTracker, first_contact
 
-FRAME_S = 0.010
 FRAMES = 120
 
 
-@pytest.fixture(params=[name for name in SETS if "kernels" not in name])
-def features(request):
-    """Names of a set's features."""
-    return SETS[request.param]
+@pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
+def bench_features(against, note, name):
+    features, recording = SETS[name], load(FOLDER / "pillow-movable.npz")
 
+    def tracker():
+        joints = recording.joints.shape[1]
+        return ContactTracker(
+            recording.layout, chain=Chain.cody(), features=features, joints=joints
+        )
 
-@pytest.fixture
-def recording():
-    return load(FOLDER / "pillow-movable.npz")
-
-
-def tracker_of(features, recording):
-    joints = recording.joints.shape[1]
-    return ContactTracker(recording.layout, chain=Chain.cody(), features=features, joints=joints)
-
-
-def bench_following(against, note, features, recording):
-    """A frame in contact."""
-    onset_s, _ = first_contact(recording, tracker_of(features, recording))
+    onset_s, series = first_contact(recording, tracker())
     frames = [frame for frame in recording if frame.t >= onset_s][:FRAMES]
 
     def follow():
-        tracker = tracker_of(features, recording)
+        tracked = tracker()
         for frame in frames:
-            tracker.push(frame)
+            tracked.push(frame)
 
-    seconds = against(follow, {}, calls=1) / len(frames)
-    note(f"a 10 ms frame, at {seconds * 1e6:.0f} us", seconds / FRAME_S, "at most 0.02")
-
-
-def bench_vector(against, note, features, recording):
-    _, series = first_contact(recording, tracker_of(features, recording))
-    vector = against(lambda: feature_vector(series, WINDOW_S, features=features), {})
-    note("a millisecond", vector * 1e3, "below 1")
+    followed_s = against(follow, {}, calls=1) / len(frames)
+    vector_s = against(lambda: feature_vector(series, WINDOW_S, features=features), {})
+    note(f"a 10 ms frame, at {followed_s * 1e6:.0f} us", followed_s / 0.010, "at most 0.02")
+    note("a vector, beside a millisecond", vector_s * 1e3, "below 1")

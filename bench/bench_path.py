@@ -3,9 +3,9 @@
 import os
 import subprocess
 import sys
-import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from edge.classifier import Classifier
@@ -13,27 +13,45 @@ from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load
 from export.__main__ import main as export
+from train.__main__ import main as train
+from train.dataset import load_trials
 
 ROOT = Path(__file__).parents[1]
 FRAME_S = 0.010
+USUAL = """
+import sys
+import numpy as np
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.decomposition import PCA
+from sklearn.neighbors import KNeighborsClassifier
+with np.load(sys.argv[1]) as data:
+    X, y = data["X"], data["y"]
+model = make_pipeline(StandardScaler(), PCA(7), KNeighborsClassifier(2)).fit(X, y)
+print(model.predict(X[:1]))
+"""
+PEAK_MEMORY = """
+import sys
+from edge.cli import main
+main(sys.argv[1:])
+# ru_maxrss would keep the memory that the parent had before exec.
+peak = [line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")]
+print(*peak, file=sys.stderr)
+"""
 
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory):
-    """(model path, data folder): the default simulated set, exported."""
-    from train.__main__ import main as train
-
+    """(model path, data folder, one of its recordings): the default simulated set, exported."""
     folder = tmp_path_factory.mktemp("built")
     data = folder / "data"
     assert train(["simulate", str(ROOT / "train/scenes/cody18.toml"), "--out", str(data)]) == 0
     assert export(["--data", str(data), "--out", str(folder)]) == 0
-    return folder / "model.onnx", data
+    return folder / "model.onnx", data, sorted(data.glob("*.npz"))[0]
 
 
 def bench_frame_in_contact(against, note, built):
-    path, data = built
-    model = Model(path)
-    recording = load(sorted(data.glob("*.npz"))[0])
+    model, recording = Model(built[0]), load(built[2])
     frames = list(recording)[: round(1.2 / FRAME_S)]
 
     def watch():
@@ -45,58 +63,29 @@ def bench_frame_in_contact(against, note, built):
     note("a 10 ms frame", share, "at most 0.01")
 
 
-@pytest.fixture(scope="session")
-def asked(built):
-    """(model, first contact's series)."""
-    path, data = built
-    model = Model(path)
-    return model, first_series(load(sorted(data.glob("*.npz"))[0]), model)[1]
-
-
-def bench_decision_of_all_tasks(against, note, asked):
-    model, series = asked
+def bench_decision_of_all_tasks(against, note, built):
+    model = Model(built[0])
+    _, series = first_series(load(built[2]), model)
     vector = model.info.vector(series)
     share = against(lambda: model.decide(vector), {}) / FRAME_S
     note("a 10 ms frame", share, "at most 0.01")
 
 
-SKLEARN = """
-    import sys
-    import numpy as np
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-    from sklearn.decomposition import PCA
-    from sklearn.neighbors import KNeighborsClassifier
-    X = np.load(sys.argv[1])["X"]
-    y = np.load(sys.argv[1])["y"]
-    model = make_pipeline(StandardScaler(), PCA(7), KNeighborsClassifier(2)).fit(X, y)
-    print(model.predict(X[:1]))
-"""
-
-
 def bench_cold_start(against, built, tmp_path):
     """From the start of the process to its first decision."""
-    import numpy as np
+    path, data, recording = built
+    trials, arrays = load_trials([data]), tmp_path / "xy.npz"
+    np.savez(arrays, X=trials.features(), y=trials.labels("object"))
+    # Unbuffered, so that a line arrives as soon as it is printed; with compiled files, as an
+    # installed package has them.
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
 
-    from train.dataset import load_trials
-
-    path, data = built
-    trials = load_trials([data])
-    np.savez(tmp_path / "xy.npz", X=trials.features(), y=trials.labels("object"))
-    program = tmp_path / "usual.py"
-    program.write_text(textwrap.dedent(SKLEARN))
-    recording = sorted(data.glob("*.npz"))[0]
-    ours = [sys.executable, "-m", "edge.cli", "replay", "--model", str(path), str(recording)]
-    usual = [sys.executable, str(program), str(tmp_path / "xy.npz")]
-
-    def start(command, sign):
+    def start(sign, *arguments):
         def until_decided():
-            # Unbuffered, so that its line is here as soon as it is decided; compiled once and
-            # for all, as an installed package is.
-            environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-            environment.pop("PYTHONDONTWRITEBYTECODE", None)
-            pipe = subprocess.PIPE
-            with subprocess.Popen(command, cwd=ROOT, stdout=pipe, env=environment) as process:
+            with subprocess.Popen(
+                [sys.executable, *arguments], cwd=ROOT, stdout=subprocess.PIPE, env=environment
+            ) as process:
                 decided = any(sign in line for line in process.stdout)
                 process.kill()
             assert decided
@@ -104,23 +93,16 @@ def bench_cold_start(against, built, tmp_path):
         return until_decided
 
     against(
-        start(ours, b'"decision"'),
-        {"scikit-learn's pipeline": start(usual, b"'")},
-        least={"scikit-learn's pipeline": 6},
+        start(b'"decision"', "-m", "edge.cli", "replay", "--model", path, recording),
+        {"scikit-learn's pipeline": start(b"'", "-c", USUAL, arrays)},
+        most={"scikit-learn's pipeline": 1 / 6},
         calls=1,
         rounds=7,
     )
 
 
 def bench_peak_memory(note, built):
-    path, data = built
-    recording = sorted(data.glob("*.npz"))[0]
-    code = (
-        "import sys; from edge.cli import main; main(sys.argv[1:]); "
-        # Not ru_maxrss, which keeps what the parent had before exec.
-        "print(*(x.split()[1] for x in open('/proc/self/status') if x.startswith('VmHWM')), "
-        "file=sys.stderr)"
-    )
-    command = [sys.executable, "-c", code, "replay", "--model", str(path), str(recording)]
+    path, _, recording = built
+    command = [sys.executable, "-c", PEAK_MEMORY, "replay", "--model", path, recording]
     run = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
     note("60 MiB", int(run.stderr.split()[-1]) / 1024 / 60, "at most 1")

@@ -18,16 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from bench.mujoco_touch import (
-    LEAD_S,
-    RADIUS_M,
-    RATE_HZ,
-    START_DEG,
-    THRESHOLD_COUNTS,
-    Thing,
-    Touch,
-    simulate,
-)
+from bench import mujoco_touch
+from bench.mujoco_touch import LEAD_S, RADIUS_M, RATE_HZ, THRESHOLD_COUNTS, Thing, Touch
 from edge.errors import InputError
 from train.simulate.effects.lateral import SPREAD
 from train.simulate.engine import run_batch
@@ -56,27 +48,23 @@ STEP_S = 0.00125
 
 def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in MuJoCo."""
-    touched = simulate(Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M))
+    touched = mujoco_touch.simulate(
+        Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M)
+    )
     return touched.recording.frames, touched.force, touched.moved_m
 
 
 def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in our simulator."""
-    item = {
-        "name": "thing",
-        "family": "foam" if thing.soft else "rigid",
-        "conditions": ["fixed" if fixed else "movable"],
-        "width_m": thing.height_m,
-        "breadth_m": thing.breadth_m,
-        "skin_friction": thing.skin,
-        "mass_kg": thing.mass_kg,
-        "friction_static": thing.floor,
-        "friction_kinetic": thing.floor,
-    }
+    item = {"name": "thing", "family": "foam" if thing.soft else "rigid"}
+    item |= {"conditions": ["fixed" if fixed else "movable"]}
+    item |= {"width_m": thing.height_m, "breadth_m": thing.breadth_m, "mass_kg": thing.mass_kg}
+    item |= {"friction_static": thing.floor, "friction_kinetic": thing.floor}
+    item |= {"skin_friction": thing.skin}
     if thing.soft:
         item |= {"modulus_pa": thing.modulus_pa, "depth_m": thing.thick_m}
         item |= {"relax_ratio": 0.6, "relax_s": 0.06}
-    start = [a + b for a, b in zip(START_DEG, UPRIGHT_DEG, strict=True)]
+    start = [a + b for a, b in zip(mujoco_touch.START_DEG, UPRIGHT_DEG, strict=True)]
     scene = from_dict(
         {
             "trials": {"count": 1, "lead_s": LEAD_S, "after_s": 1.8},
@@ -110,15 +98,10 @@ def theory(thing: Thing, fixed: bool) -> dict[str, float]:
         inside = a * a / 2 + 0.36 * depth * (a - 0.19 * depth * math.log1p(a / (0.19 * depth)))
         return inside / RADIUS_M
 
-    def half_width(advance: float) -> float:
-        return float(
-            brentq(lambda a: min(load(a), hold) / ARM_N_M + pressed(a) - advance, 1e-6, 0.2)
-        )
+    def excess(a: float) -> float:
+        return load(a) / ARM_N_M + pressed(a) - SPEED_M_S * middle if fixed else load(a) - hold
 
-    if fixed:
-        a = half_width(SPEED_M_S * middle)
-    else:
-        a = float(brentq(lambda a: load(a) - hold, 1e-6, 0.2))
+    a = float(brentq(excess, 1e-6, 0.2))
     force = load(a)
     out["total force, N"] = force
     out["motion, mm"] = 0.0 if fixed else 1e3 * (SPEED_M_S * TO_S - hold / ARM_N_M - pressed(a))

@@ -17,6 +17,7 @@ import os
 import socket
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -70,9 +71,9 @@ def main() -> int:
         fake_skin(file, lambda t: touches[int(t) % 50], timed=True, faults=faults) as skin,
     ):
         listener.bind(("127.0.0.1", 0))
+        listener.setblocking(False)
         place = Path(folder) / "map.jsonl"
-        port = listener.getsockname()[1]
-        lines = Lines(out, f"127.0.0.1:{port}", patient=lambda: True)
+        lines = Lines(out, f"127.0.0.1:{listener.getsockname()[1]}", patient=lambda: True)
         writer = map_writer(place, model.info)
         lines.add(writer)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
@@ -86,9 +87,9 @@ def main() -> int:
             for line in events_on_map(events):
                 writer.put(line, lambda: True)
             if frames % 100 == 0:
-                listener.setblocking(False)
-                while _received(listener):
-                    pass
+                with suppress(BlockingIOError):
+                    while listener.recv(65536):
+                        pass
             if frames % every == 0:
                 gc.collect()
                 now = resident_kb(), descriptors()
@@ -106,13 +107,6 @@ def main() -> int:
     lost = sum(lines.lost.values()) + loop.schedule.missed
     flat = before is not None and largest - before[0] <= GROWTH_KB and now[1] == before[1]
     return 0 if flat and lost == 0 and placed else 1
-
-
-def _received(listener: socket.socket) -> bool:
-    try:
-        return bool(listener.recv(65536))
-    except BlockingIOError:
-        return False
 
 
 if __name__ == "__main__":

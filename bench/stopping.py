@@ -104,8 +104,6 @@ def run(arguments: argparse.Namespace) -> int:
     print("| task | mean time, s | fixed window, % wrong | when sure | gain | trees | TEASER |")
     print("|---|---|---|---|---|---|---|")
     for task, ours in compared.items():
-        if arguments.task and task not in arguments.task:
-            continue
         fixed = list(zip(ours.decision_points_s, ours.fixed.tolist(), strict=True))
         sure = [(seconds, wrong) for _, seconds, wrong in ours.when_sure()]
         trees = extra_trees(X, y[task], folds, arguments.jobs)
@@ -114,21 +112,19 @@ def run(arguments: argparse.Namespace) -> int:
             seconds, wrong = teaser(series, y[task], folds)
             theirs = {seconds: f"{100 * wrong:.1f}"}
         for seconds in sorted({*DECISION_POINTS_S, *theirs}):
-            waited, stopped, forest = (at(way, seconds) for way in (fixed, sure, trees))
-            error = np.sqrt((waited * (1 - waited) + stopped * (1 - stopped)) / ours.trials)
+            waited, stopped, forest = (100 * at(way, seconds) for way in (fixed, sure, trees))
+            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / ours.trials)
             print(
-                f"| {task} | {seconds:.2f} | {100 * waited:.1f} | {100 * stopped:.1f} | "
-                f"{100 * (waited - stopped):.1f} ± {100 * error:.1f} | "
-                f"{'' if np.isnan(forest) else f'{100 * forest:.1f}'} | {theirs.get(seconds, '')} |"
+                f"| {task} | {seconds:.2f} | {waited:.1f} | {stopped:.1f} | "
+                f"{waited - stopped:.1f} ± {error:.1f} | {forest:.1f} | {theirs.get(seconds, '')} |"
             )
-    for task, ours in compared.items():
-        for rule in ours.certified:
-            if rule.folds:
-                print(
-                    f"{task}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
-                    f"folds, {100 * rule.wrong:.1f} % wrong ({100 * rule.unknown:.1f} % unknown) "
-                    f"at {rule.mean_s:.2f} s"
-                )
+    rules = ((name, rule) for name, ours in compared.items() for rule in ours.certified)
+    for name, rule in rules:
+        if rule.folds:
+            print(
+                f"{name}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
+                f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) at {rule.mean_s:.2f} s"
+            )
     return 0
 
 
@@ -137,7 +133,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     top = argparse.ArgumentParser(prog="bench.stopping", description=__doc__)
     top.add_argument("--data", nargs="+", required=True, metavar="REC", help=".npz or folders")
     top.add_argument("--trials", type=int, help="use this many of them (default: all)")
-    top.add_argument("--task", nargs="+", help="only these")
     top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
     top.set_defaults(run=run)
     return dispatch(top, argv)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from typing import Any
 
 from edge.classifier import Classifier
 from edge.events import Decided
@@ -18,41 +20,41 @@ from edge.recording import load
 REPEATS = 20
 
 
+def counted(step: Callable[[], Any]) -> Any:
+    """The step's result; the plugin counts its instructions."""
+    os.getppid()
+    result = step()
+    os.getppid()
+    return result
+
+
 def main() -> None:
     model, recording = Model(sys.argv[1]), load(sys.argv[2])
-    mark = os.getppid
-    names = []
-    info = model.info
     contact = first_series(recording, model)
     assert contact is not None, "the recording has no contact"
-    series = contact[1]
-    vector = info.vector(series)
-    model.decide(vector)
+
+    def vector() -> Any:
+        return model.info.vector(contact[1])
+
+    x = vector()
+    steps = {"nothing": lambda: None, "feature vector": vector, "model": lambda: model.decide(x)}
+    model.decide(x)
     for _ in range(REPEATS):
-        mark()
-        mark()
-        mark()
-        info.vector(series)
-        mark()
-        mark()
-        model.decide(vector)
-        mark()
-        names += ["nothing", "feature vector", "model"]
+        for name, step in steps.items():
+            counted(step)
+            print(name)
     for _ in range(2):  # caches fill in the first round
         classifier = Classifier(model, recording.layout)
         for frame in recording:
-            mark()
-            events = classifier.push(frame)
-            mark()
+            events = counted(lambda frame=frame, push=classifier.push: push(frame))
             if any(isinstance(event, Decided) for event in events):
-                names.append("frame that decides")
+                print("frame that decides")
             elif events:
-                names.append("frame with another event")
+                print("frame with another event")
             elif classifier.tracker.region is not None:
-                names.append("frame in contact")
+                print("frame in contact")
             else:
-                names.append("frame without contact")
-    print("\n".join(names))
+                print("frame without contact")
 
 
 if __name__ == "__main__":

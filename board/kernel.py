@@ -6,7 +6,6 @@ machine's own, read-only over 9p, with a writable /run.
 
 from __future__ import annotations
 
-import os
 import platform
 import shlex
 import shutil
@@ -19,11 +18,10 @@ from debian import Unavailable, once, unpack
 CHECKOUT = Path(__file__).resolve().parents[1]
 FOLDER = CHECKOUT / "build" / "kernel"
 PACKAGES = ("qemu-system-x86", "linux-image-amd64", "busybox-static")
-MODULES = (
-    *("virtio_ring", "virtio", "virtio_pci_modern_dev", "virtio_pci_legacy_dev", "virtio_pci"),
-    *("9pnet", "netfs", "fscache", "9pnet_virtio", "9p"),
-    *("usb-common", "usbcore", "usbip-core", "vhci-hcd", "i2c-tiny-usb", "i2c-dev"),
-)
+MODULES = """\
+virtio_ring virtio virtio_pci_modern_dev virtio_pci_legacy_dev virtio_pci
+9pnet netfs fscache 9pnet_virtio 9p
+usb-common usbcore usbip-core vhci-hcd i2c-tiny-usb i2c-dev"""
 """Each after those that it needs."""
 
 INIT = """\
@@ -41,14 +39,23 @@ $b poweroff -f
 """
 """The guest's first process."""
 ENDED = "the command ended with status"
-LONGEST_S = 900.0
+LONGEST_S = 900
+
+QEMU = """\
+timeout {longest} env QEMU_MODULE_DIR={accelerators} {system}/lib64/ld-linux-x86-64.so.2
+--library-path {libraries} {system}/usr/bin/qemu-system-x86_64
+-L {system}/usr/share/qemu -L {system}/usr/share/seabios
+-accel tcg,thread=multi -cpu max -smp 2 -m 2048
+-nodefaults -no-user-config -no-reboot -display none -serial stdio
+-fsdev local,id=root,path=/,security_model=none,readonly=on,multidevs=remap
+-device virtio-9p-pci,fsdev=root,mount_tag=host
+-kernel {kernel} -initrd {initrd} -append"""
 
 
 def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
-    """Boot, run a command as root, and power off.
+    """The exit status of a command that runs as root, and everything that the guest printed.
 
-    Returns:
-        The command's exit status and everything that the guest printed.
+    The guest boots, runs the command and powers off.
 
     Raises:
         Unavailable: this machine cannot fetch or run the packages.
@@ -56,33 +63,21 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
     """
     if platform.machine() != "x86_64":
         raise Unavailable("the kernel of the test runs programs of x86-64 machines alone")
-    for tool in ("apt-get", "dpkg"):
-        if shutil.which(tool) is None:
-            raise Unavailable(f"{tool} is not on this machine; use Debian")
     FOLDER.mkdir(parents=True, exist_ok=True)
     system = FOLDER / "system"
     once(system, "\n".join(PACKAGES), lambda at: unpack(at, "amd64", PACKAGES))
-    _initrd(system, command)
-    libraries = sorted({path.parent for path in system.rglob("*-linux-gnu*/lib*.so.*")})
-    accelerator = next(system.rglob("accel-tcg-x86_64.so"))
-    (kernel,) = (system / "boot").glob("vmlinuz-*")
-    qemu = [
-        *(str(system / "lib64" / "ld-linux-x86-64.so.2"), "--library-path"),
-        *(":".join(map(str, libraries)), str(system / "usr" / "bin" / "qemu-system-x86_64")),
-        *("-L", str(system / "usr" / "share" / "qemu")),
-        *("-L", str(system / "usr" / "share" / "seabios")),
-        *("-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "2", "-m", "2048"),
-        *("-nodefaults", "-no-user-config", "-no-reboot", "-display", "none", "-serial", "stdio"),
-        *("-fsdev", "local,id=root,path=/,security_model=none,readonly=on,multidevs=remap"),
-        *("-device", "virtio-9p-pci,fsdev=root,mount_tag=host"),
-        *("-kernel", str(kernel), "-initrd", str(FOLDER / "initrd")),
-        *("-append", "console=ttyS0 panic=-1 quiet"),
-    ]
+    qemu = QEMU.format(
+        longest=LONGEST_S,
+        system=system,
+        libraries=":".join({str(p.parent) for p in system.rglob("*-linux-gnu*/lib*.so.*")}),
+        accelerators=next(system.rglob("accel-tcg-x86_64.so")).parent,
+        kernel=next((system / "boot").glob("vmlinuz-*")),
+        initrd=_initrd(system, command),
+    )
     console = FOLDER / "console.txt"
     with console.open("w") as file:
         subprocess.run(
-            ["timeout", str(LONGEST_S), *qemu],
-            env={**os.environ, "QEMU_MODULE_DIR": str(accelerator.parent)},
+            [*qemu.split(), "console=ttyS0 panic=-1 quiet"],
             stdin=subprocess.DEVNULL,
             stdout=file,
             stderr=subprocess.STDOUT,
@@ -94,24 +89,28 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
     return int(rest.split()[0]), printed
 
 
-def _initrd(system: Path, command: Sequence[str]) -> None:
+def _initrd(system: Path, command: Sequence[str]) -> Path:
     """Make the archive that the kernel unpacks into memory and starts from."""
-    root = FOLDER / "initrd.root"
+    root, archive = FOLDER / "initrd.root", FOLDER / "initrd"
     shutil.rmtree(root, ignore_errors=True)
     for name in ("bin", "dev", "modules", "proc", "root", "sys"):
         (root / name).mkdir(parents=True)
     busybox = shutil.copy(system / "bin" / "busybox", root / "bin")
-    for name in MODULES:
+    for name in MODULES.split():
         (module,) = (system / "lib" / "modules").rglob(f"{name}.ko")
         shutil.copy(module, root / "modules")
     init = root / "init"
-    init.write_text(
-        INIT.format(modules=" ".join(MODULES), command=shlex.join(command), ended=ENDED)
-    )
+    modules = " ".join(MODULES.split())
+    init.write_text(INIT.format(modules=modules, command=shlex.join(command), ended=ENDED))
     init.chmod(0o755)
     names = "\n".join(str(path.relative_to(root)) for path in sorted(root.rglob("*")))
-    archive = subprocess.run(
-        [busybox, "cpio", "-o", "-H", "newc"], cwd=root, input=names.encode(), check=True,
-        capture_output=True,
-    ).stdout  # fmt: skip
-    (FOLDER / "initrd").write_bytes(archive)
+    with archive.open("wb") as file:
+        subprocess.run(
+            [busybox, "cpio", "-o", "-H", "newc"],
+            cwd=root,
+            input=names.encode(),
+            stdout=file,
+            stderr=subprocess.DEVNULL,
+            check=True,
+        )
+    return archive
