@@ -253,7 +253,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="bench.transfer", description=__doc__.split("\n\n")[0])
     parser.add_argument("--model", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=Path("build/transfer"))
-    parser.add_argument("--trials", type=int, default=128)
+    parser.add_argument("--trials", type=int, default=96)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
     try:

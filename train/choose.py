@@ -53,10 +53,11 @@ WITH_JOINTS = (
     ("moments", "zone_kernels", "joints"),
 )
 """Those for recordings with joint angles, whose changes show how far the thing gave way."""
-DRAWN = (("paper",), ("contact",), ("moments",))
-DRAWN_WITH_JOINTS = (*DRAWN, ("contact", "joints"), ("moments", "joints"))
+DRAWN = (("paper",), ("contact",))
+DRAWN_WITH_JOINTS = (*DRAWN, ("contact", "joints"))
 """Those for touches of simulated things that are drawn from kinds (`kinds_of`). Joint angles at
-onset and single taxels say how the scene is built, and another skin or arm differs in them."""
+onset and single taxels say how the scene is built. Moments say how large and of what form a
+contact is, in which simulators of soft things differ most."""
 QUICK = 3
 """Combinations tried by a quick choice, from the first on."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
@@ -76,8 +77,8 @@ UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on differences
 that are small beside the features' spread, which do not carry over to new objects."""
 DRAWN_SHRINKAGES, DRAWN_COMPONENTS = (1.0, 0.3), (1, 2, 3, 4, 6, 8, 10)
-"""Those tried for touches of simulated things of several kinds. Another physics differs most in
-what is small beside the features' spread."""
+"""Those tried for touches of simulated things of several kinds, and the most discriminants. Another
+physics differs most in what is small beside the features' spread."""
 UNSEEN_MARGIN = 0.01
 """Accuracy on left-out groups within which the cheaper candidate is taken."""
 WINDOW_MARGIN = 0.02
@@ -150,6 +151,7 @@ def candidates(
                 features=expand(sets),
                 components=counts if components is None else (components,),
                 shrinkages=shrinkages,
+                most_directions=DRAWN_COMPONENTS[-1] if drawn else None,
                 neighbours=neighbours if k is None else (k,),
             )
             pairs = products(y) if kind == "lda" else {}

@@ -81,6 +81,7 @@ class SearchGrid:
         projection: one of `train.projection.KINDS`.
         features: names of the features taken; all where empty.
         components: numbers of components, rising; `lda` takes all its directions.
+        most_directions: of `lda`, those that separate best first; all where None.
         shrinkages: of `lda`, the largest first.
         neighbours: values of k, rising.
         targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
@@ -91,6 +92,7 @@ class SearchGrid:
     projection: str = "pca"
     features: tuple[str, ...] = ()
     components: tuple[int, ...] = COMPONENTS
+    most_directions: int | None = None
     shrinkages: tuple[float, ...] = SHRINKAGES
     neighbours: tuple[int, ...] = NEIGHBOURS
     targets: tuple[str, ...] = ()
@@ -105,7 +107,8 @@ class SearchGrid:
         if self.projection == "pca":
             cells = [(c, 0.01) for c in self.components]
         else:
-            cells = [(directions, shrinkage) for shrinkage in self.shrinkages]
+            taken = min(directions, self.most_directions or directions)
+            cells = [(taken, shrinkage) for shrinkage in self.shrinkages]
         return [
             Choice(self.scaling, c, k, self.projection, s, self.features, self.targets)
             for c, s in cells
@@ -181,6 +184,7 @@ def _neighbours(
         scores, places = spectrum.scores_of(new), []
         for shrinkage in grid.shrinkages:
             directions = np.hstack([spectrum.directions(target, shrinkage) for target in labels])
+            directions = directions[:, : grid.most_directions]
             known, tested = _rounded(spectrum.scores @ directions, scores @ directions)
             places.append(_nearest(_squares(tested, known), k))
         return np.stack(places)

@@ -115,14 +115,20 @@ def test_twins_of_a_group_do_not_tell_each_other():
     assert all(len(set(few[objects == name])) == 1 for name in objects)
 
 
-def test_the_discriminants_of_two_tasks_may_be_set_side_by_side():
+@pytest.mark.parametrize("most", [None, 2])
+def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
+    """All of them, or the first of them."""
     X, y = trials()
     two = np.where(y == "a", "yes", "no")
     labels = {"t": y, "u": two}
-    grid = SearchGrid("IV", "lda", shrinkages=(0.1,), neighbours=(1,), targets=("t", "u"))
+    grid = SearchGrid(
+        "IV", "lda", shrinkages=(0.1,), neighbours=(1,), targets=("t", "u"), most_directions=most
+    )
     table = evaluate(X, labels, stratified_folds(y, 4), [grid], features=TWO)
     train, test = np.flatnonzero(table.folds), np.flatnonzero(table.folds == 0)
-    projection = Projection("IV", 5, TWO, "lda", 0.1)
+    (choice,) = table.choices["t"]
+    assert choice.components == (most or sum(len(set(labels[task])) - 1 for task in labels))
+    projection = Projection("IV", choice.components, TWO, "lda", 0.1)
     z = projection.fit(X[train], np.column_stack([y, two])[train]).transform(X)
     said = NearestNeighbours(1).fit(z[train], y[train]).predict(z[test])
     assert (table.right["t"][0][0, test] == (said == y[test])).all()
