@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import Any
 
+from edge.commands.options import within
 from edge.commands.output import Output
 from edge.fake.player import frame_bits
 from edge.skin.file import SkinFile, frame_rate, load
@@ -23,6 +24,14 @@ FRAMES = 100
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("skin", metavar="skin.toml", help="the file that describes the skin")
+    parser.add_argument(
+        "--overhead",
+        type=within(float, 0.0, 10_000.0),
+        default=0.0,
+        metavar="US",
+        help="microseconds that the kernel and the adapter take for each transaction, beside the "
+        "time of its bits (default: %(default)g)",
+    )
 
 
 def faults(file: SkinFile) -> Iterator[str]:
@@ -68,8 +77,9 @@ def run(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     file = load(arguments.skin)
     bits = [count / FRAMES for count in frame_bits(file, FRAMES)]
+    spent = [c / FRAMES for c in frame_bits(file, FRAMES, arguments.overhead * 1e-6)]
     clocks = [bus.clock_hz for bus in file.buses]
-    rate, asked = frame_rate(bits, clocks), file.reading.rate_hz
+    rate, asked = frame_rate(spent, clocks), file.reading.rate_hz
     wrong, said = list(faults(file)), list(remarks(file))
     if rate < asked and file.reading.region_of_interest:
         said.append(

@@ -77,6 +77,9 @@ def event_text(line: Mapping[str, Any]) -> str:
     if kind == "bus":
         again = "; it is opened again until it answers" if line["state"] == "lost" else ""
         return f"{line['t']:8.3f} s  {line['bus']} is {line['state']}{again}"
+    if kind == "taxels":
+        silent = f"taxels without a valid value for {line['frames']} frames: {line['invalid']}"
+        return f"{line['t']:8.3f} s  {silent if line['invalid'] else 'all taxels are valid again'}"
     if kind == "end":
         period = line["period_ms"]
         median = f", one every {period['p50']:g} ms (99 % within {period['p99']:g})"

@@ -21,7 +21,7 @@ import numpy as np
 
 from edge.commands.options import add_arm, add_joints, add_skin, add_web, open_arm, within
 from edge.commands.output import Output
-from edge.commands.source import bus_events, ending_signals, open_joints, open_page, open_skin
+from edge.commands.source import ending_signals, open_joints, open_page, open_skin, skin_events
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable
 from edge.recording import Recording, save
@@ -223,7 +223,7 @@ def run(arguments: argparse.Namespace) -> int:
         loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         LOG.info("waiting for a contact")
         for frame in loop.frames():
-            lines.write(bus_events(skin, frame.t))
+            lines.write(skin_events(skin, frame.t))
             frames = trials.push(frame)
             if page is not None:
                 recorder.labels = page.labels
@@ -237,7 +237,9 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             recorder.save(trials.rest(), complete=False)
     if not recorder.saved:
-        LOG.warning("there was no contact; nothing was saved")
+        silent = int((skin.invalid_for > 0).sum())
+        where = f"; taxels without a valid value: {silent}" if silent else ""
+        LOG.warning(f"there was no contact; nothing was saved{where}")
     elif arguments.joints is not None and not recorder.any_joints:
         LOG.error("--joints gave no angles at the times of the frames")
         return 1

@@ -17,13 +17,13 @@ from edge.classifier import Classifier
 from edge.commands.options import add_error, add_joints, add_skin, add_web, check_error
 from edge.commands.output import Output, event_text
 from edge.commands.source import (
-    bus_events,
     check_joints,
     chip_event,
     ending_signals,
     open_joints,
     open_page,
     open_skin,
+    skin_events,
 )
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
@@ -125,7 +125,7 @@ def run(arguments: argparse.Namespace) -> int:
         for frame in loop.frames():
             frames += 1
             notifier.alive()
-            faults = bus_events(skin, frame.t)
+            faults = skin_events(skin, frame.t)
             faults += [chip_event(status, t=frame.t) for status in skin.changes()]
             decided = classifier.push(frame)
             emit([*faults, *(event.to_dict() for event in decided)])

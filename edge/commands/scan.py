@@ -1,8 +1,8 @@
 """Show which chips answer, as a map of the skin.
 
-Sets up every chip, and prints each chip's state and a map of the skin: # is a taxel whose chip
-answers, . one whose chip does not, and a blank one without a chip. The exit status is 1 if a chip
-does not answer.
+Sets up every chip, reads some frames, and prints each chip's state and a map of the skin: # is a
+taxel with a valid value, . one without, and a blank one without a chip. The exit status is 1 if a
+chip does not answer or a taxel has no valid value.
 """
 
 from __future__ import annotations
@@ -10,13 +10,18 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.commands.options import add_skin
 from edge.commands.output import Output
 from edge.commands.source import chip_event, open_skin
 from edge.i2c.chip import UNUSED
-from edge.skin.file import SkinFile
+from edge.skin.loop import Loop
 from edge.skin.skin import ChipStatus
+
+FRAMES = 30
+"""A microcontroller that hangs serves the same frame over and over, which shows after 25."""
+SILENT = "taxels without a valid value"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -24,27 +29,34 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_skin(parser)
 
 
-def skin_map(file: SkinFile, statuses: list[ChipStatus]) -> str:
-    """One line per row: `#` if a taxel's chip answers, `.` if not, blank without a chip."""
-    marks = np.full(file.layout.rows * file.layout.cols, " ")
+def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
+    """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
+    marks = np.full(invalid.shape, " ")
     for status in statuses:
         for taxel in status.taxels:
             if taxel != UNUSED:
-                marks[taxel] = "#" if status.state == "running" else "."
-    rows = marks.reshape(file.layout.shape).tolist()
-    return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(rows))
+                marks.flat[taxel] = "." if invalid.flat[taxel] else "#"
+    return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print each chip and the map; 1 if a chip does not answer."""
+    """Print each chip and the map; 1 if a chip does not answer or a taxel is not valid."""
     output = Output.of(arguments)
     with open_skin(arguments, calibrated=False) as opened:
-        statuses = opened.skin.status()
+        skin = opened.skin
+        for _ in Loop(skin, lasts_s=FRAMES * skin.period_s).frames():
+            pass
+        invalid = skin.invalid_for > 0
+        statuses = skin.status()
+        silent = 0
         for status in statuses:
-            if output.as_json or status.state != "running":
-                text = f"{status.kind}: {status.error or status.state}"
-                output.event(chip_event(status, kind=status.kind), text)
-        output.text(skin_map(opened.skin.file, statuses))
-    missing = sum(status.state != "running" for status in statuses)
-    output.text(f"{len(statuses) - missing} of {len(statuses)} chips answer")
-    return 1 if missing else 0
+            own = [taxel for taxel in status.taxels if taxel != UNUSED and invalid.flat[taxel]]
+            fault = status.error or (f"{status.route}: {SILENT}: {len(own)}" if own else "")
+            silent += status.state != "running" or len(own) == len(set(status.taxels) - {UNUSED})
+            if output.as_json or fault:
+                event = chip_event(status, kind=status.kind, invalid=len(own))
+                output.event(event, f"{status.kind}: {fault}")
+        output.text(skin_map(statuses, invalid))
+    silent_taxels = f"; {SILENT}: {invalid.sum()}" if invalid.any() else ""
+    output.text(f"{len(statuses) - silent} of {len(statuses)} chips answer{silent_taxels}")
+    return 1 if silent or silent_taxels else 0

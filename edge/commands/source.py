@@ -19,7 +19,7 @@ from edge.recording import load
 from edge.runtime import joint_stream
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource
-from edge.skin.skin import ChipStatus, Skin
+from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
 from edge.touch.arm import Chain
 from edge.touch.layout import for_device
 
@@ -48,12 +48,16 @@ def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
     return {**event, "error": status.error} if status.error else event
 
 
-def bus_events(skin: Skin, t: float) -> list[dict[str, Any]]:
-    """The events of buses that were lost or have come back."""
-    return [
+def skin_events(skin: Skin, t: float) -> list[dict[str, Any]]:
+    """The events of buses that were lost or have come back, and of taxels that give no value."""
+    events: list[dict[str, Any]] = [
         {"event": "bus", "t": t, "bus": name, "state": "lost" if lost else "back"}
         for name, lost in skin.bus_changes()
     ]
+    silent = skin.silent_changes()
+    if silent is not None:
+        events.append({"event": "taxels", "t": t, "invalid": silent, "frames": SILENT_FRAMES})
+    return events
 
 
 @contextmanager

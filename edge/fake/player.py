@@ -16,7 +16,7 @@ from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
 from edge.i2c import block
-from edge.i2c.bus import wire_bits
+from edge.i2c.bus import Bus, wire_bits
 from edge.i2c.chip import UNUSED, ChipSpec, Sense
 from edge.i2c.serial_bus import serial_bits
 from edge.i2c.tca9548a import FakeTCA9548A
@@ -243,15 +243,23 @@ def play(
     return skin, scene
 
 
-def frame_bits(file: SkinFile, frames: int = 1) -> list[int]:
-    """Bits on the wire of each bus for so many frames, counted while the drivers send them."""
+def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list[float]:
+    """Bits on the wire of each bus for so many frames, counted while the drivers send them.
+
+    The software's time of each transaction counts as the bits that the wire would carry in it.
+    """
     every_chip = replace(file, reading=replace(file.reading, region_of_interest=False))
     with still(every_chip) as skin:
         buses = [reader.bus for reader in skin.readers]
-        before = [bus.bits for bus in buses]  # type: ignore[attr-defined]
+        before = [_spent(bus, overhead_s) for bus in buses]
         for _ in range(frames):
             skin.read()
-        return [bus.bits - b for bus, b in zip(buses, before, strict=True)]  # type: ignore[attr-defined]
+        return [_spent(bus, overhead_s) - b for bus, b in zip(buses, before, strict=True)]
+
+
+def _spent(bus: Bus, overhead_s: float) -> float:
+    assert isinstance(bus, FakeBus)
+    return bus.bits + bus.transactions * overhead_s * bus.clock_hz
 
 
 def skin_file(layout: SkinLayout) -> SkinFile:

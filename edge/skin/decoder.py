@@ -85,6 +85,7 @@ class Decoder:
         values: (taxels,) raw values of the last call.
         times: (taxels,) when each was read.
         sign: (taxels,) 1 where a touch raises the raw value, -1 where it lowers it.
+        served: (taxels,) which have a chip and are not dead.
     """
 
     def __init__(self, file: SkinFile, groups: Sequence[ChipGroup], slots: Sequence[Slot]) -> None:
@@ -113,10 +114,9 @@ class Decoder:
                         self._stage_of[taxel], self._chip_of[taxel] = stage, i
                         self.sign[taxel], highest[taxel] = spec.sign, spec.highest
                     stage += 1
-        self._served = self._chip_of < len(slots)
-        """Taxels that have a chip and are not dead."""
+        self.served = self._chip_of < len(slots)
         for row, col in file.signal.dead:
-            self._served[row * file.layout.cols + col] = False
+            self.served[row * file.layout.cols + col] = False
         self.values = self._raw.take(self._stage_of)
         self.times = np.full(n, NEVER)
         self._any_damaged = False
@@ -160,10 +160,10 @@ class Decoder:
         self.times = at.take(self._chip_of)
         # A value under the lowest wraps round to above every range.
         intact = self._intact.take(self._stage_of) & (values - self._lowest <= self._range)
-        damaged[self._chip_of[~intact & self._served]] = True
+        damaged[self._chip_of[~intact & self.served]] = True
         if self._any_damaged or damaged[:-1].any():
             for slot, read, bad in zip(self._slots, fresh, damaged, strict=False):
                 if slot.good and read:
                     slot.damaged = slot.damaged + 1 if bad else 0
             self._any_damaged = any(slot.damaged for slot in self._slots)
-        return good.take(self._chip_of) & intact & self._served
+        return good.take(self._chip_of) & intact & self.served

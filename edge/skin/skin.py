@@ -25,6 +25,9 @@ from edge.skin.read_scheduler import ReadScheduler
 from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
+SILENT_FRAMES = 50
+"""A taxel without a valid value in so many frames in a row is silent: half a second at 100 Hz,
+within which a taxel returns from any fault that has ended."""
 FOLLOW_FRAMES = 4
 """The baseline follows drift in one frame of so many: drift is slow, and a step costs time."""
 
@@ -111,9 +114,12 @@ class Skin:
             limit=file.signal.drift_limit_counts,
         )
         self._last: Frame | None = None
+        self._invalid_for = np.zeros(n, dtype=np.int64)
+        """Frames in a row without a valid value of each taxel."""
+        self._silent, self._since_silent = 0, 0
         self._touched_at = self._followed_at = -math.inf
         self._since_follow = 0
-        self._states = [slot.state for slot in self._slots]
+        self._states = self._chip_states()
         self._lost = [False for _ in self.readers]
         self._threads = [ThreadPoolExecutor(1) for _ in self.readers[1:]]
         """A thread for each bus but the first, which the caller's thread reads."""
@@ -167,7 +173,7 @@ class Skin:
         """
         for reader in self.readers:
             reader.start()
-        self._states = [slot.state for slot in self._slots]
+        self._states = self._chip_states()
         down = [s for s in self.status() if s.state != ChipState.RUNNING.value]
         if len(down) == len(self._slots):
             raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {down[0].error}")
@@ -181,12 +187,15 @@ class Skin:
                 route=slot.spec.route,
                 kind=slot.spec.kind.name,
                 taxels=slot.spec.taxels,
-                state=slot.state.value,
+                state=state.value,
                 error="" if slot.error is None else str(slot.error),
                 recoveries=slot.recoveries,
             )
-            for reader in self.readers
-            for slot in reader.slots
+            for (reader, slot), state in zip(
+                ((reader, slot) for reader in self.readers for slot in reader.slots),
+                self._chip_states(),
+                strict=True,
+            )
         ]
 
     def bus_changes(self) -> list[tuple[str, bool]]:
@@ -201,16 +210,40 @@ class Skin:
         return changed
 
     def changes(self) -> list[ChipStatus]:
-        """The chips whose state has changed since the last call, or since the start."""
-        states = [slot.state for slot in self._slots]
+        """The chips whose state has changed since the last call, or since the start.
+
+        A chip that is down stays so until it runs, whatever is tried.
+        """
+        states = self._chip_states()
         if states == self._states:
             return []
-        status = self.status()
-        changed = [
-            status[i] for i, (a, b) in enumerate(zip(states, self._states, strict=True)) if a != b
-        ]
+        pairs = zip(self.status(), states, self._states, strict=True)
+        changed = [status for status, now, before in pairs if now != before]
         self._states = states
         return changed
+
+    def _chip_states(self) -> list[ChipState]:
+        return [slot.state if slot.error is None else ChipState.DOWN for slot in self._slots]
+
+    @property
+    def invalid_for(self) -> NDArray[np.int64]:
+        """Number of frames in a row (rows, cols) for which a taxel has had no valid value.
+
+        It is 0 for a taxel that is dead or has no chip.
+        """
+        return self._invalid_for.reshape(self.layout.shape)
+
+    def silent_changes(self) -> int | None:
+        """Number of taxels without a valid value for `SILENT_FRAMES` frames, if it has changed.
+
+        Call it once a frame; it gives a number in one of `SILENT_FRAMES` frames at most.
+        """
+        self._since_silent += 1
+        silent = int((self._invalid_for >= SILENT_FRAMES).sum())
+        if silent == self._silent or self._since_silent < SILENT_FRAMES:
+            return None
+        self._silent, self._since_silent = silent, 0
+        return silent
 
     def read(self) -> Frame:
         """Read one frame; with region-of-interest reading, some chips keep their last values.
@@ -255,6 +288,8 @@ class Skin:
         valid = self._decoder.decode(t, t - self.oldest_s)
         counts = self.baseline.above(self._decoder.values)
         counts *= valid
+        self._invalid_for += 1
+        self._invalid_for *= self._decoder.served & ~valid
         self._follow(counts, valid, t)
         shape = self.layout.shape
         self._last = Frame(

@@ -72,6 +72,15 @@ def test_check_counts_what_the_wire_carries(edge, skin):
     assert err == ""
 
 
+def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin):
+    """A frame of Cody's first bus takes 12 chips, 3 channels and a check in every fourth."""
+    _, (bare,), _ = edge("check", skin)
+    _, (event,), _ = edge("check", skin, "--overhead", 100)
+    assert event["buses"] == bare["buses"]
+    frame_s = bare["buses"][0]["bits"] / 400e3
+    assert 1.0 / event["frame_rate_hz"] == pytest.approx(frame_s + 1.9e-3, abs=1e-4)
+
+
 @pytest.mark.parametrize(
     ("more", "status", "rate", "said"),
     [

@@ -11,6 +11,7 @@ import pytest
 
 from edge import recording
 from edge.commands import record, run, view
+from edge.fake.touches import still
 from edge.skin import file as skinfile
 from tests.edge.commands.conftest import lines
 
@@ -22,6 +23,23 @@ def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
     assert status == 0
     assert [e["state"] for e in events] == ["running"] * 32
     assert err.count("|" + "#" * 24 + "|") == 16
+
+
+def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
+    edge, tmp_path, monkeypatch, capsys
+):
+    """Its sequence number stands still."""
+    monkeypatch.setattr("edge.i2c.block.FAKE_RATE_HZ", 0.0)
+    skin, rest = skinfile.shipped("matrix"), tmp_path / "rest.npz"
+    recording.save(rest, still(skinfile.load(skin), 2.0))
+    status, (chip,), err = edge("scan", "--skin", skin, "--fake", rest)
+    assert (status, chip["state"], chip["invalid"]) == (1, "running", 100)
+    assert err.count("|" + "." * 10 + "|") == 10
+    assert err.endswith("0 of 1 chips answer; taxels without a valid value: 100\n")
+    more = ("--label", "object=box", "--out", tmp_path / "trials")
+    status, events, err = edge("record", "--skin", skin, "--fake", rest, *more)
+    assert (status, [(e["event"], e["invalid"]) for e in events]) == (1, [("taxels", 100)])
+    assert "nothing was saved; taxels without a valid value: 100" in err
 
 
 def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):

@@ -51,6 +51,15 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
     assert out.splitlines()[-1].startswith(f"{asked} of {asked} decisions are right")
 
 
+@pytest.mark.parametrize(
+    ("invalid", "text"),
+    [(12, "taxels without a valid value for 50 frames: 12"), (0, "all taxels are valid again")],
+)
+def test_silent_taxels_are_a_sentence(invalid, text):
+    event = {"event": "taxels", "t": 1.5, "invalid": invalid, "frames": 50}
+    assert event_text(event) == f"   1.500 s  {text}"
+
+
 def test_a_map_of_chips_comes_last(terminal, capsys):
     assert main(["scan", "--fake", TOUCH]) == 0
     lines = capsys.readouterr().out.splitlines()

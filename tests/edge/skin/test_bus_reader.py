@@ -17,7 +17,14 @@ from edge.i2c.bus import BusRefused, bus_error
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
-from edge.skin.bus_reader import LONGEST_PAUSE_S, PAUSE_S, SET_UP_AFTER, SET_UP_EVERY, BusReader
+from edge.skin.bus_reader import (
+    LONG_PAUSE_S,
+    LONGEST_PAUSE_S,
+    PAUSE_S,
+    SET_UP_AFTER,
+    SET_UP_EVERY,
+    BusReader,
+)
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
 from tests.edge.skin.campaign import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts, sweep
@@ -182,6 +189,36 @@ def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
     assert down.error.endswith("check its power, wiring and address (EREMOTEIO)")
     assert (up.state, up.error) == ("running", "")
     assert 0.2 <= back_at <= 0.2 + PAUSE_S + 0.01
+
+
+def test_a_chip_that_fails_again_and_again_is_tried_every_0_3_s():
+    """A loose wire, ten times a second: the user hears of it less than seven times a second."""
+    chip = {"bus": CODY.buses[1].device, "channel": 1, "address": 0x2E}
+    loose = [Fault(**chip, during=(0.1 * k, 0.1 * k + 0.05)) for k in range(1, 31)]
+    with fake_skin(CODY, lambda t: QUIET, faults=loose) as skin:
+        heard = [s.state for _ in Loop(skin, lasts_s=3.5).frames() for s in skin.changes()]
+    assert heard[0] == "down"
+    assert heard[-1] == "running"
+    assert len(heard) <= 2 * 3.0 / LONG_PAUSE_S + 2
+
+
+def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():
+    """An adapter that carries reads of at most 16 bytes: the registers, but not 12 taxels."""
+    with fake_skin(CODY, lambda t: QUIET) as skin:
+        chip, bus = skin.readers[1].slots[5].chip, skin.readers[1].bus
+        transfer = bus.transfer
+
+        def limited(prepared):
+            if len(prepared.buffer) > 16 and prepared.messages[0].address == chip.address:
+                raise bus_error(errno.EIO, bus.name)
+            transfer(prepared)
+
+        bus.transfer = limited
+        for slot in skin.readers[1].slots:
+            slot.chip.bus._send = limited
+        heard = [s.state for _ in Loop(skin, lasts_s=3.0).frames() for s in skin.changes()]
+    limit = sum(slot.spec.address == chip.address for slot in skin.readers[1].slots)
+    assert heard == ["down"] * limit
 
 
 def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_heard():

@@ -8,14 +8,17 @@ import pytest
 
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
+from edge.fake.faults import Fault
 from edge.fake.player import calibrated, fake_skin, frame_bits, still
 from edge.i2c import ad7147, mpr121
+from edge.i2c.block import UNCHANGED_FRAMES
 from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
-from edge.skin.skin import Skin
+from edge.skin.skin import SILENT_FRAMES, Skin
 from edge.skin.wiring import BusSpec
+from tests.edge.skin.campaign import SKINS
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 PAD = skinfile.load(skinfile.shipped("mpr121"))
@@ -178,3 +181,23 @@ def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
     for file, wanted in ((CODY, False), (calibrated(CODY), True)):
         with pytest.raises(BusMissing):
             Skin.open(file, calibrated=wanted)
+
+
+def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
+    """A microcontroller serves one frame for 1.5 s, while its bus and its CRC are intact."""
+    file = SKINS["block"]
+    hangs = Fault("hold", bus=file.buses[1].device, during=(0.1, 1.6))
+    heard = []
+    with fake_skin(file, lambda t: PICTURE, faults=[hangs]) as skin:
+        for frame in Loop(skin, lasts_s=2.0).frames():
+            silent = skin.silent_changes()
+            heard += [] if silent is None else [(round(frame.t, 2), silent)]
+    hung_s = (UNCHANGED_FRAMES + SILENT_FRAMES) * 0.01
+    assert heard == [(pytest.approx(0.1 + hung_s, abs=0.021), 128), (pytest.approx(1.6), 0)]
+
+
+def test_dead_taxels_are_not_silent():
+    signal = replace(CODY.signal, dead=((0, 0), (3, 4)))
+    with still(replace(CODY, signal=signal)) as skin:
+        assert not skin.read().valid[3, 4]
+        assert not skin.invalid_for.any()
