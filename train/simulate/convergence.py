@@ -1,4 +1,4 @@
-"""The step is measured, not chosen by hand: halve it until halving it changes little."""
+"""Measures the step that a scene's trials need: halves it until another half changes little."""
 
 from __future__ import annotations
 
@@ -16,34 +16,35 @@ from train.simulate.plan import ALL, PACE, make_plan
 from train.simulate.scene_model import Scene, TrialSpec
 
 HALVINGS = 4
-BEFORE_BELIEF = 3
-"""Halvings that an order is estimated from."""
+"""Most halvings of a frame."""
+FIRST_HALVINGS = 3
+"""Halvings that every kind of trials is run at; the last is for those not within the tolerance."""
 MOST_STEPS = 20_000
-"""Of a trial that verifies a step; they are short everywhere, not near a jolt alone."""
-VERIFIED_BY = 2.0
-"""How much shorter than the last of the halves the step is that verifies them."""
-OF_A_SWING = 0.2
-"""A step that is this part of sqrt(m / k) shows how a mass m swings on a contact's stiffness k."""
+"""Most steps of a trial of the reference run."""
+REFERENCE_PART = 0.5
+"""Step of the reference run, as a part of the shortest step tried; a swing may need less."""
+SWING_PART = 0.2
+"""A step of this part of sqrt(m / k) resolves how a mass m swings on a stiffness k."""
 PRESSED_M = 0.002
-"""Depth to which what swings is pressed: the springs met by then are those that it swings on."""
+"""Depth to which a swinging object is pressed: it swings on the springs met by then."""
 LITTLE_GAIN = 2.0
+"""Error of the step chosen, in smallest errors, where no step is within the tolerance."""
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """What halving the step did to a scene's middle trials.
+    """The errors of the steps tried on a scene's middle trials, and the step chosen.
 
     Attributes:
-        steps_s: steps tried, each half of the one before; the last verifies the others.
-        errors: of each but the last, as a part of the peak force: how far its forces are from
-            those of the last step, or from the extrapolated limit where that is farther; the
-            worst trial's root mean square over time.
-        order: the error goes with the step to this power, by the more pessimistic of two
-            estimates.
-        step_s: the largest step whose error is within the scene's tolerance. Where none is,
-            as where things bounce in another way at each step, the largest whose error is at
-            most twice the smallest.
-        error: that step's.
+        steps_s: the steps tried, each half of the one before, then the step of the reference run.
+        errors: the error of each step but the last, as a part of the peak force: root mean square
+            over time of the force's distance from the reference run, or from the extrapolated limit
+            where that is larger; of the worst trial.
+        order: the error is about proportional to the step to this power.
+        step_s: the largest step whose error is within the scene's tolerance. Where none is, as
+            where an object bounces differently at each step, the largest step whose error is at
+            most `LITTLE_GAIN` times the smallest.
+        error: the error of that step.
         within: whether it is within the tolerance.
     """
 
@@ -56,8 +57,8 @@ class Convergence:
 
 
 def middle_values(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
-    """{name: (n,)} of trials in the middle of every range, without spread."""
-    held = [
+    """{name: (n,)} the values in the middle of every range, without spread."""
+    middles = [
         {
             **dict.fromkeys(PLACED, 0.0),
             **{name: value.middle for name, value in spec.object.values.items()},
@@ -66,18 +67,20 @@ def middle_values(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array
         }
         for spec in specs
     ]
-    names = {name: None for values in held for name in values}
-    return {name: np.array([values.get(name, math.nan) for values in held]) for name in names}
+    names = {name: None for values in middles for name in values}
+    return {name: np.array([values.get(name, math.nan) for values in middles]) for name in names}
 
 
 def physics(
     scene: Scene, specs: Sequence[TrialSpec], step_s: float | None = None, *, paced: bool = True
 ) -> PhysicsRun:
-    """The middle trials' forces and joints, at a step or at their own; `paced` where steps are
-    finer near a jolt."""
-    if step_s is not None:
-        specs = [replace(spec, step_s=step_s) for spec in specs]
-    specs = tuple(specs)
+    """Forces and joints of the middle trials.
+
+    Args:
+        step_s: the step of all trials; None leaves each its own.
+        paced: False keeps the steps near a jolt as long as elsewhere.
+    """
+    specs = tuple(spec if step_s is None else replace(spec, step_s=step_s) for spec in specs)
     plan = make_plan(scene, specs)
     if not paced:
         plan = replace(plan, stages={**plan.stages, **{stage: [] for stage in PACE}})
@@ -87,109 +90,98 @@ def physics(
 
 @dataclass
 class _Kind:
-    """One trial of each object and condition of a kind, and what the steps tried have shown."""
+    """One trial of each object and condition of a kind, the steps tried and their forces."""
 
     specs: list[TrialSpec]
     steps_s: list[float]
     forces: list[Array]
 
-    @property
-    def changes(self) -> list[float]:
-        return [_apart(one, other) for one, other in pairwise(self.forces)]
+    def errors(self, count: int | None = None) -> list[float]:
+        """The extrapolated error of each step but the last, from the first `count` runs."""
+        changes = [_distance(a, b) for a, b in pairwise(self.forces[:count])]
+        return [change / (1.0 - 2.0 ** -_order(changes)) for change in changes]
 
 
-def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:
-    """Run kinds at further steps, all side by side."""
-    specs = [replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs]
-    forces = physics(scene, specs, paced=paced).force
-    sizes = np.cumsum([len(kind.specs) for kind, _ in work])[:-1]
-    for (kind, step_s), force in zip(work, np.split(forces, sizes), strict=True):
-        kind.steps_s.append(step_s)
-        kind.forces.append(force)
+def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Convergence]:
+    """The error of each step on each kind's middle trials, one trial an object and condition.
 
-
-def measure(
-    scene: Scene, groups: Sequence[Sequence[TrialSpec]], halvings: int = HALVINGS
-) -> list[Convergence]:
-    """Halve the step of each kind's middle trials, one trial an object, and see what changes.
-
-    The differences between neighbouring steps give the order p and, summed as the geometric
-    series that they are, the error left at each step (Richardson). A step that is too long to show
-    how a light thing swings has halves that are too long as well; so the forces are compared with
-    those of a step short enough for that. Trials end with the window that labels are judged in.
+    The differences between neighbouring steps give the order p and, summed as a geometric series,
+    the error of each step (Richardson). Where even the shortest step is too long to resolve how a
+    light object swings, its halves agree and are all wrong; so the forces are also compared with
+    those of a reference run that resolves the swing. Trials end with the window in which labels are
+    judged.
     """
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
     scene = replace(scene, trials={**scene.trials, "after_s": after_s})
-    tolerance, frame = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
+    tolerance, frame_s = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
     kinds = [
         _Kind(list({spec.key: spec for spec in reversed(specs)}.values()), [], [])
         for specs in groups
     ]
-    first = min(BEFORE_BELIEF, halvings)
-    _run(scene, [(kind, frame / 2**k) for kind in kinds for k in range(first + 1)])
-    for k in range(first + 1, halvings + 1):
-        left = [kind for kind in kinds if not _left(kind.changes)[-2] <= tolerance]
-        left = [kind for kind in left if len(kind.steps_s) == k]
-        if not left:
-            break
-        _run(scene, [(kind, frame / 2**k) for kind in left])
-    swings = _shows_swings(scene, kinds)
+    first = [(kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)]
+    _run(scene, first)
+    rough = [kind for kind in kinds if not kind.errors()[-2] <= tolerance]
+    _run(scene, [(kind, frame_s / 2**HALVINGS) for kind in rough])
     shortest = (scene.lead.high + after_s) / MOST_STEPS
-    _run(
-        scene,
-        [
-            (kind, max(min(swing, kind.steps_s[-1] / VERIFIED_BY), shortest))
-            for kind, swing in zip(kinds, swings, strict=True)
-        ],
-        paced=False,
-    )
+    reference = [
+        (kind, max(min(swing_s, kind.steps_s[-1] * REFERENCE_PART), shortest))
+        for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
+    ]
+    _run(scene, reference, paced=False)
     return [_judged(kind, tolerance) for kind in kinds]
 
 
+def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:
+    """Run each kind at a further step, all side by side."""
+    if not work:
+        return
+    specs = [replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs]
+    forces = physics(scene, specs, paced=paced).force
+    for (kind, step_s), force in zip(work, _by_kind(forces, [k for k, _ in work]), strict=True):
+        kind.steps_s.append(step_s)
+        kind.forces.append(force)
+
+
+def _by_kind(values: Array, kinds: list[_Kind]) -> list[Array]:
+    """Values (n, ...) of the kinds' trials, split by kind."""
+    return np.split(values, np.cumsum([len(kind.specs) for kind in kinds])[:-1])
+
+
 def _judged(kind: _Kind, tolerance: float) -> Convergence:
-    *forces, true = kind.forces
-    changes = kind.changes[:-1]
-    apart = [_apart(force, true) for force in forces]
-    errors = (*(max(pair) for pair in zip(apart, _left(changes), strict=False)), apart[-1])
-    limit = max(tolerance, LITTLE_GAIN * min(errors))
-    if min(errors) <= tolerance:
-        limit = tolerance
+    *forces, reference = kind.forces
+    apart = [_distance(force, reference) for force in forces]
+    extrapolated = kind.errors(len(forces))
+    errors = (*map(max, zip(apart, extrapolated, strict=False)), apart[-1])
+    smallest = min(errors)
+    limit = tolerance if smallest <= tolerance else LITTLE_GAIN * smallest
     step_s, error = next((s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit)
-    return Convergence(
-        tuple(kind.steps_s), errors, _order(changes), step_s, error, error <= tolerance
-    )
+    order = _order([_distance(a, b) for a, b in pairwise(forces)])
+    return Convergence(tuple(kind.steps_s), errors, order, step_s, error, error <= tolerance)
 
 
-def _apart(one: Array, other: Array) -> float:
-    """Root mean square over time of what two runs' forces (n, frames) differ by, as a part of
-    the second's peak; of the worst trial."""
-    peak = other.max(axis=1)
-    change = np.sqrt(np.mean((one - other) ** 2, axis=1))
+def _distance(forces: Array, reference: Array) -> float:
+    """Root mean square over time of the difference of two runs' forces (n, frames), as a part of
+    the second run's peak; of the worst trial."""
+    peak = reference.max(axis=1)
+    change = np.sqrt(np.mean((forces - reference) ** 2, axis=1))
     return float(np.max(change / np.where(peak > 0.0, peak, 1.0)))
 
 
-def _left(changes: list[float]) -> list[float]:
-    """The error that each halving has left at the step before it."""
-    return [change / (1.0 - 2.0 ** -_order(changes)) for change in changes]
-
-
 def _order(changes: list[float]) -> float:
-    """log2 of how much a halving shrinks the change: of the last two, the one that shrank it
-    less; 0.25 at least, and 1 at most, which is the order of an implicit Euler step."""
-    recent = changes[-3:]
-    shrunk = [b / a for b, a in pairwise(recent) if a > 0.0]
-    return float(np.clip(math.log2(max(min(shrunk, default=2.0), 1e-9)), 0.25, 1.0))
+    """log2 of the factor by which a halving shrinks the change: the smaller of the last two, from
+    0.25 to 1, the order of an implicit Euler step."""
+    factors = [a / b for a, b in pairwise(changes[-3:]) if b > 0.0]
+    return float(np.clip(math.log2(max(min(factors, default=2.0), 1e-9)), 0.25, 1.0))
 
 
-def _shows_swings(scene: Scene, kinds: list[_Kind]) -> list[float]:
-    """The step that shows how the lightest object of each kind swings on the skin."""
+def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
+    """For each kind, the step that resolves how its lightest object swings on the skin."""
     specs = tuple(spec for kind in kinds for spec in kind.specs)
     t = begin(scene, specs, values=middle_values(scene, specs))
-    rows, springs = total(t.weight), total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
+    stiffness = total(t.weight) * total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
     if "stems" in t.own:
         stems = total(t.own["stems"].stiffness)
-        rows, springs = np.where(stems > 0.0, 1.0, rows), np.where(stems > 0.0, stems, springs)
-    steps = OF_A_SWING * np.sqrt(t.values.get("mass_kg", np.full(t.n, np.inf)) / (rows * springs))
-    moves = t.plan.also("sliding", ALL)
-    sizes = np.cumsum([len(kind.specs) for kind in kinds])[:-1]
-    return [float(part.min()) for part in np.split(np.where(moves, steps, np.inf), sizes)]
+        stiffness = np.where(stems > 0.0, stems, stiffness)
+    steps = SWING_PART * np.sqrt(t.values.get("mass_kg", np.full(t.n, np.inf)) / stiffness)
+    steps = np.where(t.plan.also("sliding", ALL), steps, np.inf)
+    return [float(part.min()) for part in _by_kind(steps, kinds)]

@@ -1,4 +1,4 @@
-"""No run makes energy: what the arm holds and has lost is judged against the work put in."""
+"""Checks that no trial gains energy: what the arm stores and loses against the work put in."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from train.simulate.arm import Array
 from train.simulate.trials import Trials
 
 ENERGY_MADE = 0.01
-"""Share of the work put in that the arm may hold beyond it: frames sample that work."""
+"""Tolerance as a part of the work put in, since frames only sample that work."""
 
 
 def check_energy(t: Trials, joints: Array, times: Array) -> None:
-    """Refuse a batch in which energy came out of nothing.
+    """Check that no trial gains energy.
 
-    The equilibrium point's motion is all that puts energy in, W = int k (q_eq - q) dq_eq, and the
-    joints' damping takes at least d (dq)^2 / dt of it in each frame; so the arm's springs hold at
-    most what is left, and what the arm brought as speed. What a contact has taken it may give back,
-    but no more. A step that makes energy breaks the bound at once.
+    Only the motion of the equilibrium point puts energy in, W = int k (q_eq - q) dq_eq. The joints'
+    damping takes at least d (dq)^2 / dt of it in each frame. So the arm's springs store at most the
+    rest, plus the energy of the arm's motion at the start. A contact may give back what it has
+    taken, but no more. A step that makes energy breaks this bound at once.
 
     Args:
         joints: (n, frames, dof) radians.
         times: (frames,) seconds.
 
     Raises:
-        EdgeError: names the first trial that broke it.
+        EdgeError: a trial gains energy; the sentence names the first one.
     """
     scene, k = t.scene, t.joint_k.T
     moving = 0.5 * sum(i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False))
@@ -45,7 +45,7 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
         frame = int(np.argmax(made[i]))
         raise EdgeError(
             f"{scene.name}: trial {t.specs[i].number} of {t.specs[i].key} makes energy: "
-            f"at {times[frame]:g} s the arm holds or has lost {held[i, frame]:.3g} J, and "
-            f"{brought[i, frame]:.3g} J have been put in; give [step_s] a smaller step, or the "
+            f"at {times[frame]:g} s the arm has stored or lost {held[i, frame]:.3g} J of the "
+            f"{brought[i, frame]:.3g} J put in; give [step_s] a smaller step, or the "
             "object less extreme values"
         )

@@ -1,8 +1,8 @@
-"""Run trials side by side: draw their values, set them up, step them, and read their sensors.
+"""Runs trials side by side: draws their values, sets them up, steps them and reads their sensors.
 
-Each trial has a clock of its own. A round of the loop takes one step of every trial that is not
-done; a trial whose steps make up a frame ends the frame there. So finer steps near a jolt are taken
-by the trials concerned alone, and trials of different steps share one loop.
+Each trial has its own clock. A round of the loop takes one step of every unfinished trial, and each
+trial ends a frame after as many steps as that frame has. So only the trials near a jolt take finer
+steps, and trials of different steps share one loop.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ SCALED = {
     "mass": ("mass_kg",),
     "cover": ("taxel_n_m", "cover_n_m"),
 }
-"""{spread: the values it is a part of}; any other is added to the value of its own name."""
+"""{spread: the values that it scales}; any other spread is added to the value of its name."""
 PLACED = dict.fromkeys(("place_m", "yaw_deg", "roll_deg"), Value(0.0, 0.0))
-"""Where the forearm meets an object: spreads about 0, of which no object has a value."""
+"""Where the forearm meets an object: spreads around 0 for which objects have no value."""
 
 
 def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
     """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
 
-    Where an object has no such value (a fixed one its mass), it is NaN and nothing reads it.
+    A value that an object does not have, such as the mass of a fixed one, is NaN and never read.
     """
     groups: dict[tuple[str, int], list[int]] = {}
     for i, trial in enumerate(specs):
@@ -54,7 +54,7 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
 
 
 def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
-    """Those of trials that share their streams: an object's in one condition, drawn as often."""
+    """The values of trials that share streams: same object, condition and number of redraws."""
     first, numbers = trials[0], np.array([trial.number for trial in trials])
     values = {**first.object.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m, **PLACED}
     out: dict[str, Any] = {name: value.low for name, value in values.items()}
@@ -62,8 +62,8 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     def draws(what: str, names: list[str], kind: str) -> Iterator[tuple[str, Array]]:
         again = f".{first.attempt}" if first.attempt else ""
         streamed = [f"{what}.{name}{again}" for name in names]
-        found = streams.draws(scene.seed, streamed, first.key, numbers, kind)
-        return zip(names, found, strict=True)
+        drawn = streams.draws(scene.seed, streamed, first.key, numbers, kind)
+        return zip(names, drawn, strict=True)
 
     for name, part in draws("value", [n for n, v in values.items() if v.varies], "uniform"):
         out[name] = out[name] + (values[name].high - values[name].low) * part
@@ -79,7 +79,7 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
 
 
 def frame_count(scene: Scene) -> int:
-    """Frames of a trial: the longest lead, what follows, and the frame at t = 0."""
+    """Number of frames of a trial: the longest lead, the time after it, and the frame at t = 0."""
     duration = scene.lead.high + scene.trials["after_s"]
     return round(duration * scene.trials["rate_hz"]) + 1
 
@@ -94,7 +94,7 @@ def begin(
     """Trials before their first step.
 
     Args:
-        plan: what they run, where it is at hand.
+        plan: the hooks to run; None makes them.
         values: {name: (n,)} in place of the scene's draws.
 
     Raises:
@@ -112,10 +112,10 @@ def begin(
 
 
 def check_start(t: Trials) -> None:
-    """Refuse trials in which an object bears force before the arm has moved.
+    """Check that no object bears force before the arm has moved.
 
     Raises:
-        InputError: names the first such trial, and by how much its face is turned.
+        InputError: one does; the sentence names its first trial and the yaw of its face.
     """
     t.plan.run(FRAME, t)
     t.y[:], t.compliance[:] = t.y_frame, 0.0
@@ -132,15 +132,16 @@ def check_start(t: Trials) -> None:
 
 @dataclass(frozen=True)
 class PhysicsRun:
-    """The physics of n trials: what their skin bears, before any sensor reads it.
+    """The physics of n trials: the load on their skin, before any sensor reads it.
 
     Attributes:
         t: (frames,) seconds.
         joints: (n, frames, dof) radians.
         force: (n, frames) newtons.
-        traces: {name: (n, frames)} of what the effects keep, such as `slide_m`.
-        window: (n, frames, rows, C) counts on the columns that can touch, or of no frames.
-        trials: as the last step left them.
+        traces: {name: (n, frames)} that effects keep, such as `slide_m`.
+        window: (n, frames, rows, C) counts on the columns that can touch; no frames where the
+            run made no images.
+        trials: their state after the last step.
     """
 
     t: Array
@@ -159,15 +160,15 @@ def run_physics(
     values: dict[str, Array] | None = None,
     images: bool = True,
 ) -> PhysicsRun:
-    """Simulate trials side by side; each comes out as it would alone, bit by bit.
+    """The physics of trials run side by side, each with the same bits as it has alone.
 
     Args:
         plan, values: as of `begin`.
-        images: False for forces, joints and traces alone.
+        images: False leaves out the load on the taxels.
 
     Raises:
         InputError: as of `begin`.
-        EdgeError: a contact's loads were not found, or energy came out of nothing.
+        EdgeError: the solver did not find a contact's loads, or a trial gained energy.
     """
     t = begin(scene, specs, plan=plan, values=values)
     frames = frame_count(scene)
@@ -210,12 +211,12 @@ def run_physics(
 
 
 def some_of(t: Trials, i: NDArray[np.intp]) -> Any:
-    """An index of trials, `ALL` where it has them all."""
+    """An index of trials: `ALL` where it holds all of them."""
     return ALL if len(i) == t.n else i
 
 
 def start_frames(t: Trials, starts: NDArray[np.intp]) -> None:
-    """Choose the steps of some trials' next frames, and look where their contacts are."""
+    """Choose the step of some trials' next frame, and locate their contacts."""
     before = t.steps[starts]
     t.plan.run(PACE, t, some_of(t, starts))
     changed = starts[t.steps[starts] != before]
@@ -227,16 +228,15 @@ def start_frames(t: Trials, starts: NDArray[np.intp]) -> None:
 
 
 def check_found(t: Trials) -> None:
-    """Refuse trials in which a contact's loads were not found.
+    """Check that the solver found the loads of every contact.
 
     Raises:
-        EdgeError: names the scene, and how many trials that was in.
+        EdgeError: it did not; the sentence gives the number of trials.
     """
     if t.lost.any():
         raise EdgeError(
-            f"{t.scene.name}: how far the forearm tilts was not found in "
-            f"{np.count_nonzero(t.lost)} trials; "
-            "give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+            f"{t.scene.name}: the forearm's tilt was not found in {np.count_nonzero(t.lost)} "
+            "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
         )
 
 
@@ -245,11 +245,11 @@ def readings(
     which: NDArray[np.intp] | None = None,
     scene: Scene | None = None,
 ) -> Iterator[Readings]:
-    """What the sensors and their clock show of a run's trials, one by one.
+    """The sensor readings of a run's trials, trial by trial.
 
     Args:
         which: the trials to read; None for all.
-        scene: one that differs from the run's in its sensors alone, to read with these.
+        scene: a scene with other sensors, to read the run with these instead.
     """
     t = physics.trials
     scene = scene or t.scene
@@ -277,41 +277,22 @@ def readings(
 
 
 @dataclass(frozen=True)
-class Batch:
-    """What n trials gave, `frames` frames each.
+class Batch(PhysicsRun):
+    """The physics of n trials with their readings; `joints` are those that the clock shows.
 
     Attributes:
-        specs: the trials.
-        t: (frames,) seconds.
         counts: (n, frames, rows, cols) uint16.
-        joints: (n, frames, dof) radians.
-        force: (n, frames) newtons.
-        traces: {name: (n, frames)}.
         seen: the readings of each trial.
-        trials: as the last step left them.
     """
 
-    specs: tuple[TrialSpec, ...]
-    t: Array
     counts: NDArray[np.uint16]
-    joints: Array
-    force: Array
-    traces: dict[str, Array]
     seen: list[Readings]
-    trials: Trials
 
 
 def run_batch(scene: Scene, specs: tuple[TrialSpec, ...], **options: Any) -> Batch:
-    """Simulate trials and read their sensors; options as of `run_physics`."""
+    """The physics and the readings of trials; options as of `run_physics`."""
     physics = run_physics(scene, specs, **options)
     seen = list(readings(physics))
-    return Batch(
-        specs,
-        physics.t,
-        np.stack([reading.frames() for reading in seen]),
-        np.stack([reading.joints for reading in seen]),
-        physics.force,
-        physics.traces,
-        seen,
-        physics.trials,
-    )
+    counts = np.stack([reading.frames() for reading in seen])
+    joints = np.stack([reading.joints for reading in seen])
+    return Batch(**{**vars(physics), "joints": joints}, counts=counts, seen=seen)

@@ -1,4 +1,4 @@
-"""Which effects a scene's trials run, what called for each, and what each costs here."""
+"""The account of a scene: its effects, what calls for each, and what each costs on this machine."""
 
 from __future__ import annotations
 
@@ -14,52 +14,46 @@ from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
 
 
-class Stopwatch:
-    """Adds up the seconds that each effect's hooks take by themselves."""
+def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:
+    """{effect, or `base`: microseconds for each trial that calls for it}, all trials side by side.
 
-    def __init__(self) -> None:
-        """Of nothing yet."""
-        self.spent: dict[str, float] = {}
-        self.inner = 0.0
+    The time of a hook that another hook calls counts for its own effect alone.
+    """
+    spent: dict[str, float] = {}
+    inner_s = [0.0]
 
-    def around(self, call: Call) -> Call:
-        """The call, timed; what it calls in turn counts for that."""
-        function = call.function
-
-        def timed(*arguments: Any) -> Any:
-            outer, self.inner = self.inner, 0.0
+    def timed(call: Call) -> Call:
+        def run(*arguments: Any) -> Any:
+            inner_s.append(0.0)
             begun = time.perf_counter()
-            answer = function(*arguments)
+            answer = call.function(*arguments)
             took = time.perf_counter() - begun
-            self.spent[call.owner] = self.spent.get(call.owner, 0.0) + took - self.inner
-            self.inner = outer + took
+            spent[call.owner] = spent.get(call.owner, 0.0) + took - inner_s.pop()
+            inner_s[-1] += took
             return answer
 
-        return replace(call, function=timed)
+        return replace(call, function=run)
 
-
-def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:
-    """{effect, or `base`: microseconds for each trial that calls for it} of trials side by side."""
-    plan, watch = make_plan(scene, specs), Stopwatch()
-    timed = {stage: [watch.around(call) for call in calls] for stage, calls in plan.stages.items()}
-    for reading in readings(run_physics(scene, specs, plan=replace(plan, stages=timed))):
+    plan = make_plan(scene, specs)
+    stages = {stage: [timed(call) for call in calls] for stage, calls in plan.stages.items()}
+    for reading in readings(run_physics(scene, specs, plan=replace(plan, stages=stages))):
         reading.frames()
     trials = {name: int(mask.sum()) for name, mask in plan.calls.items()}
-    return {name: spent / trials.get(name, len(specs)) * 1e6 for name, spent in watch.spent.items()}
+    return {name: taken / trials.get(name, len(specs)) * 1e6 for name, taken in spent.items()}
 
 
 def explain(scene: Scene) -> str:
     """The account that `simulate --explain` prints."""
     every = kinds(scene)
-    found = measure(scene, list(every.values()))
+    measured = measure(scene, list(every.values()))
     if not scene.step_s:
         every = {
             kind: [replace(spec, step_s=convergence.step_s) for spec in specs]
-            for (kind, specs), convergence in zip(every.items(), found, strict=True)
+            for (kind, specs), convergence in zip(every.items(), measured, strict=True)
         }
     spent = costs(scene, tuple(spec for specs in every.values() for spec in specs))
     lines = [f"{scene.name}: {sum(map(len, every.values()))} trials"]
-    for (effects, specs), convergence in zip(every.items(), found, strict=True):
+    for (effects, specs), convergence in zip(every.items(), measured, strict=True):
         first = {spec.key: spec for spec in specs}
         lines += ["", ", ".join(sorted(first)), _step_line(specs[0].step_s, convergence, scene)]
         lines.append(f"  {'effect':<16}{'us/trial':>9}  called for by")
@@ -73,18 +67,20 @@ def explain(scene: Scene) -> str:
     return "\n".join(lines)
 
 
-def _step_line(step_s: float, found: Convergence, scene: Scene) -> str:
+def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
+    """The step that the trials take, and the errors of the steps tried."""
     tried = ", ".join(
-        f"{1e3 * s:.3g} ms {100.0 * e:.2g} %"
-        for s, e in zip(found.steps_s, found.errors, strict=False)
+        f"{100.0 * e:.2g} % at {1e3 * s:.3g} ms"
+        for s, e in zip(measured.steps_s, measured.errors, strict=False)
     )
     goal = f"{100.0 * scene.trials['tolerance']:g} %"
     verdict = (
-        f"{1e3 * found.step_s:g} ms is enough for {goal}"
-        if found.within
-        else f"none is within {goal}; {1e3 * found.step_s:g} ms errs by {100.0 * found.error:.2g} %"
+        f"{1e3 * measured.step_s:g} ms is enough for {goal}"
+        if measured.within
+        else f"no step is within {goal}, and {1e3 * measured.step_s:g} ms errs by "
+        f"{100.0 * measured.error:.2g} %"
     )
     return (
-        f"  step {1e3 * step_s:g} ms; measured: {verdict} (order {found.order:.2g}; error {tried}; "
-        f"verified at {1e3 * found.steps_s[-1]:.2g} ms)"
+        f"  step {1e3 * step_s:g} ms; {verdict} (error {tried}; order {measured.order:.2g}; "
+        f"reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
     )

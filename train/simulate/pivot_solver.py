@@ -94,25 +94,6 @@ class Pivots:
     c: Array
     det: Array
 
-    def some(self, keep: NDArray[np.intp]) -> Pivots:
-        """Some of the contacts."""
-        springs = []
-        for group in self.springs:
-            place = np.full(self.free.shape[1], -1)
-            place[group.at] = np.arange(len(group.at))
-            members = place[keep]
-            at = (members >= 0).nonzero()[0]
-            if at.size:
-                inner = members[at]
-                gaps, stiffness = group.gaps.take(inner, -1), group.stiffness.take(inner, -1)
-                springs.append(Springs(at, gaps, stiffness, group.nearest))
-        return Pivots(
-            springs,
-            *(a.take(keep, -1) for a in (self.weight, self.line_gap, self.lever)),
-            *(a if isinstance(a, float) else a.take(keep, -1) for a in (self.gain, self.load)),
-            *(a.take(keep, -1) for a in (self.free, self.c, self.det)),
-        )
-
     def loads(self, y: Array) -> Loads:
         """The loads of the springs at coordinates y (2, n)."""
         depth = y[0] + self.lever * y[1] - self.line_gap
@@ -207,43 +188,25 @@ class Answer(NamedTuple):
 def search(pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS) -> Answer:
     """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of them.
 
-    The slope of the energy along a step rises steadily, so a step that ends with the slope
-    turned uphill by more than half of what it began with is cut back along its secant.
+    The slope of the energy rises steadily along a step. Where it ends uphill by more than half of
+    its value at the start, the step is cut back along its secant.
     """
     c = pivots.c
     y = pivots.free - np.array(
         [c[0] * guess[0] + c[1] * guess[1], c[1] * guess[0] + c[2] * guess[1]]
     )
-    left = np.arange(y.shape[1])
-    contacts, at = pivots, y
-    loads = answer = contacts.loads(at)
-    searching = np.ones(len(left), dtype=bool)
+    loads = pivots.loads(y)
     for turn in range(ROUNDS + guarded_rounds):
-        p = contacts.step(at, loads)
+        p = pivots.step(y, loads)
         searching = (np.abs(p[0]) > CLOSE_M) | (np.abs(p[1]) > CLOSE_RAD)
-        open_ = searching.nonzero()[0]
-        if not open_.size:
+        if not searching.any():
             break
-        if 2 * open_.size <= len(left):
-            # The few that are not there yet go on by themselves.
-            y[:, left] = at
-            for whole, part in zip(answer, loads, strict=True):
-                whole[..., left] = part
-            left, contacts, searching = left[open_], contacts.some(open_), searching[open_]
-            at, p, *parts = (a.take(open_, -1) for a in (at, p, *loads))
-            loads = Loads(*parts)
-        else:
-            p = np.where(searching, p, 0.0)
+        p = np.where(searching, p, 0.0)
         if turn >= ROUNDS:
-            p = p * _cut(contacts, at, loads, p)
-        at = at - p
-        loads = contacts.loads(at)
-    y[:, left] = at
-    for whole, part in zip(answer, loads, strict=True):
-        whole[..., left] = part
-    lost = np.zeros(y.shape[1], dtype=bool)
-    lost[left] = searching
-    return Answer(pivots.agreed(y, answer), answer.rows, lost)
+            p = p * _cut(pivots, y, loads, p)
+        y = y - p
+        loads = pivots.loads(y)
+    return Answer(pivots.agreed(y, loads), loads.rows, searching)
 
 
 def _cut(contacts: Pivots, at: Array, loads: Loads, p: Array) -> Array:

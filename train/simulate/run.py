@@ -1,9 +1,10 @@
-"""A scene's trials to recordings: on this machine, on several cores, or on a Dask cluster."""
+"""Recordings of a scene's trials, made on this machine's cores or on a Dask cluster."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from os import cpu_count
 from pathlib import Path
@@ -24,13 +25,19 @@ from train.simulate.schema import SOFT_FAMILIES
 from train.simulate.truth import true_runs
 
 BATCH = 1024
-"""Trials that are simulated side by side, as far as memory goes: some 0.4 MB each."""
+"""Most trials simulated side by side; each takes about 0.4 MB of memory."""
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """One trial's recording: its file's name, how often it was drawn again, whether a taxel rises
-    above the skin's onset, and itself where it has not been written yet."""
+    """A simulated trial.
+
+    Attributes:
+        name: the name of its file.
+        redrawn: how often it was drawn again.
+        felt: whether a taxel rises above the skin's onset.
+        recording: the recording, or None once it has been written.
+    """
 
     name: str
     redrawn: int
@@ -40,14 +47,14 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Written:
-    """What `write` has done.
+    """The files that `write` has made.
 
     Attributes:
         paths: the files.
-        redrawn: how many of the trials were drawn again.
-        unfelt: in how many of them no taxel rises above the skin's onset.
-        rough: {a kind's first trials: what its step costs, as a part of the peak force} where
-            that is measured and no step is within the scene's tolerance.
+        redrawn: number of trials that were drawn again.
+        unfelt: number of trials in which no taxel rises above the skin's onset.
+        rough: {the first object and condition of a kind: the error of its step, as a part of the
+            peak force} where the step was measured and none is within the scene's tolerance.
     """
 
     paths: list[Path]
@@ -57,13 +64,13 @@ class Written:
 
 
 Kind = tuple[str, ...]
-"""The effects that trials call for."""
+"""The effects that trials call for, which name a kind of trials."""
 
 
 def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
-    """The scene's trials by the effects that they call for, at the steps that the scene gives.
+    """{effects: the trials that call for them}, at the steps that the scene gives.
 
-    A kind's step is the smallest that `step_s` gives its effects; where that is empty, a frame.
+    A kind's step is the smallest that `step_s` gives its effects, or a frame where it is empty.
     """
     out: dict[Kind, list[TrialSpec]] = {}
     for item in scene.objects:
@@ -77,10 +84,10 @@ def kinds(scene: Scene) -> dict[Kind, list[TrialSpec]]:
 
 
 def measured(scene: Scene) -> dict[Kind, Convergence]:
-    """What halving the step does to each kind of trials; empty where the scene gives its steps.
+    """{kind: the errors of the steps tried}; empty where the scene gives its steps.
 
     Raises:
-        InputError: an object touches the arm from the start, before anything takes long.
+        InputError: an object touches the arm from the start. This is checked before anything else.
     """
     if scene.step_s:
         return {}
@@ -99,7 +106,7 @@ def recordings(
     which: NDArray[np.intp] | None = None,
     scene: Scene | None = None,
 ) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial of a run, or of some, as of `engine.readings`."""
+    """(file name, recording) of each trial of a run, or of some; arguments as of `readings`."""
     trials = physics.trials
     scene = scene or trials.scene
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
@@ -135,7 +142,7 @@ def recordings(
 
 
 def simulate_trials(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of trials, each drawn until it does as its label says."""
+    """(file name, recording) of trials, each drawn until it fits its label."""
     for physics, true in true_runs(scene, specs):
         yield from recordings(physics, true)
 
@@ -143,7 +150,7 @@ def simulate_trials(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tupl
 def simulate_part(
     scene: Scene, specs: tuple[TrialSpec, ...], folder: str | None
 ) -> list[Simulated]:
-    """Simulate trials; write them where `folder` is given, else give the recordings back."""
+    """Simulated trials, written to `folder`; with their recordings if that is None."""
     out: list[Simulated] = []
     for name, trial in simulate_trials(scene, specs):
         if folder is not None:
@@ -157,21 +164,22 @@ def simulate_part(
 def parts(
     scene: Scene,
     batch: int = BATCH,
-    found: dict[Kind, Convergence] | None = None,
+    convergences: dict[Kind, Convergence] | None = None,
     jobs: int = 1,
 ) -> list[tuple[TrialSpec, ...]]:
-    """The scene's trials, cut into batches of about equal work.
+    """Batches of the scene's trials, of about equal work.
 
     Args:
-        batch: trials at most in each.
-        found: the steps of a scene that gives none, where they have been measured.
-        jobs: at least so many batches, if there are as many trials.
+        batch: most trials in each.
+        convergences: the measured steps of a scene that gives none, as of `measured`.
+        jobs: least number of batches, if there are as many trials.
     """
     if batch < 1:
         raise InputError(f"--batch must be at least 1, not {batch}")
-    found = measured(scene) if found is None else found
+    if convergences is None:
+        convergences = measured(scene)
     every = [
-        replace(spec, step_s=found[kind].step_s) if kind in found else spec
+        replace(spec, step_s=convergences[kind].step_s) if kind in convergences else spec
         for kind, specs in kinds(scene).items()
         for spec in specs
     ]
@@ -180,7 +188,7 @@ def parts(
 
 
 def simulate(scene: Scene, batch: int = BATCH) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial, simulated here."""
+    """(file name, recording) of each trial of a scene, simulated in this process."""
     for specs in parts(scene, batch):
         yield from simulate_trials(scene, specs)
 
@@ -195,16 +203,16 @@ def write(
     address: str | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> Written:
-    """Simulate a scene into a folder of recordings.
+    """Write the recordings of a scene into a folder.
 
     The files' bytes depend on the scene and its seed alone.
 
     Args:
-        batch: trials simulated side by side at most.
+        batch: most trials simulated side by side.
         jobs: processes on this machine (joblib).
-        backend: `local`, or `dask`: the scheduler at `address` runs the batches, and the
-            recordings come back to be written here.
-        progress: called with the number of trials that have just been written.
+        backend: `local`, or `dask` where the scheduler at `address` runs the batches and sends
+            the recordings back.
+        progress: called with the number of trials just written.
 
     Raises:
         InputError: a file cannot be written, or there is no scheduler at `address`.
@@ -213,23 +221,19 @@ def write(
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{target}: cannot be made: {error.strerror or error}") from None
-    found = measured(scene)
-    work = parts(scene, batch, found, jobs if jobs > 0 else cpu_count() or 1)
-    done: Iterable[list[Simulated]]
-    if backend == "dask":
-        done = _on_dask(scene, work, address)
-    elif backend == "local":
-        done = _on_cores(scene, work, str(target), jobs)
-    else:
+        raise InputError(
+            f"{target}: the folder cannot be made: {error.strerror or error}"
+        ) from None
+    if backend not in ("local", "dask"):
         raise InputError(f"--backend must be local or dask, not {backend!r}")
+    convergences = measured(scene)
+    work = parts(scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1)
     made: list[Simulated] = []
-    for part in done:
+    for part in _simulated(scene, work, str(target), jobs, backend, address):
         for trial in part:
             if trial.recording is not None:
                 recording.save(target / trial.name, trial.recording, lasting=False)
-                trial = replace(trial, recording=None)
-            made.append(trial)
+            made.append(replace(trial, recording=None))
         progress(len(part))
     return Written(
         paths=[target / name for name in sorted(trial.name for trial in made)],
@@ -237,36 +241,33 @@ def write(
         unfelt=sum(1 for trial in made if not trial.felt),
         rough={
             kinds(scene)[kind][0].key: convergence.error
-            for kind, convergence in found.items()
+            for kind, convergence in convergences.items()
             if not convergence.within
         },
     )
 
 
-def _on_cores(
-    scene: Scene, work: list[tuple[TrialSpec, ...]], folder: str, jobs: int
-) -> Iterable[list[Simulated]]:
-    if jobs == 1:
-        return (simulate_part(scene, specs, folder) for specs in work)
-    from joblib import Parallel, delayed
-
-    run = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    done: Iterable[list[Simulated]] = run(
-        delayed(simulate_part)(scene, specs, folder) for specs in work
-    )
-    return done
-
-
-def _on_dask(
-    scene: Scene, work: list[tuple[TrialSpec, ...]], address: str | None
+def _simulated(
+    scene: Scene,
+    work: list[tuple[TrialSpec, ...]],
+    folder: str,
+    jobs: int,
+    backend: str,
+    address: str | None,
 ) -> Iterator[list[Simulated]]:
+    """Each batch once it is simulated; those from a cluster have not been written yet."""
+    if backend == "local" and jobs == 1:
+        yield from (simulate_part(scene, specs, folder) for specs in work)
+        return
     from joblib import Parallel, delayed
 
-    with on_cluster(address):
-        run = Parallel(n_jobs=-1, return_as="generator_unordered")
-        yield from run(delayed(simulate_part)(scene, specs, None) for specs in work)
+    remote = backend == "dask"
+    with on_cluster(address) if remote else nullcontext():
+        run = Parallel(n_jobs=-1 if remote else jobs, return_as="generator_unordered")
+        call, place = delayed(simulate_part), None if remote else folder
+        yield from run(call(scene, specs, place) for specs in work)
 
 
 def total_trials(scene: Scene) -> int:
-    """How many trials a scene has."""
+    """The number of a scene's trials."""
     return scene.count * sum(len(item.conditions) for item in scene.objects)

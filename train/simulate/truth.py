@@ -1,7 +1,7 @@
-"""Labels are what happened: a trial that contradicts its label is drawn again.
+"""Draws a trial again where what happened contradicts its label.
 
-A thing that is called movable has to slide, and one that is called soft has to yield, before the
-window ends in which it is judged; the paper's did ("For an object to be considered movable in our
+An object labelled movable has to slide, and one labelled soft has to yield, before the window ends
+in which labels are judged; the paper's did ("For an object to be considered movable in our
 experiments, it needed to be moved by the robot's stereotyped motion", section IV-C).
 """
 
@@ -20,9 +20,9 @@ from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import THICKNESS
 
 REDRAWS = 40
-"""Draws of one trial that may contradict its label before the scene is refused."""
+"""Draws of one trial after which the scene is refused, if each contradicts the label."""
 AHEAD = 4
-"""Further draws of a trial that are simulated side by side; the first true one is taken."""
+"""Further draws of a trial simulated side by side; the first that fits its label is taken."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class Contradiction:
     """How a trial contradicts its label.
 
     Attributes:
-        label: the label, soft or the trial's condition.
-        what: what the trial did.
-        remedy: how a scene may change that.
+        label: `soft`, or the trial's condition.
+        what: the end of a sentence on what the trial did.
+        remedy: a change of the scene that may help.
     """
 
     label: str
@@ -41,7 +41,7 @@ class Contradiction:
 
 
 def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
-    """How each trial of a run contradicts its label; None where it does not."""
+    """For each trial of a run, how it contradicts its label, or None."""
     trials, scene = physics.trials, physics.trials.scene
     labels, touched = scene.labels, physics.force > 0.0
     onset, every = np.argmax(touched, axis=1), np.arange(len(touched))
@@ -59,7 +59,7 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
         label, what = trial.condition, ""
         if not ever[i]:
             what = "was never touched"
-            remedy = "let [motion] reach it, and the skin's columns face it"
+            remedy = "let [motion] reach it, and turn the skin's columns to it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
             what = f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             remedy = "lower its mass_kg or its friction, or leave movable out of its conditions"
@@ -78,7 +78,7 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
 
 
 def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
-    """What ended trial i before its window, and how a scene gives it longer; else empty texts."""
+    """Words on what ended trial i before its window did, and the remedy; else empty texts."""
     trials = physics.trials
     scene, moves = trials.scene, trials.rate[:, 0] != 0.0
     stroke_s = float(trials.travel_s[moves, i].max())
@@ -86,10 +86,8 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
     if min(left_s, stroke_left_s) >= scene.labels["window_s"]:
         return "", ""
     if left_s <= stroke_left_s:
-        return (
-            f", and the trial ended {left_s:.2f} s after the touch",
-            "give trials.after_s more, or ",
-        )
+        ended = f", and the trial ended {left_s:.2f} s after the touch"
+        return ended, "give trials.after_s more, or "
     remedy = "motion.travel_s more time"
     if stroke_s < scene.travel_s:
         remedy = "motion.start_deg more room before the joint's limit"
@@ -100,36 +98,35 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
 def true_runs(
     scene: Scene, specs: tuple[TrialSpec, ...]
 ) -> Iterator[tuple[PhysicsRun, NDArray[np.intp]]]:
-    """Runs of trials, and which trials of each did as their labels say.
+    """Runs of trials, and which trials of each run fit their labels.
 
-    Each trial does in exactly one of the runs; a trial's draws depend on nothing but itself.
+    Each trial fits its label in exactly one of the runs; its draws depend on nothing but itself.
 
     Raises:
         InputError: a trial contradicts its label in every draw.
     """
     while specs:
         physics = run_physics(scene, specs)
-        judged = contradictions(physics)
-        true: dict[tuple[str, int], int] = {}
-        last: dict[tuple[str, int], tuple[TrialSpec, Contradiction]] = {}
-        for i, (spec, wrong) in enumerate(zip(specs, judged, strict=True)):
-            trial = spec.key, spec.number
-            if wrong is None:
-                true.setdefault(trial, i)
+        fits: dict[tuple[str, int], int] = {}
+        wrong: dict[tuple[str, int], tuple[TrialSpec, Contradiction]] = {}
+        for i, (spec, contradiction) in enumerate(zip(specs, contradictions(physics), strict=True)):
+            if contradiction is None:
+                fits.setdefault((spec.key, spec.number), i)
             else:
-                last[trial] = spec, wrong
-        yield physics, np.array(sorted(true.values()), dtype=int)
-        again = [last[trial] for trial in last if trial not in true]
-        for spec, wrong in again:
-            if spec.attempt + 1 >= REDRAWS:
-                raise InputError(
-                    f"{scene.name}: object {spec.object.name!r} is labelled {wrong.label}, but in "
-                    f"each of {REDRAWS} draws it contradicted that within "
-                    f"{scene.labels['window_s']:g} s of the touch (the last {wrong.what}); "
-                    f"{wrong.remedy}"
-                )
-        specs = tuple(
-            replace(spec, attempt=attempt)
-            for spec, _ in again
-            for attempt in range(spec.attempt + 1, min(spec.attempt + 1 + AHEAD, REDRAWS))
+                wrong[spec.key, spec.number] = spec, contradiction
+        yield physics, np.array(sorted(fits.values()), dtype=int)
+        again = [wrong[trial] for trial in wrong if trial not in fits]
+        specs = tuple(spec for last in again for spec in _next_draws(scene, *last))
+
+
+def _next_draws(scene: Scene, last: TrialSpec, wrong: Contradiction) -> Iterator[TrialSpec]:
+    """The next draws of a trial whose last draw contradicted its label."""
+    first = last.attempt + 1
+    if first >= REDRAWS:
+        raise InputError(
+            f"{scene.name}: object {last.object.name!r} is labelled {wrong.label}, but each of "
+            f"{REDRAWS} draws contradicted that within {scene.labels['window_s']:g} s of the touch "
+            f"(the last {wrong.what}); {wrong.remedy}"
         )
+    for attempt in range(first, min(first + AHEAD, REDRAWS)):
+        yield replace(last, attempt=attempt)
