@@ -15,7 +15,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", help="a TOML file like train/scenes/cody18.toml")
     parser.add_argument("--out", metavar="DIR", help="folder for the recordings")
     parser.add_argument(
-        "--explain", action="store_true", help="print what runs, what called for it and its cost"
+        "--explain",
+        action="store_true",
+        help="print the effects that run, the reason for each, and its cost",
     )
     parser.add_argument("--seed", type=int, help="seed, instead of the scene's")
     parser.add_argument(
@@ -25,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="trials of each object in each condition, instead of the scene's",
     )
     parser.add_argument(
-        "--batch", type=int, default=1024, help="trials simulated side by side at most"
+        "--batch", type=int, default=1024, help="most trials simulated side by side"
     )
     parser.add_argument("--jobs", type=int, default=1, help="processes; -1 for all cores")
     parser.add_argument(
@@ -71,19 +73,19 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"{len(written.paths)} recordings in {arguments.out}", file=sys.stderr)
         if written.redrawn:
             print(
-                f"{written.redrawn} of them were drawn again until they did as their labels say",
+                f"{written.redrawn} of them were drawn again until they fitted their labels",
                 file=sys.stderr,
             )
         if written.unfelt:
             print(
                 f"in {written.unfelt} of them no taxel rises above skin.onset_counts "
-                f"({scene.skin.onset}): nothing is felt there",
+                f"({scene.skin.onset}), so no touch is felt",
                 file=sys.stderr,
             )
         for key, error in written.rough.items():
             print(
-                f"{key} and its like: no step is within trials.tolerance; the one taken errs by "
-                f"{100.0 * error:.2g} % of the peak force (--explain tells more)",
+                f"{key} and its kind: no step is within trials.tolerance; the step taken errs by "
+                f"{100.0 * error:.2g} % of the peak force (see --explain)",
                 file=sys.stderr,
             )
     return 0

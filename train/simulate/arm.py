@@ -19,9 +19,9 @@ class Link(NamedTuple):
 
     Attributes:
         shift: (3,) metres.
-        turn: (3, 3), or None where the step does not turn.
+        turn: (3, 3), or None if the step does not turn.
         axis: (3,) of the joint, a unit vector in the frame that the step reaches.
-        main: which of that frame's own axes the joint turns about, or None.
+        main: the axis of that frame about which the joint turns, or None for a skew one.
     """
 
     shift: Array
@@ -47,7 +47,7 @@ class Pose(NamedTuple):
 
 
 class Kinematics:
-    """A chain of turning joints, taken apart into constant steps and turns.
+    """A chain of turning joints, split into constant steps and turns.
 
     Attributes:
         links: one for each joint.
@@ -56,7 +56,7 @@ class Kinematics:
     """
 
     def __init__(self, chain: Chain) -> None:
-        """Take a chain apart.
+        """Split a chain.
 
         Raises:
             InputError: a joint slides.
@@ -121,7 +121,7 @@ def _joined(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Arra
 
 
 def _combined(parts: Array, rotation: Array) -> Array:
-    """(3, n): the axes of (3, 3, n) times their parts (3,); a part of 0 costs nothing."""
+    """(3, n) the sum of axes (3, 3, n) times parts (3,), without those of part 0."""
     out = np.zeros(rotation.shape[1:])
     for part, axis in zip(parts.tolist(), rotation, strict=True):
         if part != 0.0:
@@ -141,7 +141,7 @@ def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
     """The axes after a turn about the link's axis (Rodrigues): I + sin K + (1 - cos) K^2."""
     out = np.empty_like(rotation)
     if link.main is not None:
-        # About one of the frame's own axes the other two turn in their plane.
+        # A turn about an axis of the frame turns the other two in their plane.
         if link.axis[link.main] < 0.0:
             sine = -sine
         first, second = (link.main + 1) % 3, (link.main + 2) % 3

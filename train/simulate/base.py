@@ -1,5 +1,5 @@
-"""What every trial does: the soft arm that follows its equilibrium point, the bed of taxels, and
-the image of the load. Effects add to it, or take the place of one of its hooks (`plan`)."""
+"""The hooks of every trial: a soft arm that follows its equilibrium point, a bed of taxels, and the
+image of the load. Effects add hooks, or replace some of these (`plan`)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from train.simulate.plan import Index
 from train.simulate.trials import Trials, pick
 
 STILL_M_S = 1e-6
-"""A forearm slower than this stands still."""
+"""A forearm slower than this counts as still."""
 FLAT_M = 1e6
-"""Radius of a face that does not curve."""
+"""Radius of a flat face."""
 FAR_M = -1e9
-"""Depth of a contact whose face covers nothing."""
+"""Depth of a contact whose face covers no row."""
 
 
 def swing(t: Trials, i: Index) -> None:
-    """Set the arm in its steady sweep.
+    """Begin with the arm in its steady sweep.
 
-    Before the contact each joint lags its equilibrium point by d/k of its speed: the steady answer
-    of d q' + k (q - q_eq) = 0 to a ramp.
+    Before the contact each joint lags its equilibrium point by d/k of its speed, the steady
+    solution of d q' + k (q - q_eq) = 0 for a ramp.
     """
     low, high = t.kinematics.limits
     start = np.repeat(np.array(t.scene.start)[:, None], t.n, axis=1)
@@ -40,13 +40,13 @@ def swing(t: Trials, i: Index) -> None:
 
 
 def place(t: Trials, i: Index) -> None:
-    """Put the object where the sweep meets it after the lead, before the columns it can touch.
+    """Put the object where the sweep meets it after the lead.
 
-    Its face lies across the way of the forearm, turned by the yaw; of each column it is found how
-    far it lies back at zero depth, R (1 - cos theta), and which part of it the face covers.
+    Its face lies across the forearm's motion, turned by the yaw. For each column that it can touch
+    this finds the gap at zero depth, R (1 - cos theta), and the part that the face covers.
 
     Raises:
-        InputError: the forearm does not move there.
+        InputError: the forearm does not move at that place.
     """
     skin, values = t.skin, t.values
     t.z[:] = t.scene.place_m + values["place_m"]
@@ -60,7 +60,7 @@ def place(t: Trials, i: Index) -> None:
     if not (size > STILL_M_S).all():
         raise InputError(
             f"{t.scene.name}: motion.rate_deg_s does not move the forearm where it is to meet "
-            "an object (motion.place_m); let a joint turn that carries it"
+            "an object (motion.place_m); turn a joint that carries it there"
         )
     normal, yaw = speed / size, np.radians(values["yaw_deg"])
     t.normal[:] = normal * np.cos(yaw) + along * np.sin(yaw)
@@ -74,7 +74,7 @@ def place(t: Trials, i: Index) -> None:
     t.columns[:] = (first + np.arange(window)[:, None]) % skin.cols
     theta = np.take_along_axis(away, t.columns, axis=0)
     t.column_gaps[:] = skin.radius_m * (1.0 - np.cos(theta))
-    # A narrow face ends among the columns.
+    # A narrow face ends between the columns.
     pitch = skin.radius_m * 2.0 * math.pi / skin.cols
     part = covered(skin.radius_m * np.sin(theta), values["breadth_m"], pitch)
     t.reach[:] = np.where(theta < 0.5 * math.pi, part, 0.0)
@@ -82,20 +82,20 @@ def place(t: Trials, i: Index) -> None:
 
 
 def lay(t: Trials, i: Index) -> None:
-    """Lines are the skin's rows, each with a spring for every column."""
+    """Make a line of each row of the skin, with a spring for every column."""
     lay_rows(t, i)
     t.add_springs(i, pick(t.column_gaps, i), pick(t.reach, i) * pick(t.taxel_k, i))
 
 
 def lay_rows(t: Trials, i: Index) -> None:
-    """As far as the object's face covers each row, and how far it draws back there."""
+    """Find the part of each row that the face covers, and how far the face draws back there."""
     offset, radius = t.row_z - pick(t.z, i), pick(t.values["radius_m"], i)
     t.weight[:, i] = covered(offset, pick(t.values["width_m"], i), t.skin.row_pitch_m)
     t.line_gap[:, i] = np.where(radius < FLAT_M, curve_gap(offset, radius), 0.0)
 
 
 def law(t: Trials, i: Index) -> None:
-    """The bed's law as lines K a - B; a flat face needs one for each column only."""
+    """The bed's law as lines K a - B; a flat face needs only one for each column."""
     trials = np.arange(t.n)[i]
     curved = t.line_gap[:, trials].any(axis=0)
     flat, round_ = trials[~curved], trials[curved]
@@ -110,14 +110,14 @@ def law(t: Trials, i: Index) -> None:
 
 
 def tune(t: Trials, i: Index) -> None:
-    """What holds each joint in a step of this length."""
+    """Set the stiffness and the compliance of each joint within a step of this length."""
     held = t.damping / pick(t.h, i)
     t.held[:, i] = held
     t.give[:, i] = 1.0 / (held + t.joint_k)
 
 
 def locate(t: Trials, i: Index) -> None:
-    """Depth and its Jacobian at the frame's joint angles, and the compliance of a step."""
+    """Find the depth, its Jacobian and the compliance of a step at the frame's joint angles."""
     q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
     pose = t.kinematics.pose(q)
     along = pose.rotation[2]
@@ -130,13 +130,13 @@ def locate(t: Trials, i: Index) -> None:
 
 
 def keep_pose(t: Trials, i: Index, q: Array, point: Array, axes: Array, origins: Array) -> None:
-    """The arm at the frame, for the effects that ask."""
+    """Keep the arm's pose at the frame, for the effects."""
     t.q_frame[:, i], t.point[:, i] = q, point
     t.axes[:, :, i], t.origins[:, :, i] = axes, origins
 
 
 def predict(t: Trials, i: Index) -> None:
-    """Where the arm would be after the step with no load on it.
+    """Find where the arm would be after the step without load.
 
     Each joint obeys d q' + k (q - q_eq) = -J^T F; backward Euler in closed form.
     """
@@ -149,15 +149,15 @@ def predict(t: Trials, i: Index) -> None:
 
 
 def press(t: Trials, i: Index) -> None:
-    """The contact's loads; an object that moves adds to what gives way."""
+    """Solve the contact's loads; an object that moves adds its compliance."""
     t.loads[:, i] = t.ask(i, pick(t.y[0], i), pick(t.compliance[0], i) + pick(t.soft, i))
 
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads of a forearm that does not pivot, in closed form.
 
-    Where something answers to speed (`effects.viscous`) the force is gain F - L: the elastic law
-    with its compliance scaled, about a load that is there already. A contact never pulls.
+    With forces that depend on speed (`effects.viscous`) the force is gain F - L: the elastic law
+    with a scaled compliance, beside a load that is already there. A contact never pulls.
     """
     law = pick(t.law_gaps, i), pick(t.slopes, i), pick(t.intercepts, i)
     if "viscous" in t.own:
@@ -171,7 +171,7 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
 
 
 def settle(t: Trials, i: Index) -> None:
-    """The joints give way to the loads."""
+    """Let the joints give way to the loads."""
     loads, y, c = pick(t.loads, i), pick(t.y, i), pick(t.compliance, i)
     jacobian = pick(t.jacobian, i)
     torque = jacobian[:, 0] * loads[0] + jacobian[:, 1] * loads[1]
@@ -181,20 +181,20 @@ def settle(t: Trials, i: Index) -> None:
 
 
 def bear(t: Trials, i: Index) -> None:
-    """The force that the skin bears, and each row's depth."""
+    """The force on the skin, and each row's depth."""
     t.force[i] = pick(t.loads[0], i)
     keep_depth(t, i, pick(t.depth[0], i) - pick(t.line_gap, i), pick(t.weight, i))
 
 
 def keep_depth(t: Trials, i: Index, line_depth: Array, weight: Array) -> None:
-    """Each row's depth, and that of the deepest row that the face covers."""
+    """Keep each row's depth, and that of the deepest row that the face covers."""
     t.line_depth[:, i] = line_depth
     t.deepest[i] = np.where(weight > 0.0, line_depth, 0.0).max(axis=0)
     t.inside[i] = np.where(weight > 0.0, line_depth, FAR_M).max(axis=0)
 
 
 def image(t: Trials, i: Index) -> None:
-    """The force shared out among taxels: (rows, columns) newtons."""
+    """Share the force among the taxels."""
     stiffness = pick(t.reach, i) * pick(t.taxel_k, i)
     loads = spring_loads(
         pick(t.line_depth, i), pick(t.column_gaps, i), stiffness, pick(t.weight, i)

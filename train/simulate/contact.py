@@ -1,12 +1,12 @@
-"""The bed of springs between skin and object: its law, and the step that cannot blow up.
+"""The bed of springs between skin and object: its law, and a step that is always stable.
 
 A bed is lines (rows of the skin, or stems) of springs (columns around the forearm). At depth d a
-line bears sum_s k_s max(0, d - line_gap - gap_s) times its weight. As a function of the depth a of
-the whole bed this is convex and piecewise linear, phi(a) = max_s(K_s a - B_s), so an implicit step
-has a closed form (`closed_form`).
+line bears sum_s k_s max(0, d - line_gap - gap_s) times its weight. In the depth a of the whole bed
+this is convex and piecewise linear, phi(a) = max_s(K_s a - B_s), so an implicit step has a closed
+form (`closed_form`).
 
 The coordinates of a contact are y = (a, tilt), its loads are a force and a moment (F, M), and
-C = (c00, c01, c11) says how far unit loads move y within the step. A forearm that does not pivot
+C = (c00, c01, c11) is the motion of y within the step for unit loads. A forearm that does not pivot
 has neither tilt nor moment.
 """
 
@@ -34,7 +34,7 @@ def covered(offset: Array, width: Array, pitch: float) -> Array:
 
 
 def curve_gap(offset: Array, radius: Array) -> Array:
-    """How far a face curved along the forearm has drawn back: l^2 / (2 r)."""
+    """Gap of a face curved along the forearm: l^2 / (2 r)."""
     return offset * offset / (2.0 * radius)
 
 
@@ -49,7 +49,7 @@ def total(values: Array) -> Array:
 
 
 def by_depth(gaps: Array, stiffness: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Springs (S, n) in the order of their gaps: which each is, its gap and its stiffness."""
+    """Order, gaps and stiffness, (S, n) each, of springs sorted by their gaps."""
     order = gaps.argsort(axis=0, kind="stable")
     return order, np.take_along_axis(gaps, order, 0), np.take_along_axis(stiffness, order, 0)
 
@@ -67,7 +67,7 @@ def closed_form(gaps: Array, slopes: Array, intercepts: Array, y: Array, c: Arra
     and the largest of the lines' answers holds. A spring that y itself does not reach adds nothing.
 
     Args:
-        y: (n,) depths that the beds would have without load.
+        y: (n,) depths of the beds without load.
         c: (n,) metres that they give way for each newton.
     """
     reached = gaps < y
@@ -85,7 +85,7 @@ def spring_loads(depths: Array, gaps: Array, stiffness: Array, weight: Array) ->
 def share_out(force: Array, loads: Array) -> None:
     """Share forces (n,) among springs in proportion to their loads (S, L, n), in place.
 
-    Not the loads themselves: at a stiffness of 1e15 N/m they lose digits that the force has.
+    At a stiffness of 1e15 N/m the loads have fewer digits than the force, so they only give parts.
     """
     borne = total(total(loads.swapaxes(0, 1)))
     loads *= force / np.where(borne > 0.0, borne, 1.0)

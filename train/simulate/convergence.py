@@ -19,6 +19,8 @@ HALVINGS = 4
 """Most halvings of a frame."""
 FIRST_HALVINGS = 3
 """Halvings that every kind of trials is run at; the last is for those not within the tolerance."""
+MOST_OBJECTS = 8
+"""Most objects of a kind whose steps are measured; they are spread over its list."""
 MOST_STEPS = 20_000
 """Most steps of a trial of the reference run."""
 REFERENCE_PART = 0.5
@@ -103,7 +105,7 @@ class _Kind:
 
 
 def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Convergence]:
-    """The error of each step on each kind's middle trials, one trial an object and condition.
+    """The error of each step on middle trials of each kind, one for each of its objects.
 
     The differences between neighbouring steps give the order p and, summed as a geometric series,
     the error of each step (Richardson). Where even the shortest step is too long to resolve how a
@@ -114,10 +116,7 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
     scene = replace(scene, trials={**scene.trials, "after_s": after_s})
     tolerance, frame_s = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
-    kinds = [
-        _Kind(list({spec.key: spec for spec in reversed(specs)}.values()), [], [])
-        for specs in groups
-    ]
+    kinds = [_Kind(_spread_out(specs), [], []) for specs in groups]
     first = [(kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)]
     _run(scene, first)
     rough = [kind for kind in kinds if not kind.errors()[-2] <= tolerance]
@@ -129,6 +128,12 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
     ]
     _run(scene, reference, paced=False)
     return [_judged(kind, tolerance) for kind in kinds]
+
+
+def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
+    """One trial of each object and condition, at most `MOST_OBJECTS`."""
+    first = list({spec.key: spec for spec in reversed(specs)}.values())
+    return first[:: -(-len(first) // MOST_OBJECTS)]
 
 
 def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:

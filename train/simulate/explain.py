@@ -51,7 +51,8 @@ def explain(scene: Scene) -> str:
             kind: [replace(spec, step_s=convergence.step_s) for spec in specs]
             for (kind, specs), convergence in zip(every.items(), measured, strict=True)
         }
-    spent = costs(scene, tuple(spec for specs in every.values() for spec in specs))
+    first_trials = {spec.key: spec for specs in every.values() for spec in reversed(specs)}
+    spent = costs(scene, tuple(first_trials.values()))
     lines = [f"{scene.name}: {sum(map(len, every.values()))} trials"]
     for (effects, specs), convergence in zip(every.items(), measured, strict=True):
         first = {spec.key: spec for spec in specs}

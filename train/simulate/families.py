@@ -1,4 +1,4 @@
-"""Any-object scenes: a family of objects with ranges, from which different objects are drawn."""
+"""Draws different objects from the ranges of a [[family]]."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ from train.simulate.schema import (
 )
 
 PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
-WHOLE = ("stem_count",)
+COUNTED = ("stem_count",)
 DRAWS = 1000
 
 
 def draw_family(
     table: SceneTable, seed: int, push_n: float, skin: SkinLayout
 ) -> Iterator[dict[str, Any]]:
-    """The objects, as [[object]] tables, of one [[family]].
+    """The objects of one [[family]], as [[object]] tables.
 
-    Each range of the family is drawn once an object, evenly in its logarithm (evenly where it
-    begins at 0), by a stream of the family's name; its `kinetic_part` gives `friction_kinetic`.
-    An object that can be movable is drawn until `push_n` newtons move it, or as many as it passes
-    on; a family may give a `push_n` of its own.
+    Each object draws every range of the family once, uniformly in its logarithm (uniformly where
+    the range begins at 0), from a stream of the family's name. `kinetic_part` gives
+    `friction_kinetic`. An object that may be movable is drawn again until `push_n` newtons, or the
+    force that it passes on to its foot if that is less, move it. A family may give its own
+    `push_n`.
 
     Raises:
         InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
@@ -48,7 +49,7 @@ def draw_family(
     push_n = table.field("push_n", LABELS["push_n"], push_n)
     given = [key for key in keys_of(family) if key != "friction_kinetic" and table.has(key)]
     table.done()
-    # In the file's order: the draws follow it.
+    # The draws follow the order of the keys in the file.
     ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in given}
     movable = "movable" in conditions
     shared = {"family": family, "conditions": list(conditions)}
@@ -62,25 +63,25 @@ def draw_family(
                 drawn["friction_kinetic"] = drawn["friction_static"] * share
             floor = drawn.get("friction_static", 0.0)
             hold = floor * drawn.get("mass_kg", 0.0) * GRAVITY
-            # The skin may press down what it pushes, as far as it holds on to it.
+            # Through skin friction the push may also press the object down.
             level = 1.0 - floor * drawn.get("skin_friction", 0.0)
             if not movable or hold <= level * min(push_n, passed_on({**usual, **drawn}, skin)):
                 break
         else:
-            wanted = f"such that {push_n:g} N (labels.push_n) move it at its friction_static"
+            wanted = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", wanted)
-        whole = {k: round(drawn[k]) for k in WHOLE if k in drawn}
-        yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **whole}
+        counts = {k: round(drawn[k]) for k in COUNTED if k in drawn}
+        yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **counts}
 
 
 PRESSED_M = 0.06
-"""How deep the forearm is in a soft thing soon enough to move it within the window, [derived]: the
-arm comes 0.15 m a second and gives way itself."""
+"""How deep the forearm presses a soft object early enough to move it within the window [derived]:
+the arm moves 0.15 m in a second, and gives way itself."""
 
 
 def passed_on(drawn: Mapping[str, float], skin: SkinLayout) -> float:
-    """The newtons that an object passes on to its foot: what presses stems, or an elastic layer
-    (`effects.foundation`), so deep; without limit where it is stiffer."""
+    """Newtons that an object passes on to its foot: the force that presses its stems or its elastic
+    layer (`effects.foundation`) `PRESSED_M` deep; infinite for other objects."""
     if "stem_n_m" in drawn and "stem_count" in drawn:
         return round(drawn["stem_count"]) * drawn["stem_n_m"] * PRESSED_M
     if "modulus_pa" in drawn and "depth_m" in drawn:

@@ -1,10 +1,10 @@
-"""The loads on forearms that pivot, found for many trials at once.
+"""Finds the loads on pivoting forearms, for many trials at once.
 
 Rows press to different depths, a + lever * tilt, and the loads are a force and a moment. The
-energy of arm and bed is convex and piecewise quadratic in (a, tilt), so its minimum is the one
-answer. Newton's method finds it in a few rounds (the Hessian is that of the pieces that are
-touched; Qi and Sun, Math. Programming 58, 1993); where it cycles between pieces, a line search on
-the slope takes over, in the few trials that need it.
+energy of arm and bed is convex and piecewise quadratic in (a, tilt), so it has one minimum, which
+is the answer. Newton's method finds it in a few rounds, with the Hessian of the springs touched
+(Qi and Sun, Math. Programming 58, 1993). In the few trials where it cycles, a line search on the
+slope takes over.
 """
 
 from __future__ import annotations
@@ -17,41 +17,26 @@ from numpy.typing import NDArray
 
 from train.simulate.arm import Array
 from train.simulate.contact import total
+from train.simulate.plan import Index
+from train.simulate.trials import pick
 
 ROUNDS = 8
-"""Plain Newton rounds before the line search takes over; two or three are usual."""
+"""Plain Newton rounds before the line search takes over; most searches need two or three."""
 CLOSE_M, CLOSE_RAD = 1e-14, 1e-13
-"""A step below both is rounding."""
+"""A step below both is rounding error."""
 CUTS = 40
 GUARDED_ROUNDS = 5000
-"""A bed of 1e11 N/m has taken some hundred: one for each spring that comes or goes."""
+"""A bed of 1e11 N/m takes some hundred rounds, one for each spring that comes or goes."""
 NO_DIGITS = 1e-9
-"""A determinant of C of so small a part of its terms has too few digits to divide by."""
-
-
-@dataclass(frozen=True)
-class Springs:
-    """The springs of some of the trials, in the order of their depth.
-
-    Attributes:
-        at: (m,) which trials of the contacts.
-        gaps: (S, 1, m) metres at which each is touched.
-        stiffness: (S, 1, m) newtons a metre, or (S, rows, m) where it differs by row.
-        nearest: (S,) the smallest gap of any trial: no spring from here on is touched above it.
-    """
-
-    at: NDArray[np.intp]
-    gaps: Array
-    stiffness: Array
-    nearest: Array
+"""A determinant of C smaller than this part of its terms has too few digits to divide by."""
 
 
 class Loads(NamedTuple):
-    """What beds bear, (n,) each but for the last.
+    """The loads of beds, (n,) each except the last.
 
     Attributes:
         force, moment: newtons and newton metres.
-        stiffness: newtons a metre of the whole bed there.
+        stiffness: newtons a metre of the whole bed at this depth.
         mean, spread: the mean lever of that stiffness, and its second moment about it.
         rows: (rows, n) newtons.
     """
@@ -65,26 +50,32 @@ class Loads(NamedTuple):
 
 
 def determinant(c: Array) -> Array:
-    """Of C (3, n); 0 where it is rounding: an arm of one joint pushes and tilts in one motion, and
-    C has no inverse."""
+    """(n,) the determinant of C (3, n), and 0 where it is only rounding error: an arm of one joint
+    pushes and tilts in one motion, so its C has no inverse."""
     det = c[0] * c[2] - c[1] * c[1]
     return np.where(det > NO_DIGITS * c[0] * c[2], det, 0.0)
 
 
 @dataclass(frozen=True)
 class Pivots:
-    """Contacts of n pivoting forearms: y = free - C (F, M) has to hold.
+    """Contacts of n pivoting forearms, whose loads must satisfy y = free - C (F, M).
 
     Attributes:
-        springs: of all trials, in groups of about as many.
+        at: index of the contacts' trials in the next two.
+        gaps: (S, 1, trials) metres at which each spring is touched.
+        stiffness: (S, 1, trials) newtons a metre, or (S, rows, trials) where it differs by row.
+        nearest: (S,) ascending; no trial's springs from s on are touched above nearest[s].
         weight, line_gap, lever: (rows, n) the part of each row that the face covers, metres by
             which the face draws back there, metres from the contact's middle.
-        gain, load: (n,), (rows, n): a row bears gain F + load of its springs' F (`viscous`).
+        gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load (`viscous`).
         free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in them.
-        det: (n,) of C, as of `determinant`.
+        det: (n,) the determinant of C, from `determinant`.
     """
 
-    springs: list[Springs]
+    at: Index
+    gaps: Array
+    stiffness: Array
+    nearest: Array
     weight: Array
     line_gap: Array
     lever: Array
@@ -97,21 +88,11 @@ class Pivots:
     def loads(self, y: Array) -> Loads:
         """The loads of the springs at coordinates y (2, n)."""
         depth = y[0] + self.lever * y[1] - self.line_gap
-        force, held = np.zeros((2, *depth.shape))
-        for group in self.springs:
-            every = len(group.at) == depth.shape[1]
-            pressed = depth if every else depth.take(group.at, -1)
-            deep = int(np.searchsorted(group.nearest, pressed.max()))
-            if deep == 0:
-                continue
-            inside = np.maximum(pressed - group.gaps[:deep], 0.0)
-            stiffness = group.stiffness[:deep]
-            touched = (inside > 0.0) * stiffness
-            np.multiply(inside, touched, out=inside)
-            if every:
-                force, held = total(inside), total(touched)
-            else:
-                force[:, group.at], held[:, group.at] = total(inside), total(touched)
+        deep = max(1, int(np.searchsorted(self.nearest, depth.max(initial=0.0))))
+        inside = np.maximum(depth - pick(self.gaps[:deep], self.at), 0.0)
+        touched = (inside > 0.0) * pick(self.stiffness[:deep], self.at)
+        np.multiply(inside, touched, out=inside)
+        force, held = total(inside), total(touched)
         force, held = force * self.weight, held * self.weight
         if not isinstance(self.load, float):
             borne = self.gain * force + self.load
@@ -124,9 +105,11 @@ class Pivots:
         return Loads(total(force), total(force * self.lever), stiffness, mean, spread, force)
 
     def step(self, y: Array, loads: Loads) -> Array:
-        """(2, n): p of (I + C H) p = y - (free - C f), in coordinates about the stiffness's mean
-        lever, where H is diagonal and the determinant a sum of positive terms: no digits are lost
-        at 1e15 N/m."""
+        """(2, n) the Newton step p of (I + C H) p = y - (free - C f).
+
+        In coordinates about the mean lever of the stiffness, H is diagonal and the determinant is a
+        sum of positive terms, so no digits are lost at 1e15 N/m.
+        """
         c00, c01, c11 = self.c
         force, moment, k, mean, spread, _ = loads
         r0 = y[0] - self.free[0] + (c00 * force + c01 * moment)
@@ -142,7 +125,7 @@ class Pivots:
         p = np.array([p0 - mean * p1, p1])
         single = (det_c == 0.0) & (c00 > 0.0)
         if single.any():
-            # One way to go, and a stiffness along it.
+            # Such an arm moves along one line, with one stiffness along it.
             lean = c01 / np.where(single, c00, 1.0)
             reach = 1.0 + lean * mean
             p0 = r0 / (1.0 + c00 * (reach * reach * k + lean * lean * spread))
@@ -150,35 +133,37 @@ class Pivots:
         return p
 
     def arm(self, y: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """The loads that the arm gives at y, and (n,) whether C tells both of them."""
+        """The loads of the arm at y, and (n,) whether C has an inverse that gives both of them."""
         c00, c01, c11 = self.c
         det = self.det
-        tells, d = det > 0.0, self.free - y
-        over = np.where(tells, det, 1.0)
-        both = np.array([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / over
-        return both, tells
+        invertible, d = det > 0.0, self.free - y
+        divisor = np.where(invertible, det, 1.0)
+        loads = np.array([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / divisor
+        return loads, invertible
 
     def slope(self, y: Array, loads: Loads, p: Array) -> Array:
-        """Of the energy at y along -p."""
-        given, tells = self.arm(y)
+        """(n,) the slope of the energy at y along -p."""
+        given, invertible = self.arm(y)
         single = p[0] * ((y[0] - self.free[0]) / self.c[0] + loads.force) + p[1] * loads.moment
-        both = p[0] * (loads.force - given[0]) + p[1] * (loads.moment - given[1])
-        return np.asarray(np.where(tells, -both, -single))
+        double = p[0] * (loads.force - given[0]) + p[1] * (loads.moment - given[1])
+        return np.asarray(np.where(invertible, -double, -single))
 
     def agreed(self, y: Array, loads: Loads) -> Array:
-        """(2, n) the loads at the solution, from the side that has more digits: a stiff bed's depth
-        is all rounding, while what the arm has given way is not."""
+        """(2, n) the loads at the solution, from the side with more digits.
+
+        The depth of a stiff bed is mostly rounding error; the way of the arm is not.
+        """
         c00, c01, _ = self.c
-        given, tells = self.arm(y)
+        given, invertible = self.arm(y)
         single = (self.free[0] - y[0] - c01 * loads.moment) / np.where(c00 > 0.0, c00, 1.0)
         stiff = (c00 * loads.stiffness > 1.0) & (loads.force > 0.0)
-        force = np.where(stiff, np.where(tells, given[0], single), loads.force)
-        moment = np.where(stiff & tells, given[1], loads.moment)
+        force = np.where(stiff, np.where(invertible, given[0], single), loads.force)
+        moment = np.where(stiff & invertible, given[1], loads.moment)
         return np.where(force > 0.0, np.array([force, moment]), 0.0)
 
 
 class Answer(NamedTuple):
-    """Loads (2, n), what each row bears (rows, n), and (n,) whether they were not found."""
+    """The loads (2, n), the force on each row (rows, n), and (n,) whether the search failed."""
 
     loads: Array
     rows: Array
@@ -210,7 +195,7 @@ def search(pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS) -
 
 
 def _cut(contacts: Pivots, at: Array, loads: Loads, p: Array) -> Array:
-    """(n,) the part of a step p that does not go too far."""
+    """(n,) the part of a step p to take, so that it does not go too far."""
     begin, size = contacts.slope(at, loads, p), np.ones(at.shape[1])
     far = np.ones(at.shape[1], dtype=bool)
     for _ in range(CUTS):

@@ -1,8 +1,8 @@
-"""Which effects a scene's trials call for, and the order in which their hooks run.
+"""The effects that trials call for, and the order in which their hooks run.
 
-An effect is a module of `train.simulate.effects` with some of the hooks below. It is imported only
-where a trial calls for it, and its hooks run on the trials that do: each gets the trials and the
-index of those concerned. What all trials do (`base`) has hooks of the same names, which come first.
+An effect is a module of `train.simulate.effects` with some of the hooks named below. It is imported
+only where a trial calls for it. Each hook gets the trials and the index of those that call for its
+effect. `base` has the hooks of all trials, which run first in their stage.
 """
 
 from __future__ import annotations
@@ -26,37 +26,37 @@ from train.simulate.schema import (
 )
 
 Index = Any
-"""Which trials: an array of their numbers, or `ALL`."""
+"""Some of the trials: an array of their places, or `ALL`."""
 ALL = slice(None)
 
 SETUP = (
     "swing",  # the arm in its steady sweep
     "place",  # the object where the sweep meets it, and the columns that can touch
-    "soften",  # what is in series with a taxel
-    "widen",  # when each column is touched
-    "lay",  # the springs of the bed: the last of the effects alone
-    "fill",  # further springs, and what changes these
-    "law",  # the bed's law for the solver: the last of the effects alone
-    "stand",  # how the object stands, and whatever else begins
+    "soften",  # springs in series with a taxel
+    "widen",  # the depth at which each column is touched
+    "lay",  # the springs of the bed
+    "fill",  # further springs
+    "law",  # the bed's law for the solver
+    "stand",  # the object and the state of effects at the start
 )
-PACE = ("pace",)  # before a frame: how many steps it has
-TUNE = ("tune",)  # what depends on the length of a step, whenever that changes
+PACE = ("pace",)  # before a frame: its number of steps
+TUNE = ("tune",)  # terms that depend on the length of a step, whenever that changes
 FRAME = (
-    "locate",  # the contact's coordinates and Jacobian: the last of the effects alone
+    "locate",  # the contact's coordinates and Jacobian
     "reach_along",  # further Jacobians
 )
 STEP = (
-    "predict",  # where arm and object would be without load
-    "drag",  # what holds the object
-    "give_way",  # how the object moves under a load
+    "predict",  # the arm and the object without load
+    "drag",  # the forces that hold the object
+    "give_way",  # the object's compliance
     "press",  # the loads
     "move",  # the object under these loads
     "settle",  # the arm under these loads
 )
 SAMPLE = (
-    "bear",  # what the skin bears, and each row's depth: the last of the effects alone
-    "lean",  # what else bears on the skin
-    "image",  # the load on the taxels: the last of the effects alone
+    "bear",  # the force on the skin, and each row's depth
+    "lean",  # further force on the skin
+    "image",  # the load on the taxels
     "pass_on",  # how it spreads, and what it breaks
 )
 SENSOR = (
@@ -64,31 +64,31 @@ SENSOR = (
     "sensor",  # the readings
 )
 ANSWER = "answer"
-"""The solver of a contact, which `press` asks: the last of the effects alone."""
+"""The solver of a contact, which `press` calls."""
 INSTEAD = ("lay", "law", "locate", ANSWER, "bear", "image")
-"""Hooks of which the last effect that has one takes the place of all others."""
+"""Stages in which a trial runs only one hook: that of its last effect that has one."""
 STAGES = (*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER, *SAMPLE, *SENSOR)
 
 
 @dataclass
 class Call:
-    """A hook, whose it is, and which trials it concerns (n,)."""
+    """A hook, the effect that owns it, and (n,) the trials that call for that."""
 
     owner: str
     function: Callable[..., Any]
     which: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        """The trials as an index, prepared once."""
+        """Prepare the index of these trials."""
         self.index: Index = ALL if self.which.all() else self.which.nonzero()[0]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The hooks that some trials run, and nothing else.
+    """The hooks that trials run.
 
     Attributes:
-        effects: of each trial, in the catalogue's order.
+        effects: the effects of each trial, in the order of `EFFECTS`.
         calls: {effect: (n,) whether a trial calls for it}.
         stages: {stage: its hooks in order}.
     """
@@ -109,7 +109,7 @@ class Plan:
                     call.function(trials, some)
 
     def traces(self, own: dict[str, Any]) -> dict[str, tuple[Any, str]]:
-        """{name: (an effect's state, its attribute)} of what is kept of every frame."""
+        """{name: (an effect's state, its attribute)} of the values kept for every frame."""
         return {
             name: (own[effect], attribute)
             for effect in self.calls
@@ -117,14 +117,14 @@ class Plan:
         }
 
     def also(self, effect: str, i: Index) -> NDArray[np.bool_]:
-        """Which of the trials i call for an effect, too."""
+        """Whether each of the trials i calls for an effect."""
         if effect in self.calls:
             return self.calls[effect][i]
         return np.zeros(len(self.effects), dtype=bool)[i]
 
 
 def module_of(effect: str) -> Any:
-    """An effect's code, loaded here."""
+    """An effect's module, imported on first use."""
     return import_module(f"train.simulate.effects.{effect}")
 
 
@@ -138,7 +138,7 @@ def make_plan(scene: Scene, specs: tuple[TrialSpec, ...]) -> Plan:
 
 
 def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
-    """The plan of trials that call for these effects, each for its own."""
+    """The plan of trials, given the effects of each."""
     calls: dict[str, NDArray[np.bool_]] = {}
     for name in (*SHARED, *EFFECTS):
         wanted = {name, *SHARED.get(name, ())}
@@ -162,13 +162,13 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
 
 
 def settings(scene: Scene, effect: str) -> dict[str, float]:
-    """An effect's settings in a scene."""
+    """An effect's settings in a scene, with defaults."""
     defaults = {k: float(f.default or 0.0) for k, f in EFFECTS[effect].settings.items()}
     return {**defaults, **scene.settings.get(effect, {})}
 
 
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
-    """{effect: what called for it} of one object in one condition, in the catalogue's order."""
+    """{effect: the reason for it} of an object in a condition, in the order of `EFFECTS`."""
     required: dict[str, str] = {}
     for name in IMPLIED_BY_FAMILY.get(item.family, ()):
         required[name] = f"family {item.family}"
@@ -200,10 +200,10 @@ def _supports(item: SceneObject, condition: str, name: str) -> bool:
 
 
 def check_supported(scene: Scene, where: str) -> None:
-    """Refuse a scene that names an effect which none of its objects can have.
+    """Check that each effect that a scene names suits one of its objects.
 
     Raises:
-        InputError: the sentence says what the effect needs.
+        InputError: one does not; the sentence says what it needs.
     """
     for name in scene.leave_out:
         for item in scene.objects:
@@ -214,13 +214,15 @@ def check_supported(scene: Scene, where: str) -> None:
                     f"{where}: effects.leave_out leaves out {name}, without which object "
                     f"{item.name!r} would not be {label or 'movable'}, as its label says"
                 )
-    found = [required_effects(scene, o, c) for o in scene.objects for c in o.conditions]
-    if not scene.inertia and any("inertia" in required for required in found):
+    required_by_object = [
+        required_effects(scene, o, c) for o in scene.objects for c in o.conditions
+    ]
+    if not scene.inertia and any("inertia" in required for required in required_by_object):
         raise InputError(
             f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one number a joint"
         )
     for name in scene.add:
-        if any(name in required for required in found):
+        if any(name in required for required in required_by_object):
             continue
         info = EFFECTS[name]
         needs = []

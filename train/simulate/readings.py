@@ -1,4 +1,4 @@
-"""What the sensors read of a trial, on its way from the load to whole counts."""
+"""A trial's sensor readings on the way from the load to whole counts."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ FULL = 65535.0
 
 @dataclass
 class Readings:
-    """What the sensors read of one trial, all frames at once.
+    """The sensor readings of one trial, all frames at once.
 
-    Most taxels of a skin never bear anything. An effect that leaves those at zero works on the
-    others alone; one that does not asks for all of them (`everywhere`).
+    Most taxels never bear a load. An effect that leaves those at zero works on `counts`; any other
+    effect asks for all taxels (`everywhere`).
 
     Attributes:
-        scene: whose sensors these are.
-        trial: which trial.
-        effects: those that the trial calls for.
+        scene: the scene of these sensors.
+        trial: the trial.
+        effects: the effects that the trial calls for.
         which: the trial's place in its batch.
         t: (frames,) seconds.
-        counts: (frames, taxels), of those that bear something in some frame, or of all.
-        taxels: (taxels,) where on the skin they are: row * cols + column.
+        counts: (frames, taxels) of those that bear a load in some frame, or of all.
+        taxels: (taxels,) their places on the skin, row * cols + column.
         joints: (frames, dof) radians.
-        times: (frames,) seconds, where a clock effect shifts them.
-        kept: (frames,) bool, where frames are lost.
-        valid: (rows, cols) bool, where taxels are known to be dead.
+        times: (frames,) seconds, if a clock effect shifts them.
+        kept: (frames,) whether each frame arrives, if some are lost.
+        valid: (rows, cols) whether each taxel works, if dead ones are known.
     """
 
     scene: Scene
@@ -64,7 +64,7 @@ class Readings:
         return streams.stream(self.scene.seed, effect, self.trial.key, self.trial.number)
 
     def everywhere(self) -> NDArray[Any]:
-        """(frames, rows, cols) counts of all taxels: `counts` has them from here on."""
+        """(frames, rows, cols) counts of all taxels, which `counts` holds from now on."""
         every = np.arange(self.shape[0] * self.shape[1])
         if not np.array_equal(self.taxels, every):
             counts = np.zeros((len(self.counts), len(every)), dtype=self.counts.dtype)

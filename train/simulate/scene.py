@@ -1,4 +1,4 @@
-"""A scene's TOML file, checked: arm, motion, skin, objects, trials, spreads and effects."""
+"""Reads and checks a scene's TOML file: arm, motion, skin, objects, trials, spreads and effects."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from train.simulate.streams import FARTHEST
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
-"""Nm/rad and Nms/rad of j0 to j4: the gains of the lab's impedance controller."""
+"""Nm/rad and Nms/rad of j0 to j4, the gains of the lab's impedance controller."""
 CODY_INERTIA = (0.36, 0.33, 0.03, 0.047, 0.003)
-"""kg m^2 about j0 to j4: rods of 2 kg for upper arm and forearm, the elbow bent as below (the
-arm's masses are not published)."""
+"""kg m^2 about j0 to j4, for upper arm and forearm as rods of 2 kg with the elbow bent as below.
+The arm's masses are not published."""
 CODY_START_DEG = (-44.0, 5.0, 0.0, 42.0, 0.0)
 CODY_RATE_DEG_S = (20.0, 0.0, 0.0, 0.0, 0.0)
-"""A swing of the shoulder at the lab's 20 deg/s with the elbow bent to 42 degrees: there the
-gains above give the 115 N/m at mid-forearm that the lab's arm has."""
+"""The shoulder swings at the lab's 20 deg/s with the elbow bent to 42 degrees. In this posture the
+gains above give the lab arm's 115 N/m at mid-forearm."""
 PLACE_M = 0.103
-"""The middle of Cody's 16 rows, to the millimetre."""
+"""The middle of Cody's 16 rows, rounded to a millimetre."""
 
 COLUMN_ANGLES_DEG = (
     *(-82.05, -67.25, -52.44, -37.22, -22.42, -7.61, 7.61, 22.42, 37.22, 52.44, 67.25, 82.05),
@@ -58,11 +58,11 @@ SCALE: dict[str, Any] = {
 def load(
     path: str | os.PathLike[str], *, seed: int | None = None, count: int | None = None
 ) -> Scene:
-    """Read a scene; `seed` and `count` (trials) take the place of the file's.
+    """The scene of a file; `seed` and `count` (trials) replace the file's.
 
     Raises:
-        InputError: the file cannot be read, a key is unknown, a value makes no sense, or an
-            effect is named that the scene cannot support.
+        InputError: the file cannot be read, a key is unknown, a value is not allowed, or an effect
+            suits none of the objects.
     """
     table = _as_another(path)
     if seed is not None:
@@ -73,8 +73,7 @@ def load(
 
 
 def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """A scene's table; where it is `like` another scene of its folder, with what that one says
-    and this one does not."""
+    """The table of a scene's file, completed from the scene that `like` names in its folder."""
     table = dict(read_toml(path).raw)
     if "like" not in table:
         return table
@@ -84,7 +83,7 @@ def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
     if "like" in out:
         raise InputError(
             f"{os.fspath(path)}: like names {name}, which is itself like another scene; name that "
-            "one, and say here what differs"
+            "scene instead, and give the differences here"
         )
     for key, value in table.items():
         old = out.get(key)
@@ -95,7 +94,7 @@ def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
-    """Check a scene given as the table that TOML gives; `where` names the file in errors.
+    """The scene of a table as TOML gives it; `where` names the file in errors.
 
     Raises:
         InputError: as `load`.
@@ -162,7 +161,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
 def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
     frame = 1.0 / rate_hz
     if table.raw:
-        table.get("base")  # the step of trials without the others named
+        table.get("base")  # the step of trials that call for none of the effects named
     out: dict[str, float] = {}
     for name in filter(table.has, ("base", *EFFECTS)):
         out[name] = table.field(name, schema.STEP)
@@ -174,7 +173,7 @@ def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
 
 
 def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
-    """The chain, and each joint's stiffness, damping and inertia (none where not known)."""
+    """The chain, and each joint's stiffness, damping and inertia, which may be unknown."""
     name = table.text("chain", "cody")
     path = Path(table.where).parent / name
     if name == "cody":
@@ -204,13 +203,13 @@ def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
 def _motion(
     table: SceneTable, chain: Chain, skin: SkinLayout
 ) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
-    """Start and rate of each joint, in radians, the stroke's time, and where the skin is met."""
+    """Start and rate of each joint in radians, seconds of travel, and the place of the contact."""
     start, rate = (
         table.numbers(key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0)
         for key, cody in (("start_deg", CODY_START_DEG), ("rate_deg_s", CODY_RATE_DEG_S))
     )
     if not any(rate):
-        raise table.fail("rate_deg_s", "such that the arm reaches an object", rate)
+        raise table.fail("rate_deg_s", "not all 0, so that the arm reaches an object", rate)
     for joint, limits, angle in zip(chain.names, chain.limits, start, strict=True):
         if limits is not None:
             low, high = (math.degrees(limit) for limit in limits)
@@ -233,7 +232,7 @@ def _last_row_m(skin: SkinLayout) -> float:
 def _stroke(
     chain: Chain, start: tuple[float, ...], rate: tuple[float, ...], travel_s: float
 ) -> float:
-    """Seconds for which a joint's equilibrium point moves: until the last has reached its limit."""
+    """Seconds until the last moving joint's equilibrium point stops at its limit."""
     ends = []
     for limits, angle, speed in zip(chain.limits, start, rate, strict=True):
         if speed and limits is not None:
@@ -245,10 +244,10 @@ def _stroke(
 
 def _skin(table: SceneTable) -> tuple[SkinLayout, Value]:
     given = {key: table.get(key, default) for key, default in (CODY_SKIN | SCALE).items()}
-    # Fewer than three columns around the forearm may all look away from what it meets.
+    # Fewer than three columns around the forearm may all face away from an object.
     cols = table.whole("cols", CODY_SKIN["cols"], range(3, 1001))
     if not table.has("column_angles_deg") and cols != CODY_SKIN["cols"]:
-        # Evenly around the forearm, where the file gives their number alone.
+        # Columns lie evenly around the forearm where the file gives only their number.
         angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
         given["column_angles_deg"] = [a if a < 180.0 else a - 360.0 for a in angles]
         if not table.has("pitch_m"):
@@ -283,12 +282,12 @@ def _objects(
         if not item.slug:
             raise table.fail("name", "text with a letter or a digit")
         if slugs.count(item.slug) > 1:
-            raise table.fail("name", "of one object only")
+            raise table.fail("name", "different from every other object's")
     return objects
 
 
 def _named(top: SceneTable, key: str) -> Iterator[SceneTable]:
-    """The tables of a list, which errors call by their names."""
+    """The tables of a list; errors call each by its name."""
     for table in top.tables(key, key) if top.get(key, []) != [] else ():
         yield SceneTable(table.raw, top.where, f"{key} {table.text('name')!r}: ")
 
@@ -301,7 +300,7 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
         raise table.fail("conditions", "fixed, movable or both")
     own = schema.FAMILY_KEYS[family]
     values: dict[str, Value] = {}
-    # What the scene spreads around 0 differs in trials of an object that is silent of it, too.
+    # A spread around 0 also applies to an object that gives no value for it.
     differs = {
         key
         for key, needed in schema.SPREAD_OF_MOVABLE.items()
@@ -314,7 +313,7 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
             default = 0.0
         if table.has(key) or default is not None:
             values[key] = table.value(key, limits, default)
-    if "stem_count" in own and table.has("stem_count"):  # a family's range is drawn by now
+    if "stem_count" in own and table.has("stem_count"):  # a family has drawn from its range by now
         table.field("stem_count", schema.OBJECT["stem_count"])
     if "movable" in conditions:
         for key in ("mass_kg", "friction_static", "friction_kinetic"):
@@ -344,5 +343,5 @@ def _effects(
     table.done()
     add = (*add, *(name for name in settings if name not in add))
     for name in set(add) & set(leave_out):
-        raise table.fail("leave_out", f"without {name}, which effects.add adds")
+        raise table.fail("leave_out", f"a list without {name}, which effects.add adds")
     return add, leave_out, settings

@@ -1,4 +1,4 @@
-"""A scene, checked: its objects, all that its trials share, and the table that it is read from."""
+"""A checked scene: its objects, the values that its trials share, and the table it is read from."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from train.simulate.schema import Field
 
 @dataclass(frozen=True)
 class Value:
-    """A number of a scene: the same in every trial, or drawn evenly between two limits."""
+    """A number of a scene, either fixed or drawn uniformly between two limits."""
 
     low: float
     high: float
 
     @property
     def middle(self) -> float:
-        """The value of a trial without variation."""
+        """The value halfway between the limits."""
         return 0.5 * (self.low + self.high)
 
     @property
     def varies(self) -> bool:
-        """Whether it is drawn anew in each trial."""
+        """Whether each trial draws its own."""
         return self.high > self.low
 
 
 class SceneTable(ConfigTable):
-    """A table of a scene, its numbers as the schema declares them."""
+    """A table of a scene, which checks numbers against the schema."""
 
     def field(self, key: str, field: Field, default: float | None = None) -> float:
-        """The number of a field; `default` takes the place of the field's own."""
+        """The number of a field; `default` replaces the field's own."""
         value = field.default if default is None else default
         if field.whole:
             allowed = range(int(field.low), int(field.high) + 1)
@@ -43,13 +43,13 @@ class SceneTable(ConfigTable):
         return self.number(key, value, field.low, field.high, open_low=field.open_low)
 
     def fields(self, known: Mapping[str, Field]) -> dict[str, float]:
-        """The numbers of a table that has no other keys."""
+        """The numbers of a table that may have no other keys."""
         out = {key: self.field(key, field) for key, field in known.items()}
         self.done()
         return out
 
     def value(self, key: str, field: Field, default: object = None) -> Value:
-        """A field's number, or a range of two."""
+        """A field's number, or its range [low, high]."""
         given = self.get(key, field.default if default is None else default)
         ends = given if isinstance(given, list) else [given, given]
         if len(ends) != 2:
@@ -62,7 +62,7 @@ class SceneTable(ConfigTable):
         return Value(low, high)
 
     def names(self, key: str, allowed: tuple[str, ...], default: object = ()) -> tuple[str, ...]:
-        """A list of some of the names allowed, none twice."""
+        """A list of different names, each of which is allowed."""
         names = self.texts(key, default)
         if not set(names) <= set(allowed) or len(set(names)) != len(names):
             raise self.fail(key, f"a list of different names out of {', '.join(allowed)}")
@@ -78,11 +78,11 @@ class SceneObject:
     conditions: tuple[str, ...]
     values: dict[str, Value]
     given: frozenset[str]
-    """Keys that the file gives; the others are the family's."""
+    """Keys that the file gives; the other values are the family's defaults."""
 
     @cached_property
     def slug(self) -> str:
-        """The name, fit for a file."""
+        """The name in a form that suits a file name."""
         return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
 
 
@@ -91,10 +91,10 @@ class Cylinder:
     """The skin's shape: `rows` rings of `cols` taxels around a forearm.
 
     Attributes:
-        radius_m: of the forearm.
-        row_pitch_m, column_pitch_m: from taxel to taxel, along and around.
-        row0_z_m: z of the first row in the skin's link; the next rows lie below it.
-        column_angles_deg: where the columns' normals point.
+        radius_m: radius of the forearm.
+        row_pitch_m, column_pitch_m: distance between taxels along and around the forearm.
+        row0_z_m: z of the first row in the skin's link; further rows have lower z.
+        column_angles_deg: directions of the columns' normals.
     """
 
     rows: int
@@ -108,31 +108,31 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class TrialSpec:
-    """Which trial is to be simulated: an object, its condition, and a number that seeds it."""
+    """A trial to simulate: an object, its condition, and a number that seeds it."""
 
     object: SceneObject
     condition: str
     number: int
     step_s: float = 0.01
-    """The physics' step; a whole number of them makes a frame."""
+    """Length of a physics step; a frame has a whole number of them."""
     attempt: int = 0
-    """How often the trial was drawn before, and contradicted its label."""
+    """Number of earlier draws of this trial, which contradicted its label."""
 
     @property
     def key(self) -> str:
-        """Names the object and its condition in streams and files."""
+        """The name of the object and its condition in streams and files."""
         return f"{self.object.slug}-{self.condition}"
 
 
 @dataclass(frozen=True)
 class Scene:
-    """All that a simulation needs; `load` reads it from TOML."""
+    """Everything that a simulation needs; `scene.load` reads it from TOML."""
 
     name: str
     seed: int
     trials: dict[str, float]
     step_s: dict[str, float]
-    """{effect, or `base`: the largest step that its trials may take}; empty: to be measured."""
+    """{effect, or `base`: the longest step of its trials}; empty where the step is measured."""
     lead: Value
     arm: Chain
     stiffness: tuple[float, ...]
@@ -140,18 +140,18 @@ class Scene:
     inertia: tuple[float, ...]
     """(dof,) kg m^2 of each joint."""
     start: tuple[float, ...]
-    """(dof,) radians, the equilibrium point at t = 0."""
+    """(dof,) radians of the equilibrium point at t = 0."""
     rate: tuple[float, ...]
-    """(dof,) rad/s."""
+    """(dof,) rad/s of the equilibrium point."""
     travel_s: float
-    """How long the equilibrium point moves."""
+    """Seconds for which the equilibrium point moves."""
     skin: SkinLayout
     taxel_n_m: Value
     place_m: float
     """z in the skin's link of the point that meets the object."""
     spread: dict[str, float]
     labels: dict[str, float]
-    """When a label must show, and how."""
+    """When and by how much an object must do as its label says."""
     objects: tuple[SceneObject, ...]
     add: tuple[str, ...]
     leave_out: tuple[str, ...]
@@ -159,12 +159,12 @@ class Scene:
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """The arm's."""
+        """The arm's kinematics."""
         return Kinematics(self.arm)
 
     @cached_property
     def cylinder(self) -> Cylinder:
-        """The skin's shape; `load` has made sure that it is a cylinder."""
+        """The skin's shape; `scene.load` has checked that it is a cylinder."""
         skin = self.skin
         radius, angles, pitch = skin.radius_m, skin.column_angles_deg, skin.pitch_m
         along, around = pitch if isinstance(pitch, tuple) else (pitch, pitch)
@@ -176,5 +176,5 @@ class Scene:
 
     @property
     def count(self) -> int:
-        """Trials of each object in each condition."""
+        """Number of trials of each object in each condition."""
         return int(self.trials["count"])

@@ -1,4 +1,4 @@
-"""What a scene file may say: keys, units, limits, defaults, and the effects there are."""
+"""The keys of a scene file with their limits and defaults, and the table of all effects."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene: where it must lie, and what it is where the file is silent."""
+    """A number of a scene: its limits, and its default where the file does not give it."""
 
     low: float
     high: float
     default: float | None
     says: str
     open_low: bool = False
-    """The lower limit itself is not allowed."""
+    """Whether the lower limit itself is excluded."""
     whole: bool = False
 
 
 @dataclass(frozen=True)
 class EffectInfo:
-    """An effect without its code, which is loaded only where a scene calls for it."""
+    """The entry of an effect; its code is loaded only where a scene calls for it."""
 
     says: str
     stage: str
-    """`contact` (part of the step), `sensor` (on the frames) or `clock` (on their times)."""
+    """`contact` (acts in the step), `sensor` (on the frames) or `clock` (on their times)."""
     settings: dict[str, Field] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
-    """Effects without which it means nothing."""
+    """Effects that it builds upon."""
     families: tuple[str, ...] = ()
-    """Object families that support it; empty for all."""
+    """Object families that can have it; empty for all."""
     keys: tuple[str, ...] = ()
-    """Object keys without which it means nothing; giving one of them calls for it."""
+    """Object keys that it needs; an object with all of them calls for it."""
 
 
 RIGID, FOAM, PILLOW, BUBBLES, FOLIAGE = "rigid", "foam", "pillow", "bubbles", "foliage"
@@ -43,20 +43,20 @@ TRIALS = {
     "count": Field(1, 1_000_000, 5, "trials of each object in each condition", whole=True),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
-    "tolerance": Field(1e-5, 0.5, 0.01, "what the step may cost, as a part of the peak force"),
+    "tolerance": Field(1e-5, 0.5, 0.01, "error allowed to the step, as a part of the peak force"),
 }
 LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
 TAXEL = Field(0.0, 1e15, 10_000.0, "stiffness of a taxel in N/m", open_low=True)
-"""Of 1e16 N/m the depths that bear a touch are below the rounding of a metre."""
+"""At 1e16 N/m the depth of a touch is below the rounding error of a metre."""
 LABELS = {
-    "window_s": Field(0.01, 60.0, 1.2, "time after the first touch within which a label shows"),
-    "push_n": Field(0.1, 1e6, 6.0, "moves each movable object that a [[family]] gives"),
-    "slides_m": Field(0.0, 1.0, 0.02, "what is called movable moves at least this far by then"),
-    "yields": Field(0.0, 1.0, 0.01, "what is soft yields by then, as a part of its thickness"),
+    "window_s": Field(0.01, 60.0, 1.2, "time after the first touch in which labels are judged"),
+    "push_n": Field(0.1, 1e6, 6.0, "push that moves every movable object of a [[family]]"),
+    "slides_m": Field(0.0, 1.0, 0.02, "a movable object moves at least this far by then"),
+    "yields": Field(0.0, 1.0, 0.01, "a soft object yields by then, as a part of its thickness"),
 }
 SPREAD = {
-    "place_m": Field(0.0, 0.08, 0.0, "where along the forearm the object is met"),
-    "aside_m": Field(0.0, 0.5, 0.0, "how far beside its middle an object is pushed"),
+    "place_m": Field(0.0, 0.08, 0.0, "place along the forearm where the object is met"),
+    "aside_m": Field(0.0, 0.5, 0.0, "distance of the push from the object's middle"),
     "slope_deg": Field(0.0, 10.0, 0.0, "of the table, along the push"),
     "yaw_deg": Field(0.0, 30.0, 0.0, "angle between the object's face and the forearm"),
     "roll_deg": Field(0.0, 60.0, 0.0, "forearm roll: which columns touch"),
@@ -66,7 +66,8 @@ SPREAD = {
     "cover": Field(0.0, 1.0, 0.0, "of the skin's and the cover's stiffness, as a part"),
 }
 SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
-"""Spreads around 0 of what a movable object may be silent of, where it has this other key."""
+"""{spread around 0: the other key that a movable object needs for it}; the object need not give
+a value for the spread itself."""
 OBJECT = {
     "mass_kg": Field(0.0, 1e12, None, "kilograms", open_low=True),
     "friction_static": Field(0.0, 5.0, None, "mu_s"),
@@ -78,7 +79,7 @@ OBJECT = {
     "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
     "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
     "foot_m": Field(0.0, 10.0, None, "diameter of the object's foot", open_low=True),
-    "aside_m": Field(-1.0, 1.0, None, "how far beside its middle the object is pushed"),
+    "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
     "slope_deg": Field(-20.0, 20.0, None, "of what the object stands on, uphill along the push"),
     "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
     "modulus_pa": Field(0.0, 1e18, None, "of the elastic foundation", open_low=True),
@@ -114,33 +115,35 @@ FAMILY_KEYS: dict[str, dict[str, float]] = {
         "stem_kg": 0.02,
     },
 }
-"""Keys that belong to one family alone, with what they are where the object is silent: a
-middling thing of the family."""
+"""{family: {key that no other family has: its default}}, a typical object of the family."""
 
 
 def keys_of(family: str) -> tuple[str, ...]:
-    """The keys of `OBJECT` that an object of this family may have."""
+    """The keys of `OBJECT` that an object of a family may have."""
     others = {key for name, keys in FAMILY_KEYS.items() if name != family for key in keys}
     return tuple(key for key in OBJECT if key not in others - set(FAMILY_KEYS[family]))
 
 
 THICKNESS = {FOAM: "depth_m", PILLOW: "depth_m", BUBBLES: "bubble_m", FOLIAGE: "stem_slip_m"}
-"""How far each soft family could yield."""
+"""{soft family: the key of the depth to which it can yield}."""
 ELASTIC = (FOAM, PILLOW)
 EFFECTS: dict[str, EffectInfo] = {
-    # In the order in which they take their place in the step and on the frames.
+    # Effects run in this order, in the step and on the frames.
     "foundation": EffectInfo("elastic foundation under each taxel", "contact", families=ELASTIC),
     "lateral": EffectInfo(
-        "foam that pulls its neighbourhood along: an elastic layer",
+        "foam that behaves as an elastic layer, not as separate springs",
         "contact",
         needs=("foundation",),
         families=ELASTIC,
     ),
     "bottoming": EffectInfo(
-        "foam that is pressed flat", "contact", needs=("foundation",), families=ELASTIC
+        "foam that stiffens as it is pressed flat",
+        "contact",
+        needs=("foundation",),
+        families=ELASTIC,
     ),
     "cover": EffectInfo(
-        "a sleeve over the skin, in series and spreading the load",
+        "a sleeve over the skin, in series, that spreads the load",
         "contact",
         keys=("cover_n_m",),
     ),
@@ -157,7 +160,7 @@ EFFECTS: dict[str, EffectInfo] = {
     ),
     "relaxation": EffectInfo("standard linear solid", "contact", families=ELASTIC),
     "inertia": EffectInfo(
-        "the arm's inertia: it hits, lifts off and comes down again",
+        "the arm's inertia: it hits and bounces",
         "contact",
         {"loss_s": Field(0.0, 1.0, 0.0015, "the skin's dashpot, as a part of its stiffness")},
     ),
@@ -172,7 +175,7 @@ EFFECTS: dict[str, EffectInfo] = {
         "a table that is not level", "contact", needs=("sliding",), keys=("slope_deg",)
     ),
     "turning": EffectInfo(
-        "a push beside the middle turns what it moves",
+        "a push beside the middle turns the object",
         "contact",
         needs=("sliding",),
         keys=("aside_m", "foot_m"),
@@ -181,7 +184,7 @@ EFFECTS: dict[str, EffectInfo] = {
         "friction that falls with speed", "contact", needs=("sliding",), keys=("stribeck_m_s",)
     ),
     "tipping": EffectInfo(
-        "tips over its edge where that takes less than sliding",
+        "the object tips over its edge where that takes less force than sliding",
         "contact",
         needs=("sliding",),
         keys=("base_m", "height_m"),
@@ -192,12 +195,12 @@ EFFECTS: dict[str, EffectInfo] = {
         {"part": Field(0.0, 0.2, 0.02, "of each of the four neighbours")},
     ),
     "hysteresis": EffectInfo(
-        "the reading lags behind the load, either way",
+        "the reading lags behind the load as it rises and falls",
         "sensor",
         {"counts": Field(0.0, 65535, 30.0, "half the width of the loop")},
     ),
     "drift": EffectInfo(
-        "a baseline that wanders, its own for each taxel",
+        "a baseline that drifts, differently for each taxel",
         "sensor",
         {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of the taxels' slopes")},
     ),
@@ -249,10 +252,10 @@ IMPLIED_BY_FAMILY = {
 }
 IMPLIED_BY_CONDITION = {"movable": ("sliding",)}
 SHARED = {"viscous": ("relaxation", "inertia")}
-"""{module of `effects` that several effects build upon: these}."""
+"""{module of `effects`: the effects that share it}."""
 LABELLED_BY = {
     "foundation": {FOAM: "soft", PILLOW: "soft"},
     "pop": {BUBBLES: "soft"},
     "stems": {FOLIAGE: "soft"},
 }
-"""{effect: {family: the label that it makes true}}."""
+"""{effect: {family: the label that rests on it}}."""

@@ -1,4 +1,4 @@
-"""Random numbers that stay where they are: one stream per name, condition and trial."""
+"""Random numbers in one stream for each name, condition and trial."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 FARTHEST = 2.5
-"""Deviations from the middle that a normal draw lies at most."""
+"""Largest distance of a normal draw from the mean, in deviations."""
 
 
 @cache
 def key(name: str) -> tuple[int, int]:
-    """Two 32-bit words that stand for `name` on every machine and in every run."""
+    """Two 32-bit words that identify `name` on every machine and in every run."""
     digest = hashlib.sha256(name.encode()).digest()
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
 
@@ -23,8 +23,8 @@ def key(name: str) -> tuple[int, int]:
 def stream(seed: int, name: str, condition: str, trial: int | None = None) -> np.random.Generator:
     """The stream of `name` in one trial of `condition`; without `trial`, of the condition.
 
-    Streams are told apart by name, never by position: adding an effect, an object or a trial
-    leaves the draws of all others as they were.
+    A stream depends on its name, never on its position: a further effect, object or trial changes
+    no draw of the others.
     """
     words = (*key(name), *key(condition), *(() if trial is None else (trial,)))
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=words)))
@@ -33,7 +33,7 @@ def stream(seed: int, name: str, condition: str, trial: int | None = None) -> np
 def draws(
     seed: int, names: list[str], condition: str, trials: NDArray[np.int64], kind: str
 ) -> NDArray[np.float64]:
-    """(names, n), a draw for each trial: the trial-th of the condition's stream of each name.
+    """(names, n) draws: for each name, the trial-th number of the condition's stream.
 
     Args:
         trials: (n,) trial numbers, 0 and up.
@@ -48,7 +48,7 @@ def draws(
 
 @cache
 def quantiles(deviation: float = 1.0) -> NDArray[np.float32]:
-    """The normal law in 65,536 equal parts, from -4.3 to 4.3 deviations."""
+    """Normal quantiles of 65,536 equal parts, from -4.3 to 4.3 deviations."""
     upper = map(NormalDist().inv_cdf, ((np.arange(32768) + 32768.5) / 65536.0).tolist())
     parts = np.array(list(upper), dtype=np.float32)
     return np.concatenate([-parts[::-1], parts]) * np.float32(deviation)
@@ -61,13 +61,13 @@ def add_drawn(
     places: NDArray[np.intp],
     length: int,
 ) -> None:
-    """Add to each number one of a table of 65,536 (`quantiles`), by 16 random bits: several times
-    faster than `standard_normal`, and finer than any taxel's reading.
+    """Add to each number an entry of a table of 65,536 (`quantiles`), chosen by 16 random bits.
+
+    This is several times faster than `standard_normal`, and finer than any taxel's reading.
 
     Args:
-        to: (rows, n), of rows that have `length` numbers each.
-        places: (n,) where in a row they are; a place's draws are the same whichever others there
-            are.
+        to: (rows, n) the numbers; each row has `length` of them with those left out.
+        places: (n,) their places in a row. The draws of a place do not depend on the others.
     """
     count = len(to) * length
     words = generator.bit_generator.random_raw(-(-count // 4)).astype("<u8", copy=False)

@@ -1,4 +1,4 @@
-"""The trials that run side by side: arrays whose last axis is the trial."""
+"""The state of trials that run side by side, in arrays whose last axis is the trial."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from train.simulate.plan import ALL, Index, Plan
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
 
 WINDOW_HALF = 6
-"""Columns to either side of the one that meets the object: +-90 degrees, beyond which a
-cylinder has no more surface to press."""
+"""Columns on either side of the one that meets the object: +-90 degrees, beyond which a cylinder
+has no surface to press."""
 
 
 def pick(values: NDArray[Any], i: Index) -> NDArray[Any]:
-    """The values (..., n) of some trials, to read; of all of them it is the array itself."""
+    """The values (..., n) of some trials, to read; for `ALL`, the array itself."""
     return values if i is ALL else values.take(i, axis=-1)
 
 
@@ -27,43 +27,46 @@ def pick(values: NDArray[Any], i: Index) -> NDArray[Any]:
 class Trials:
     """n trials of a scene, from the setup to their last step.
 
-    The attributes below are what all trials have. An effect keeps state of its own in `own`, a
-    small dataclass whose arrays end in the trial axis too; without the effect it does not exist.
+    These attributes belong to all trials. An effect keeps its own state in `own`, as a small
+    dataclass whose arrays also end in the trial axis; without the effect it does not exist.
 
     Attributes:
-        values: {name: (n,)} of what was drawn for each trial.
-        plan: the hooks that run.
+        values: {name: (n,)} the values drawn for each trial.
+        plan: the hooks to run.
         own: {effect: its state}.
-        usual, steps, left: (n,) of a frame: its steps where nothing happens, its steps now, and
-            those that are still to come. Each trial has a clock of its own.
-        frame, t, h: (n,) frames ended, seconds now, and seconds of a step.
+        usual, steps, left: (n,) number of steps of a frame away from jolts, of the present frame,
+            and those still to come.
+        frame, t, h: (n,) number of frames ended, seconds now, and seconds of a step. Each trial has
+            its own clock.
         start, rate, travel_s: (dof, n), (dof, 1), (dof, n): the equilibrium point's angles at
             t = 0, its speed, and for how long it moves.
         lag: (dof, 1) radians by which a joint trails its equilibrium point in free motion.
         damping, joint_k: (dof, 1) of each joint.
-        held, give: (dof, n) what holds a joint within a step, and the compliance of all that.
+        held, give: (dof, n) stiffness of a joint's damping and inertia within a step, and the
+            compliance of the joint with it.
         q, q_free, q_frame: (dof, n) joint angles: now, after the step without load, at the frame.
         point, normal, face, along_face: (3, n) the point of the forearm's axis beside the
             contact; of the object's face its normal, a point, and its direction along the forearm.
         z: (n,) metres in the skin's link, where the object is met.
         y, y_frame, depth, loads: (2, n) the contact's coordinates (`contact`) without load, at the
-            frame and under load, and the loads.
+            frame and under load, and its loads.
         soft: (n,) metres that the object gives way for each newton in this step.
-        compliance: (3, n) of the arm in them; jacobian: (dof, 2, n) how the joints move them.
-        row_z: (rows, 1) metres in the skin's link, of its rows.
-        columns: (C, n) of the skin that can touch; column_gaps: (C, n) metres that each lies
-            back at zero depth; reach: (C, n) the part of it that the face can touch.
-        taxel_k: (n,) newtons a metre of a taxel and what is in series with it.
-        gaps, stiffness: (S, n) the springs of a row: metres at which each is touched, newtons a
-            metre; a trial of fewer springs has some at infinity, of no stiffness.
+        compliance, jacobian: (3, n), (dof, 2, n) the arm's compliance in these coordinates, and how
+            the joints move them.
+        row_z: (rows, 1) metres of each row in the skin's link.
+        columns, column_gaps, reach: (C, n) the skin's columns that can touch, the gap of each in
+            metres at zero depth, and the part of it that the face can touch.
+        taxel_k: (n,) newtons a metre of a taxel with the springs in series.
+        gaps, stiffness: (S, n) the springs of a row: metres at which each is touched, and newtons a
+            metre. A trial of fewer springs has some at infinity, of no stiffness.
         law_gaps, slopes, intercepts: (E, n) a bed's law max_s (K_s a - B_s), by its gaps.
         weight, line_gap, line_depth: (rows, n) the part of each row that the face covers, metres
-            by which the face draws back there, and how deep it is pressed.
-        row_force: (rows, n) newtons that the rows bore in the last step; a forearm that does not
-            pivot has the whole in its first row.
-        lost: (n,) whether a contact's loads were not found.
-        force, deepest, inside: (n,) of a frame: the newtons borne, the depth of its deepest row,
-            and the same of the nearest row where none touches, below 0.
+            by which the face draws back there, and metres of its depth.
+        row_force: (rows, n) newtons on each row in the last step; where the forearm does not pivot,
+            the first row holds the sum.
+        lost: (n,) whether the solver failed to find a contact's loads.
+        force, deepest, inside: (n,) at a frame: newtons on the skin, depth of the deepest row, and
+            the same but negative where no row touches.
         image: (rows, C, n) newtons on each taxel.
     """
 
@@ -74,7 +77,7 @@ class Trials:
     own: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Zeros for all that is said above."""
+        """Fill the attributes above with zeros."""
         skin, n, dof = self.skin, len(self.specs), len(self.scene.stiffness)
         rate_hz, zeros = self.scene.trials["rate_hz"], np.zeros
         self.n, self.rate_hz = n, rate_hz
@@ -92,7 +95,6 @@ class Trials:
         self.q, self.q_free, self.q_frame = zeros((3, dof, n))
         self.point, self.normal, self.face, self.along_face = zeros((4, 3, n))
         self.axes, self.origins, self.jacobian = *zeros((2, 3, dof, n)), zeros((dof, 2, n))
-        self.along = zeros((3, n))
         self.y, self.y_frame, self.depth, self.loads = zeros((4, 2, n))
         self.compliance = zeros((3, n))
         self.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
@@ -121,14 +123,14 @@ class Trials:
         return np.asarray(pick(self.start, i) + moved)
 
     def add_springs(self, i: Index, gaps: Array, stiffness: Array) -> None:
-        """Put further springs (S, n of i) into each row's bed, of some trials."""
-        more, none = np.full((len(gaps), self.n), np.inf), np.zeros((len(gaps), self.n))
-        more[:, i], none[:, i] = np.where(stiffness > 0.0, gaps, np.inf), stiffness
+        """Add springs (S, n of i) to each row of some trials."""
+        more, added = np.full((len(gaps), self.n), np.inf), np.zeros((len(gaps), self.n))
+        more[:, i], added[:, i] = np.where(stiffness > 0.0, gaps, np.inf), stiffness
         self.gaps = np.concatenate([self.gaps, more])
-        self.stiffness = np.concatenate([self.stiffness, none])
+        self.stiffness = np.concatenate([self.stiffness, added])
 
     def obey(self, i: Index, gaps: Array, stiffness: Array) -> NDArray[np.intp]:
-        """Give some trials the law of springs (E, n of i); (E, n of i) their order by depth."""
+        """Give some trials the law of springs (E, n of i); returns the springs' order by depth."""
         order, gaps, stiffness = by_depth(gaps, stiffness)
         short = len(gaps) - len(self.law_gaps)
         if short > 0:
@@ -144,16 +146,16 @@ class Trials:
         """(2, n of i) the loads of some trials' contacts.
 
         Args:
-            y, c: (n of i) the depth without load, and metres that it gives way for each newton, in
-                place of the trials' own.
+            y, c: (n of i) depth without load, and metres that it gives way for each newton, instead
+                of the trials' own.
         """
         calls = self.plan.stages["answer"]
         if len(calls) == 1:
             return np.asarray(calls[0].function(self, i, y, c))
         trials = np.arange(self.n) if i is ALL else i
-        found = np.zeros((2, len(trials)))
+        loads = np.zeros((2, len(trials)))
         for call in calls:
             at = call.which[trials].nonzero()[0]
             if at.size:
-                found[:, at] = call.function(self, trials[at], y[at], c[at])
-        return found
+                loads[:, at] = call.function(self, trials[at], y[at], c[at])
+        return loads

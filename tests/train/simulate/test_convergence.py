@@ -20,7 +20,7 @@ OBJECTS = (
 def test_halving_the_step_halves_the_error(condition, keys, add):
     scene = make(one_object(conditions=[condition], width_m=0.05, **keys), *add)
     scene.trials["tolerance"] = 1e-9
-    (found,) = measure(scene, list(kinds(scene).values()), halvings=4)
+    (found,) = measure(scene, list(kinds(scene).values()))
     assert found.errors[-1] < found.errors[0]
     assert 0.6 <= found.order <= 1.0
     assert found.errors[-1] < 0.005

@@ -11,7 +11,8 @@ import pytest
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate.effects import tilt
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, determinant, search
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, determinant, search
+from train.simulate.plan import ALL
 from train.simulate.scene_model import Value
 
 
@@ -30,7 +31,7 @@ def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
     hard = replace(make(one_object(width_m=0.05), "tilt"), taxel_n_m=Value(1e8, 1e8))
     assert run(hard).force.max() > 0.0
     monkeypatch.setattr(tilt, "GUARDED_ROUNDS", 0)
-    with pytest.raises(EdgeError, match="forearm tilts was not found in 2 trials"):
+    with pytest.raises(EdgeError, match="tilt was not found in 2 trials"):
         run(hard)
 
 
@@ -90,9 +91,10 @@ def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
     """The simulator's answers, searched for from no load."""
     n = len(free[0])
     gaps = springs.gaps
-    groups = [Springs(np.arange(n), gaps[:, None], springs.stiffness[:, None], gaps.min(axis=1))]
+    beds = (ALL, gaps[:, None], springs.stiffness[:, None], gaps.min(axis=1))
     rows = (springs.weight, springs.line_gap, springs.lever)
-    pivots = Pivots(groups, *rows, 1.0, 0.0, np.array(free), np.array(c), determinant(np.array(c)))
+    c = np.array(c)
+    pivots = Pivots(*beds, *rows, 1.0, 0.0, np.array(free), c, determinant(c))
     found = search(pivots, np.zeros((2, n)), guarded_rounds)
     return SimpleNamespace(force=found.loads[0], moment=found.loads[1], lost=found.lost)
 

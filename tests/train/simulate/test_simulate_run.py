@@ -225,7 +225,7 @@ def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):
     )
     assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().err
-    assert "in 2 of them no taxel rises above skin.onset_counts (200): nothing is felt" in told
+    assert "in 2 of them no taxel rises above skin.onset_counts (200), so no touch is felt" in told
 
 
 def test_a_touch_whose_peak_is_the_onset_is_not_felt(demo):
@@ -249,5 +249,5 @@ def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):
     )
     assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().err
-    assert "feather-movable and its like: no step is within trials.tolerance" in told
+    assert "feather-movable and its kind: no step is within trials.tolerance" in told
     assert "feather-fixed" not in told

@@ -105,7 +105,7 @@ def test_values_ranges_and_defaults():
         (
             ("motion",),
             {"rate_deg_s": [0, 0, 0, 0, 0]},
-            "motion.rate_deg_s must be such that the arm reaches",
+            "motion.rate_deg_s must be not all 0, so that the arm reaches",
         ),
         (
             ("motion",),
@@ -134,7 +134,7 @@ def test_values_ranges_and_defaults():
         (
             ("effects", "leave_out"),
             ["tilt"],
-            "effects.leave_out must be without tilt, which effects.add adds",
+            "effects.leave_out must be a list without tilt, which effects.add adds",
         ),
         (
             ("effects", "tilt"),
@@ -222,7 +222,9 @@ def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
 def test_two_objects_of_one_name():
     table = copy.deepcopy(GOOD)
     table["object"] = table["object"] * 2
-    with pytest.raises(InputError, match="object 'box': name must be of one object only"):
+    with pytest.raises(
+        InputError, match="object 'box': name must be different from every other object's"
+    ):
         from_dict(table)
 
 

@@ -172,7 +172,7 @@ class TestFamilies:
         ("change", "says"),
         [
             ({"count": 0}, "count must be a whole number from 1 to 1000, not 0"),
-            ({"mass_kg": [50.0, 60.0]}, r"such that 6 N \(labels.push_n\) move it"),
+            ({"mass_kg": [50.0, 60.0]}, r"low enough that 6 N \(labels.push_n\) move it"),
             ({"friction_static": [0.9, 0.3]}, "lower limit first"),
             ({"colour": 3}, "family 'crate': unknown key colour; allowed: name.*, count"),
             ({"stem_count": 3}, "family 'crate': unknown key stem_count"),

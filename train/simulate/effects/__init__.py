@@ -1,6 +1,5 @@
-"""One module for each effect; a scene that does not call for an effect never loads its module.
+"""One module for each effect, loaded only for a scene that calls for it.
 
-A module has functions named after the stages of `train.simulate.plan`. Those of the physics take
-the trials and the index of the trials concerned, `clock` and `sensor` take the readings of one
-trial.
+A module has hooks: functions named after the stages of `train.simulate.plan`. Hooks of the physics
+take the trials and the index of those concerned; `clock` and `sensor` take one trial's readings.
 """

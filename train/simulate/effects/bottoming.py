@@ -1,9 +1,9 @@
-"""Foam that is pressed flat: its cells close, and what is behind it is felt.
+"""Foam that stiffens as it is pressed flat, until the surface behind it is felt.
 
 An open-celled foam is about linear to two thirds of its thickness (the support factor of the IFD
 test, 65 % over 25 % of compression, is 2 to 2.6; a linear one has 2.6), then stiffens, and is
 solid at 1 - 1.4 times its relative density (Gibson and Ashby, Cellular Solids, 5.2), some 93 %.
-Two more tangents for each column stand for that, so that the bed stays convex and piecewise linear.
+Two more tangents for each column approximate this, so the bed stays convex and piecewise linear.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from train.simulate.plan import Index
 from train.simulate.trials import Trials, pick
 
 CLOSING, CLOSED = 0.65, 0.93
-"""Parts of the thickness at which the cells begin to close, and are closed."""
+"""Compression, as a part of the thickness, at which the cells begin to close and are closed."""
 STIFFER = 5.0
-"""Times its first stiffness between them."""
+"""Stiffness between the two, as a multiple of the initial one."""
 
 
 def fill(t: Trials, i: Index) -> None:
-    """Each column's tangents: the closing cells, then what is behind."""
+    """Add each column's tangents: the closing cells, then the surface behind."""
     gaps, reach = pick(t.column_gaps, i), pick(t.reach, i)
     depth, soft = pick(t.values["depth_m"], i), reach * pick(t.taxel_k, i)
     t.add_springs(

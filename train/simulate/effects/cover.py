@@ -1,4 +1,4 @@
-"""A sleeve over the skin: a spring in series, 1/k = 1/k_skin + 1/k_cover, that spreads load."""
+"""A sleeve over the skin: a spring in series, 1/k = 1/k_skin + 1/k_cover, that spreads the load."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from train.simulate.trials import Trials, pick
 
 
 def soften(t: Trials, i: Index) -> None:
-    """The sleeve in series with what is there."""
+    """Put the sleeve in series with each taxel."""
     t.taxel_k[i] = 1.0 / (1.0 / pick(t.taxel_k, i) + 1.0 / pick(t.values["cover_n_m"], i))
 
 
 def pass_on(t: Trials, i: Index) -> None:
-    """Each neighbour takes its part of a taxel's load; none is lost at the skin's ends."""
+    """Move a part of each taxel's load to its four neighbours; none is lost at the skin's ends."""
     image = pick(t.image, i)
     moved = image * pick(t.values["cover_spread"], i)
     gained = -4.0 * moved

@@ -1,4 +1,4 @@
-"""Each taxel reads a part of what its four neighbours bear; the seam joins first and last."""
+"""Each taxel also reads a part of its four neighbours' load; the last column meets the first."""
 
 from __future__ import annotations
 

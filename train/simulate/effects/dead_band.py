@@ -1,4 +1,4 @@
-"""Small readings are zero, as in the lab's node (below 6 sigma of the rest)."""
+"""Small readings are zero, as in the lab's node (below 6 standard deviations of its noise)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from train.simulate.readings import Readings
 
 
 def sensor(readings: Readings) -> None:
-    """Zero below the band."""
+    """Zero the counts below the band."""
     counts = readings.counts
     counts *= counts >= np.float32(readings.settings("dead_band")["counts"])

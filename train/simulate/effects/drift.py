@@ -1,4 +1,4 @@
-"""A baseline that wanders: each taxel's reading has a slope of its own in each trial."""
+"""A drifting baseline: each taxel's reading has its own slope over time in each trial."""
 
 from __future__ import annotations
 

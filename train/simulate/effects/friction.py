@@ -1,13 +1,12 @@
 """Friction between skin and object: the face holds the skin until it slides along it.
 
-As the forearm swings, its skin is dragged along the object's face, and the shear on it both
-carries a part of the arm's push and loads or lifts what it pushes. Coulomb's law on the skin's
-shear spring: T = K u with abs(T) <= mu F. The normal force in the bound is that of the step
-before, and the pull of the spring is implicit, so that however stiff it is, each step takes less
-than it finds.
+As the forearm swings, its skin is dragged along the object's face. The shear carries a part of the
+arm's push, and presses the object down or lifts it. Coulomb's law holds for the skin's shear
+spring: T = K u with abs(T) <= mu F. F is the normal force of the step before, and the spring is
+implicit, so no stiffness makes energy.
 
-What is soft fits itself to a forearm that lies askew, and presses on it along the forearm's
-normal: there the bound lies about that normal's part along the face.
+A soft object fits itself to a forearm that lies askew, and presses along the forearm's normal. The
+bound then lies around the component of that normal along the face.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ class Shear:
 
     Attributes:
         stiffness: newtons a metre of the skin along the face.
-        fits: (n,) whether what is pushed fits itself to a forearm that lies askew.
-        stretch, pull: (n,) metres, and newtons along the face on the arm against its slip.
-        jacobian: (dof, n) of the skin's place along the face.
-        coupled: (2, n) metres that it gives way for each load of the contact.
-        give: (n,) metres for each newton along the face.
-        before: (dof, n) the joints before the step.
+        fits: (n,) whether the object fits itself to a forearm that lies askew.
+        stretch, pull: (n,) metres of the spring, and its newtons on the arm along the face.
+        jacobian: (dof, n) how the joints move the skin along the face.
+        coupled: (2, n) metres that the skin moves along the face for each load of the contact.
+        give: (n,) metres that it moves for each newton along the face.
+        before: (dof, n) joint angles before the step.
     """
 
     stiffness: float
@@ -48,7 +47,7 @@ class Shear:
 
 
 def stand(t: Trials, i: Index) -> None:
-    """Nothing is held yet."""
+    """Begin with an unstretched skin."""
     n = t.n
     t.own["friction"] = Shear(
         stiffness=settings(t.scene, "friction")["shear_n_m"],
@@ -63,15 +62,15 @@ def stand(t: Trials, i: Index) -> None:
 
 
 def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
-    """The lower and the upper pull that the load of now can hold."""
+    """The lower and the upper limit of the pull under the present load."""
     force, fits = pick(t.loads[0], i), pick(t.own["friction"].fits, i)
-    most, tilt = pick(t.values["skin_friction"], i) * force, pick(t.y_frame[1], i)
+    limit, tilt = pick(t.values["skin_friction"], i) * force, pick(t.y_frame[1], i)
     normal = np.where(fits, -force * tilt / np.sqrt(1.0 - tilt * tilt), 0.0)
-    return normal - most, normal + most
+    return normal - limit, normal + limit
 
 
 def reach_along(t: Trials, i: Index) -> None:
-    """How the skin at the contact moves along the face with the joints."""
+    """Find how the joints move the skin along the face."""
     own = t.own["friction"]
     skin = pick(t.point, i) + t.skin.radius_m * pick(t.normal, i)
     turned = cross(pick(t.along_face, i)[:, None], pick(t.axes, i))
@@ -82,7 +81,7 @@ def reach_along(t: Trials, i: Index) -> None:
 
 
 def predict(t: Trials, i: Index) -> None:
-    """The pull with which the step begins, and what it does to arm and contact."""
+    """Choose the pull of this step, and let arm and contact give way to it."""
     own = t.own["friction"]
     q, q_free, loads = pick(t.q, i), pick(t.q_free, i), pick(t.loads, i)
     jacobian, coupled = pick(own.jacobian, i), pick(own.coupled, i)
@@ -96,7 +95,7 @@ def predict(t: Trials, i: Index) -> None:
 
 
 def drag(t: Trials, i: Index) -> None:
-    """The shear on its face presses what slides to the floor, or lifts it."""
+    """Add the shear to the weight of an object that slides."""
     i = np.arange(t.n)[i][t.plan.also("sliding", i)]
     if i.size:
         lifts = pick(t.own["friction"].pull, i) * pick(t.along_face[2], i)
@@ -105,7 +104,7 @@ def drag(t: Trials, i: Index) -> None:
 
 
 def settle(t: Trials, i: Index) -> None:
-    """The stretch as the step has left it; more than friction holds has slipped."""
+    """Update the stretch; the skin slips where friction cannot hold it."""
     own = t.own["friction"]
     moved = total(pick(own.jacobian, i) * (pick(t.q, i) - pick(own.before, i)))
     low, high = bounds(t, i)
@@ -114,7 +113,7 @@ def settle(t: Trials, i: Index) -> None:
 
 
 def lean(t: Trials, i: Index) -> None:
-    """Askew, the skin bears a part of the shear along its own normal."""
+    """Add the shear's component along the normal of skin that lies askew."""
     i = np.arange(t.n)[i][t.plan.also("tilt", i)]
     force, pull = pick(t.force, i), pick(t.own["friction"].pull, i)
     leant = np.maximum(force - pull * pick(t.depth[1], i), 0.0)

@@ -1,4 +1,4 @@
-"""The reading lags behind the load by half a loop's width, either way (the play operator of
+"""The reading lags half a loop's width behind a rising and a falling load (the play operator of
 Prandtl's hysteresis model)."""
 
 from __future__ import annotations

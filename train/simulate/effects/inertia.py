@@ -1,14 +1,14 @@
-"""The arm's inertia: it hits, lifts off and comes down again before it presses steadily.
+"""The arm's inertia: the arm hits, bounces and then presses steadily.
 
-Each joint obeys I q'' + d q' + k (q - q_eq) = -J^T F, by backward Euler in closed form: inertia
-adds I / h^2 to what holds a joint, and its speed to where the joint would be without load. How
-high the arm bounces is the skin's own loss, a dashpot of `loss_s` times its stiffness beside each
-taxel's spring (Kelvin and Voigt; `viscous`): a mass m on a stiffness K then has the damping ratio
-loss_s sqrt(K / m) / 2. Inertia between joints is left out.
+Each joint obeys I q'' + d q' + k (q - q_eq) = -J^T F, solved by backward Euler in closed form.
+Inertia adds I / h^2 to the joint's stiffness within a step, and the joint's speed to its position
+without load. The skin's loss limits the bounce: a dashpot of `loss_s` times the stiffness beside
+each taxel's spring (Kelvin and Voigt; `viscous`). A mass m on a stiffness K then has the damping
+ratio loss_s sqrt(K / m) / 2. Inertia between joints is left out.
 
-A rigid thing is hit for less than a frame, and only short steps show that; Newmark's rules of
-second order were no better there (they ring, or damp as this does). So steps are shorter where a
-touch is near and for a while after each jolt, and as long as the scene says elsewhere.
+A hit on a rigid object is shorter than a frame, so only short steps resolve it. Newmark's rules of
+second order are no better: they ring, or damp as much. So steps are shorter when a touch is near
+and for a while after each jolt, and of the scene's length elsewhere.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from train.simulate.plan import Index, settings
 from train.simulate.trials import Trials, pick
 
 FINER = 8
-"""Times as many steps as usual has a frame near a jolt."""
+"""Steps of a frame near a jolt, as a multiple of the usual number."""
 JOLT = 0.1
-"""Change of the force's slope from frame to frame, as a part of the peak so far, that makes a jolt:
-the arm has been hit, or let go of."""
+"""A larger change of the force's slope between frames, as a part of the peak so far, is a jolt: the
+arm has been hit or released."""
 LASTS_S = 0.02
-"""Seconds for which steps stay short after it."""
+"""Seconds for which steps stay short after a jolt."""
 NEAR = 1.5
-"""Frames that a touch is away, at the speed of the last."""
+"""A touch is near if it comes within so many frames at the present speed."""
 
 
 @dataclass
 class Momentum:
-    """The arm's motion, and how finely it is followed.
+    """The arm's motion, and the state that decides how finely it is followed.
 
     Attributes:
         inertia: (dof, 1) kg m^2 of each joint.
-        speed, before: (dof, n) rad/s, and the joint angles before the step.
+        speed, before: (dof, n) rad/s of each joint, and its angle before the step.
         weight: (dof, n) I / h.
-        left: (n,) frames that will still have finer steps.
-        depth, force, change, peak: (n,) seen of the frames before.
+        left: (n,) number of further frames with finer steps.
+        depth, force, change, peak: (n,) of the last frame, and the peak of all so far.
     """
 
     inertia: Array
@@ -59,7 +59,7 @@ class Momentum:
 
 
 def swing(t: Trials, i: Index) -> None:
-    """The joints move at the equilibrium point's speed."""
+    """Begin with the joints at the speed of the equilibrium point."""
     t.own["inertia"] = Momentum(
         inertia=np.array(t.scene.inertia)[:, None],
         speed=np.repeat(t.rate, t.n, axis=1),
@@ -71,12 +71,12 @@ def swing(t: Trials, i: Index) -> None:
 
 
 def stand(t: Trials, i: Index) -> None:
-    """The dashpot beside the skin's springs."""
+    """Add the dashpot beside the skin's springs."""
     t.own["viscous"].loss_s[i] = settings(t.scene, "inertia")["loss_s"]
 
 
 def pace(t: Trials, i: Index) -> None:
-    """Shorter steps where a touch is near, and for a while after a jolt."""
+    """Shorten the steps when a touch is near, and for a while after a jolt."""
     own, depth, force = t.own["inertia"], pick(t.inside, i), pick(t.force, i)
     closing = np.maximum(depth - pick(own.depth, i), 0.0)
     change, peak = force - pick(own.force, i), np.maximum(pick(own.peak, i), force)
@@ -89,7 +89,7 @@ def pace(t: Trials, i: Index) -> None:
 
 
 def tune(t: Trials, i: Index) -> None:
-    """Inertia holds each joint in a step, too."""
+    """Add inertia to the joint's stiffness within a step."""
     own, h = t.own["inertia"], pick(t.h, i)
     weight = own.inertia / h
     held = pick(t.held, i) + weight / h
@@ -98,7 +98,7 @@ def tune(t: Trials, i: Index) -> None:
 
 
 def predict(t: Trials, i: Index) -> None:
-    """Where the arm would be without load, with its speed."""
+    """Add the joints' speed to their position without load."""
     own = t.own["inertia"]
     further = pick(own.weight, i) * pick(own.speed, i) * pick(t.give, i)
     own.before[:, i] = pick(t.q, i)
@@ -107,6 +107,6 @@ def predict(t: Trials, i: Index) -> None:
 
 
 def settle(t: Trials, i: Index) -> None:
-    """The speed with which the step ended."""
+    """Update the speed at the end of the step."""
     own = t.own["inertia"]
     own.speed[:, i] = (pick(t.q, i) - pick(own.before, i)) / pick(t.h, i)

@@ -1,4 +1,4 @@
-"""Frames come early or late: each shows the load of its own time, and says that time."""
+"""Frames come early or late; each shows the load at its own time, and reports that time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from train.simulate.readings import Readings
 
 
 def clock(readings: Readings) -> None:
-    """Load and joints between the neighbouring frames, at the shifted times."""
+    """Shift the times, and interpolate load and joints between neighbouring frames."""
     counts, joints, t = readings.counts, readings.joints, readings.t
     frame, part = t[1] - t[0], np.zeros(len(t))
     drawn = readings.stream("jitter").standard_normal(len(t) - 2)

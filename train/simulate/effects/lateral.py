@@ -1,4 +1,4 @@
-"""Foam that pulls its neighbourhood along: an elastic layer in place of independent springs.
+"""Foam as an elastic layer, whose surface moves beside the contact too, not as separate springs.
 
 For a smooth body pressed into a layer of thickness H, the load grows with depth as the stiffness
 of a flat strip as wide as the contact: dF/dd = S(a) (a the contact's half width; Barber, Contact
@@ -12,8 +12,8 @@ so a column of taxels at x is touched at the depth at which the contact has beco
 
     d(x) = (1 / R) integral of a (a + 0.55 H) / (a + 0.19 H) from 0 to x,
 
-and from then on adds its foundation; the margin is a spring more a line. The bed stays convex
-and piecewise linear. The pressure is close to a half ellipse at any a / H up to 1.5.
+and from then on adds its foundation. The margin is one more spring in each line. The bed stays
+convex and piecewise linear. The pressure is close to a half ellipse at any a / H up to 1.5.
 """
 
 from __future__ import annotations
@@ -28,34 +28,34 @@ from train.simulate.plan import Index
 from train.simulate.trials import Trials, pick
 
 MARGIN = 0.19
-"""What the flat strip bears beyond the foundation under it, as a width over H."""
+"""Load of the flat strip beyond the foundation under it, as a width over H."""
 SPREAD = 0.55
-"""The same of the load at first touch, which goes with a^2 as on a half space."""
+"""The same for the load at first touch, which grows with a^2 as on a half space."""
 
 
 @dataclass
 class Lateral:
-    """Metres of depth at which a layer's first column is touched, (n,)."""
+    """Depth in metres at which a layer's first column is touched, (n,)."""
 
     nearest: Array
 
 
 def delay(x: Array, depth: Array) -> Array:
-    """How many times metres deeper than on independent springs the layer is touched at x, times
-    R: the integral of a (SPREAD - MARGIN) H / (a + MARGIN H)."""
+    """R times the depth at which the layer is touched at x, beyond that of separate springs: the
+    integral of a (SPREAD - MARGIN) H / (a + MARGIN H)."""
     beside = MARGIN * depth
     return np.asarray((SPREAD - MARGIN) * depth * (x - beside * np.log1p(x / beside)))
 
 
 def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
-    """The depths at which columns are touched that lie `gaps` R (1 - cos theta) back."""
-    # From the cylinder's own gap its x = R sin theta.
+    """The depths at which columns are touched whose gaps are R (1 - cos theta)."""
+    # The cylinder's gap gives x = R sin theta.
     near = np.minimum(gaps, radius)
     return gaps + delay(np.sqrt(near * (2.0 * radius - near)), depth) / radius
 
 
 def widen(t: Trials, i: Index) -> None:
-    """Columns are touched later."""
+    """Columns are touched at a larger depth."""
     gaps = touched_at(pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i))
     t.column_gaps[:, i] = gaps
     if "lateral" not in t.own:
@@ -64,16 +64,16 @@ def widen(t: Trials, i: Index) -> None:
 
 
 def fill(t: Trials, i: Index) -> None:
-    """One more spring a row, touched first, for the foam beside the contact."""
+    """Add one spring to each row, touched first, for the foam beside the contact."""
     width = 2.0 * MARGIN * pick(t.values["depth_m"], i) / t.skin.column_pitch_m
     more = pick(t.taxel_k, i) * width * pick(t.reach, i).any(axis=0)
     t.add_springs(i, np.zeros((1, len(more))), more[None])
 
 
 def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
-    """(rows, n) how steeply the forearm dips into the face's ends, as far as these lie in a row.
+    """(rows, n) slope with which the forearm dips into an end of the face that lies in this row.
 
-    A face that covers all of the skin's first or last row goes on beyond the skin.
+    A face that covers all of the skin's first or last row continues beyond the skin.
     """
     rises = np.diff(depth, axis=0) / pitch_m
     before = np.concatenate([np.floor(weight[:1]), weight[:-1]])
@@ -85,14 +85,14 @@ def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
 
 
 def row_loads(t: Trials, i: Index, wide: Array) -> Array:
-    """What each row bears, up to a factor, with `wide` columns (rows, n) of it in touch.
+    """(rows, n) the load of each row up to a common factor, with `wide` (rows, n) columns touched.
 
-    Across the forearm a row bears as a layer does; along it the rows feel each other as a
-    stretched foundation does whose length is the margin (Pasternak's; Kerr, J. Applied Mechanics
-    31, 1964). Where the forearm lies askew over the end of a face, that end bears the margin
-    squared times the slope more, and rows pressed less deep than the margin times the slope are
-    hardly touched. Against an elastic block by finite elements, askew by 10 and 17 degrees, the
-    highest load of a taxel is within 10 %.
+    Across the forearm a row bears the load of a layer. Along it, rows are coupled as in a stretched
+    foundation whose length is the margin (Pasternak's; Kerr, J. Applied Mechanics 31, 1964). Where
+    the forearm lies askew over the end of a face, that end bears the margin squared times the slope
+    in addition, and rows pressed less deep than the margin times the slope are hardly touched. The
+    highest load of a taxel is within 10 % of that on an elastic block by finite elements, askew by
+    10 and 17 degrees.
     """
     depth, weight = pick(t.line_depth, i), pick(t.weight, i)
     gaps, stiffness = pick(t.gaps, i), pick(t.stiffness, i)
@@ -111,10 +111,10 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
 
 
 def image(t: Trials, i: Index) -> None:
-    """The force shared out among the rows as each bears, and within a row as a half ellipse: as
-    the root of each column's depth past its touch."""
+    """Share the force among the rows by their loads, and within a row as a half ellipse: by the
+    root of each column's depth beyond its touch."""
     depth, reach = pick(t.line_depth, i), pick(t.reach, i)
-    # A touch so slight that it falls between the columns is the nearest one's.
+    # A touch so slight that it falls between two columns goes to the nearest.
     gaps = pick(t.column_gaps, i) - pick(t.own["lateral"].nearest, i)
     inside = np.where(depth > 0.0, depth - gaps[:, None], 0.0)
     touched = inside > 0.0

@@ -10,7 +10,7 @@ def sensor(readings: Readings) -> None:
     """Counts + size * N(0, 1)."""
     table = streams.quantiles(readings.settings("noise")["counts"])
     band = readings.settings("dead_band")["counts"] if "dead_band" in readings.effects else 0.0
-    # Noise that the dead band takes away again need not be added to a taxel that bears nothing.
+    # Noise within the dead band need not be added to a taxel without load.
     if float(table[-1]) >= band:
         readings.everywhere()
     rows, cols = readings.shape

@@ -1,8 +1,8 @@
-"""Bubble wrap: a bubble under each taxel stiffens by the gas law and is gone once it bursts.
+"""Bubble wrap: a bubble under each taxel stiffens by the gas law, and is gone once it bursts.
 
-p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b; three of its
-tangents (at 0, b/2 and 3b/4) stand for it, and each joins the skin's spring in series exactly.
-A burst bubble leaves the hard backing, b further on.
+p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b. Three tangents (at 0,
+b/2 and 3b/4) approximate it, each exactly in series with the skin's spring. A burst bubble leaves
+the hard backing, b deeper.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ SEGMENTS = len(SLOPES) + 1
 
 @dataclass
 class Bubbles:
-    """Columns of bubbles, and of the backing under each.
+    """Bubbles and the backing under each.
 
     Attributes:
-        first: the place of their springs in `Trials.gaps`, segment by segment.
+        first: the place of their first spring in `Trials.gaps`; segments follow each other.
         gaps, stiffness: (S, n) of these springs.
-        alive: (S, rows, n) 1 where one is left, 0 where it is gone.
+        alive: (S, rows, n) 1 where a spring is left, 0 where it is gone.
     """
 
     first: int
@@ -42,7 +42,7 @@ class Bubbles:
 
 
 def lay(t: Trials, i: Index) -> None:
-    """Each column becomes four springs: three tangents, and the backing for after the burst."""
+    """Lay four springs in each column: three tangents, and the backing for after the burst."""
     values, skin = {k: pick(v, i) for k, v in t.values.items()}, pick(t.taxel_k, i)
     k0, height = values["bubble_n_m"], values["bubble_m"]
     slopes = [1.0 / (1.0 / skin + 1.0 / (k0 * s)) for s in SLOPES]
@@ -62,7 +62,7 @@ def lay(t: Trials, i: Index) -> None:
 
 
 def law(t: Trials, i: Index) -> None:
-    """The law of the springs that are left, of a forearm that does not pivot."""
+    """The law of the springs that are left, for a forearm that does not pivot."""
     own, trials = t.own["pop"], np.arange(t.n)[i]
     alive, weight = pick(own.alive, trials), pick(t.weight, trials)
     gaps = pick(t.line_gap, trials) + pick(own.gaps, trials)[:, None]
@@ -71,7 +71,7 @@ def law(t: Trials, i: Index) -> None:
 
 
 def stand(t: Trials, i: Index) -> None:
-    """Every bubble is whole."""
+    """Begin with no bubble burst."""
     change(t, np.arange(t.n)[i])
 
 
@@ -86,7 +86,7 @@ def change(t: Trials, trials: NDArray[np.intp]) -> None:
 
 
 def image(t: Trials, i: Index) -> None:
-    """The force shared out among springs, then the four springs of each taxel together."""
+    """Share the force among the springs, then add up the four of each taxel."""
     own = t.own["pop"]
     loads = spring_loads(
         pick(t.line_depth, i), pick(own.gaps, i), pick(own.stiffness, i), pick(t.weight, i)
@@ -98,7 +98,7 @@ def image(t: Trials, i: Index) -> None:
 
 
 def pass_on(t: Trials, i: Index) -> None:
-    """Bubbles under more than they hold are gone from the next frame on, and leave the backing."""
+    """Burst the overloaded bubbles, which leaves their backing from the next frame on."""
     own = t.own["pop"]
     burst = (pick(t.image, i) > pick(t.values["pop_n"], i)).swapaxes(0, 1)
     at = np.flatnonzero(burst.any(axis=(0, 1)))

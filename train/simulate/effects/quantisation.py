@@ -1,4 +1,4 @@
-"""A converter with coarse steps."""
+"""The coarse steps of a converter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from train.simulate.readings import Readings
 
 
 def sensor(readings: Readings) -> None:
-    """The nearest whole number of steps."""
+    """Round to the nearest whole number of steps."""
     counts, step = readings.counts, np.float32(readings.settings("quantisation")["counts"])
     counts /= step
     np.rint(counts, out=counts)

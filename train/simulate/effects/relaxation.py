@@ -1,5 +1,5 @@
-"""Standard linear solid: beside the spring a second one, k1 = ratio * k, that a dashpot empties
-within its time (`viscous`)."""
+"""Standard linear solid: a second spring, k1 = ratio * k, in series with a dashpot that relaxes it
+(`viscous`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from train.simulate.trials import Trials, pick
 
 
 def stand(t: Trials, i: Index) -> None:
-    """The second spring and its dashpot are the contact's Maxwell element."""
+    """Make the second spring and its dashpot the contact's Maxwell element."""
     viscous = t.own["viscous"]
     viscous.ratio[i] = pick(t.values["relax_ratio"], i)
     viscous.relax_s[i] = pick(t.values["relax_s"], i)

@@ -8,7 +8,7 @@ from train.simulate.readings import Readings
 
 
 def sensor(readings: Readings) -> None:
-    """At most the limit."""
+    """Cut the counts at the limit."""
     scale = readings.scene.skin.counts_per_newton or 1.0
     limit = np.float32(readings.settings("saturation")["newton"] * scale)
     np.minimum(readings.counts, limit, out=readings.counts)

@@ -1,6 +1,7 @@
 """An object on the floor: it sticks while the push is at most mu_s m g, then drags mu_k m g.
 
-One step: stick first; where the push is more than that holds, move; stop at rest, exactly.
+A step first assumes that the object sticks. It moves where the push exceeds `hold`, and stops
+exactly at rest.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ class Mover:
     """An object that can move along the push.
 
     Attributes:
-        inertia: (n,) kilograms, as the contact feels it.
-        static, kinetic: (n,) the coefficients of its friction on the floor.
-        weight: (n,) newtons with which it stands there.
-        hold, resist: (n,) newtons that hold it, and that resist its motion.
-        leans: (n,) whether it leans: then it moves either way, until it stands or lies.
-        lies: (n,) metres that it has moved when it lies.
-        speed, slide: (n,) m/s, and metres that it has moved.
+        inertia: (n,) kilograms felt at the contact.
+        static, kinetic: (n,) coefficients of friction on the floor.
+        weight: (n,) newtons with which it presses on the floor.
+        hold, resist: (n,) newtons that hold it at rest, and that resist its motion.
+        leans: (n,) whether it leans; it then moves either way until it stands or lies.
+        lies: (n,) metres of its way at which it lies.
+        speed, slide: (n,) m/s, and metres of its way.
         rest, shifted: (n,) the contact's depth without load, at rest and in motion.
     """
 
@@ -49,7 +50,7 @@ TRACES = {"slide_m": "slide"}
 
 
 def stand(t: Trials, i: Index) -> None:
-    """At rest, with what holds it and what resists its motion."""
+    """Begin at rest, with the friction of the scene."""
     values, zeros = t.values, np.zeros((6, t.n))
     t.own["sliding"] = Mover(
         inertia=values["mass_kg"].copy(),
@@ -68,12 +69,12 @@ def stand(t: Trials, i: Index) -> None:
 
 
 def predict(t: Trials, i: Index) -> None:
-    """The object is where it has moved to."""
+    """Take the object's way from the depth."""
     t.y[0, i] = pick(t.y[0], i) - pick(t.own["sliding"].slide, i)
 
 
 def drag(t: Trials, i: Index) -> None:
-    """Coulomb's friction."""
+    """Coulomb's law of friction."""
     mover = t.own["sliding"]
     weight = pick(mover.weight, i)
     mover.hold[i] = pick(mover.static, i) * weight
@@ -81,10 +82,10 @@ def drag(t: Trials, i: Index) -> None:
 
 
 def give_way(t: Trials, i: Index) -> None:
-    """How an object that moves meets the load.
+    """Let an object that moves give way to the load.
 
-    Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is a further
-    compliance h^2/m and a shift, so its solver holds.
+    Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is one more
+    compliance, h^2/m, and a shift, so the contact's solver still applies.
     """
     mover: Mover = t.own["sliding"]
     h, speed, y = pick(t.h, i), pick(mover.speed, i), pick(t.y[0], i)
@@ -97,7 +98,7 @@ def give_way(t: Trials, i: Index) -> None:
 
 
 def move(t: Trials, i: Index) -> None:
-    """The motion under the loads; a few trials are asked for their loads once more."""
+    """Move under the loads, and solve the loads of a few trials again."""
     mover: Mover = t.own["sliding"]
     h, speed, resist = pick(t.h, i), pick(mover.speed, i), pick(mover.resist, i)
     slide, leans, lies = pick(mover.slide, i), pick(mover.leans, i), pick(mover.lies, i)
@@ -110,7 +111,7 @@ def move(t: Trials, i: Index) -> None:
     stops = moving & ~goes
     again = np.flatnonzero(stops | (~moving & (force > pick(mover.hold, i))))
     if again.size:
-        # What comes to rest is asked once more at rest, and what sets off as it moves.
+        # An object that stops is solved again at rest, one that starts is solved again in motion.
         trials, rests = np.arange(t.n)[i][again], stops[again]
         y = np.where(rests, mover.rest[trials], mover.shifted[trials])
         soft = np.where(rests, 0.0, (gain * h)[again])

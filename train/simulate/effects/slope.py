@@ -1,5 +1,7 @@
-"""A table that is not level: the weight's part along it adds to what friction bears, or takes from
-it. On a slope of angle b, uphill along the push, m g (mu cos b + sin b) moves a thing."""
+"""A table that is not level: the weight's component along it adds to friction or takes from it.
+
+On a slope of angle b, uphill along the push, m g (mu cos b + sin b) moves an object.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from train.simulate.trials import Trials, pick
 
 
 def stand(t: Trials, i: Index) -> None:
-    """The slope as a change of the coefficients; a thing does not set off by itself."""
+    """Change the coefficients of friction by the slope; no object starts by itself."""
     mover, angle = t.own["sliding"], np.radians(pick(t.values["slope_deg"], i))
     for friction in (mover.static, mover.kinetic):
         friction[i] = np.maximum(pick(friction, i) * np.cos(angle) + np.sin(angle), 0.0)

@@ -1,5 +1,5 @@
-"""Foliage: stems that stand at different depths, bend as cantilevers (k = 3 E I / L^3, one
-number here), damp, and slip off the forearm once bent too far, for good."""
+"""Foliage: stems at different depths that bend as cantilevers (k = 3 E I / L^3, one number here),
+damp, and slip off the forearm for good once bent too far."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from train.simulate.trials import Trials, pick
 
 @dataclass
 class Stems:
-    """Where stems stand and what they do; a trial of fewer has some of no stiffness.
+    """The stems of each trial; a trial of fewer stems has some of no stiffness.
 
     Attributes:
-        depth, stiffness: (stems, n) metres at which each is met, newtons a metre, 0 once it has
-            slipped off.
+        depth, stiffness: (stems, n) metres at which each is touched, and newtons a metre, 0 once it
+            has slipped off.
         damping: (stems, n) N s/m of each, 0 once it has slipped off.
         taxel, part: (stems, n) the place in the window's image of the first of the two rows that a
             stem lies between, and the part of its load that the second bears.
-        order: (stems, n) which is the first, second and so on by depth.
-        slopes, intercepts: (stems, n) the law of those still held, without damping.
-        drag: (n,) N s/m of all that bend.
+        order: (stems, n) the stems sorted by depth.
+        slopes, intercepts: (stems, n) the law of the stems still held, without damping.
+        drag: (n,) N s/m of all bent stems.
     """
 
     depth: Array
@@ -43,7 +43,7 @@ class Stems:
 
 
 def lay(t: Trials, i: Index) -> None:
-    """Stems in place of the bed's rows."""
+    """Lay stems instead of the bed's rows."""
     trials, scene, values = np.arange(t.n)[i], t.scene, t.values
     counts = values["stem_count"][trials].astype(np.int64)
     shape = (int(counts.max()), t.n)
@@ -91,8 +91,7 @@ def let_go(t: Trials, i: Index) -> None:
 
 
 def tune(t: Trials, i: Index) -> None:
-    """The law of the next step: of those still held, and implicitly of what damps those that
-    bend."""
+    """The law of the next step: the stems still held, and implicitly the damping of bent ones."""
     own = t.own["stems"]
     drag, stems = pick(own.drag, i) / pick(t.h, i), len(own.depth)
     t.slopes[:stems, i] = pick(own.slopes, i) + drag
@@ -100,7 +99,7 @@ def tune(t: Trials, i: Index) -> None:
 
 
 def settle(t: Trials, i: Index) -> None:
-    """Let go of stems bent too far; the others damp the next step."""
+    """Let stems slip off that are bent too far; the others damp the next step."""
     own = t.own["stems"]
     bent = pick(t.depth[0], i) - pick(own.depth, i)
     slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(own.stiffness, i) > 0.0)
@@ -115,7 +114,7 @@ def settle(t: Trials, i: Index) -> None:
 
 
 def bear(t: Trials, i: Index) -> None:
-    """The force that the skin bears, and how far the first stem is bent."""
+    """The force on the skin, and how far the first stem is bent."""
     own, depth = t.own["stems"], pick(t.depth[0], i)
     held, bent = pick(own.stiffness, i) > 0.0, depth - pick(own.depth, i)
     t.force[i] = pick(t.loads[0], i)
@@ -124,7 +123,7 @@ def bear(t: Trials, i: Index) -> None:
 
 
 def image(t: Trials, i: Index) -> None:
-    """Each stem's load on the two rows it lies between."""
+    """Put each stem's load on the two rows that it lies between."""
     own, m = t.own["stems"], len(np.arange(t.n)[i])
     bent = np.maximum(pick(t.depth[0], i) - pick(own.depth, i), 0.0)
     loads = bent * pick(own.stiffness, i)

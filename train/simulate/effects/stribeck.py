@@ -10,7 +10,7 @@ from train.simulate.trials import Trials, pick
 
 
 def drag(t: Trials, i: Index) -> None:
-    """The friction of now."""
+    """Friction at the present speed."""
     mover = t.own["sliding"]
     static, kinetic = pick(mover.static, i), pick(mover.kinetic, i)
     part = pick(mover.speed, i) / pick(t.values["stribeck_m_s"], i)

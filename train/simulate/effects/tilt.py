@@ -1,4 +1,4 @@
-"""The forearm pivots about the contact: a second coordinate, the angle against the face.
+"""The forearm pivots about the contact, which adds a second coordinate: its angle to the face.
 
 Rows then press to different depths, a + lever * tilt, and the loads are a force and a moment
 (`pivot_solver`).
@@ -6,7 +6,7 @@ Rows then press to different depths, a + lever * tilt, and the loads are a force
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,85 +14,70 @@ from numpy.typing import NDArray
 from train.simulate import base
 from train.simulate.arm import Array, cross, dot
 from train.simulate.contact import by_depth, covered, curve_gap, total
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, Springs, determinant, search
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, determinant, search
 from train.simulate.plan import Index
 from train.simulate.trials import Trials, pick
-
-ALIKE = 16
-"""Trials whose rows have as many springs, up to a multiple of this, are solved as one array."""
-
-
-@dataclass
-class Group:
-    """Trials whose rows have about as many springs.
-
-    Attributes:
-        trials: (m,) which they are.
-        springs: in the order of their depth.
-        order: (S, m) which of `Trials.gaps` each is.
-        intact: (S, m) newtons a metre, as long as none is gone.
-    """
-
-    trials: NDArray[np.intp]
-    springs: Springs
-    order: NDArray[np.intp]
-    intact: Array
 
 
 @dataclass
 class Tilt:
-    """A pivoting forearm's contact.
+    """The contact of a pivoting forearm.
 
     Attributes:
         lever: (rows, n) metres of each row from the contact's middle.
-        guess, settled: (2, n) the loads that the next search begins with, and the last step's.
-        groups: the beds' springs.
+        guess, settled: (2, n) the loads with which the next search begins, and those of the last
+            step.
+        gaps: (S, 1, n) metres at which each spring of a row is touched, in ascending order.
+        stiffness: (S, 1, n) newtons a metre, or (S, rows, n) where springs of some rows are gone.
+        order: (S, n) the place of each spring in `Trials.gaps`.
+        intact: (S, n) newtons a metre of the springs before any is gone.
+        nearest: (S,) the smallest gap of any trial's s-th spring.
     """
 
     lever: Array
     guess: Array
     settled: Array
-    groups: list[Group] = field(default_factory=list)
+    gaps: Array
+    stiffness: Array
+    order: NDArray[np.intp]
+    intact: Array
+    nearest: Array
 
     def keep_alive(self, trials: NDArray[np.intp], first: int, alive: Array) -> None:
-        """Leave some trials those springs alone that are still there.
+        """Keep only the springs that are left.
 
         Args:
-            trials: (m,) which, in ascending order.
-            first: the place in `Trials.gaps` of the springs that may be gone.
-            alive: (S, rows, m) 1 where one is left, 0 where it is gone.
+            trials: (m,) the trials concerned.
+            first: the place in `Trials.gaps` of the first spring that may be gone.
+            alive: (S, rows, m) 1 where a spring is left, 0 where it is gone.
         """
-        for group in self.groups:
-            mine = np.isin(trials, group.trials).nonzero()[0]
-            if not mine.size:
-                continue
-            at, old = np.searchsorted(group.trials, trials[mine]), group.springs
-            same = old.stiffness.shape[1] == 1
-            stiffness = np.repeat(old.stiffness, alive.shape[1] if same else 1, axis=1)
-            which = group.order.take(at, -1)[:, None] - first
-            left = np.take_along_axis(alive.take(mine, -1), which, axis=0)
-            stiffness[:, :, at] = group.intact.take(at, -1)[:, None] * left
-            group.springs = Springs(old.at, old.gaps, stiffness, old.nearest)
+        if self.stiffness.shape[1] == 1:
+            self.stiffness = np.repeat(self.stiffness, alive.shape[1], axis=1)
+        place = np.clip(self.order.take(trials, -1) - first, 0, len(alive) - 1)
+        left = np.take_along_axis(alive, place[:, None], axis=0)
+        self.stiffness[:, :, trials] = self.intact.take(trials, -1)[:, None] * left
 
 
 def law(t: Trials, i: Index) -> None:
     """Each row's springs, in the order of their depth."""
-    own = t.own["tilt"] = Tilt(np.zeros((t.rows, t.n)), *np.zeros((2, 2, t.n)))
-    trials = np.arange(t.n)[i]
-    order, gaps, stiffness = by_depth(pick(t.gaps, i), pick(t.stiffness, i))
-    counts = np.isfinite(gaps).sum(axis=0)
-    sizes = -(-counts // ALIKE)
-    for size in np.unique(sizes):
-        at = (sizes == size).nonzero()[0]
-        deep = int(counts[at].max())
-        some, k = gaps[:deep].take(at, -1), stiffness[:deep].take(at, -1)
-        springs = Springs(trials[at], some[:, None], k[:, None], some.min(axis=1))
-        own.groups.append(Group(trials[at], springs, order[:deep].take(at, -1), k))
+    order, gaps, stiffness = by_depth(t.gaps, t.stiffness)
+    deep = int(np.isfinite(pick(gaps, i)).sum(axis=0).max())
+    order, gaps, stiffness = order[:deep], gaps[:deep], stiffness[:deep]
+    t.own["tilt"] = Tilt(
+        np.zeros((t.rows, t.n)),
+        np.zeros((2, t.n)),
+        np.zeros((2, t.n)),
+        gaps[:, None],
+        stiffness[:, None],
+        order,
+        stiffness,
+        pick(gaps, i).min(axis=1),
+    )
 
 
 def locate(t: Trials, i: Index) -> None:
-    """Depth and tilt against the object's face at the frame's joint angles, with their Jacobians;
-    which rows the face covers, and their levers about its middle."""
+    """Find depth and tilt against the object's face at the frame's joint angles, their Jacobians,
+    and the part of each row that the face covers, with its lever about the middle."""
     q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
     along_face, radius = pick(t.along_face, i), t.skin.radius_m
     pose = t.kinematics.pose(q)
@@ -120,22 +105,12 @@ def locate(t: Trials, i: Index) -> None:
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
     own, viscous = t.own["tilt"], t.own.get("viscous")
-    trials = np.arange(t.n)[i]
-    place = np.full(t.n, -1)
-    place[trials] = np.arange(len(trials))
-    springs = []
-    for group in own.groups:
-        at = place[group.trials]
-        mine = (at >= 0).nonzero()[0]
-        if mine.size == len(at):
-            found = group.springs
-            springs.append(Springs(at, found.gaps, found.stiffness, found.nearest))
-        elif mine.size:
-            parts = (group.springs.gaps.take(mine, -1), group.springs.stiffness.take(mine, -1))
-            springs.append(Springs(at[mine], *parts, group.springs.nearest))
     c = np.array([c, pick(t.compliance[1], i), pick(t.compliance[2], i)])
     pivots = Pivots(
-        springs,
+        i,
+        own.gaps,
+        own.stiffness,
+        own.nearest,
         pick(t.weight, i),
         pick(t.line_gap, i),
         pick(own.lever, i),
@@ -145,22 +120,21 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
         c,
         determinant(c),
     )
-    found = search(pivots, pick(own.guess, i), GUARDED_ROUNDS)
-    t.row_force[:, i] = found.rows
-    t.lost[i] |= found.lost
-    return found.loads
+    result = search(pivots, pick(own.guess, i), GUARDED_ROUNDS)
+    t.row_force[:, i] = result.rows
+    t.lost[i] |= result.lost
+    return result.loads
 
 
 def settle(t: Trials, i: Index) -> None:
-    """The next step's loads will go on as these did."""
+    """Guess the next loads by extrapolating the last two."""
     own, loads = t.own["tilt"], pick(t.loads, i)
     own.guess[:, i] = 2.0 * loads - pick(own.settled, i)
     own.settled[:, i] = loads
 
 
 def bear(t: Trials, i: Index) -> None:
-    """The force that the skin bears, which is the push's part along its own normal, and each row's
-    depth."""
+    """The force on the skin, the push's component along the skin's normal, and each row's depth."""
     tilt = pick(t.depth[1], i)
     t.force[i] = pick(t.loads[0], i) * np.sqrt(np.maximum(1.0 - tilt * tilt, 0.0))
     depth = pick(t.depth[0], i) + pick(t.own["tilt"].lever, i) * tilt - pick(t.line_gap, i)

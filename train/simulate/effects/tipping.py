@@ -1,10 +1,10 @@
 """An object that tips over its far edge before it slides: where mu_s > base / (2 height).
 
-It takes m g base / (2 height) at the height of the contact; as the object leans, its weight's
-lever shrinks, and so does the push it takes. The lean is a potential, not a loss: let go, the
-object falls back onto its foot. Beyond the balance its weight turns it over, away from the arm,
-until it lies. The softening is taken at the step's start (a concave potential taken explicitly
-makes no energy) and the rest implicitly.
+It takes m g base / (2 height) at the height of the contact. As the object leans, the lever of its
+weight shrinks, and so does the push needed. Leaning stores energy: released, the object falls back
+onto its foot. Beyond the balance its weight turns it over, away from the arm, until it lies. The
+softening is taken at the step's start, since an explicit concave potential makes no energy, and the
+rest implicitly.
 """
 
 from __future__ import annotations
@@ -23,8 +23,13 @@ from train.simulate.trials import Trials, pick
 
 @dataclass
 class Tipping:
-    """Whether each object tips (n,), the push that starts it in newtons (n,), and the metres of
-    travel until it falls (n,)."""
+    """Which objects tip, and how.
+
+    Attributes:
+        tips: (n,) whether the object tips.
+        force: (n,) newtons of the push that starts it.
+        travel: (n,) metres until it falls.
+    """
 
     tips: NDArray[np.bool_]
     force: Array
@@ -32,10 +37,10 @@ class Tipping:
 
 
 def stand(t: Trials, i: Index) -> None:
-    """Which objects tip, at what push, and how far until they fall.
+    """Find the objects that tip.
 
-    The object is taken for a box twice as high as the contact: its moment of inertia about the
-    edge is m (base^2 + 4 height^2) / 3, felt at the contact as that over height^2.
+    The object is modelled as a box twice as high as the contact: its moment of inertia about the
+    edge is m (base^2 + 4 height^2) / 3, felt at the contact as this divided by height^2.
     """
     mover, mass = t.own["sliding"], t.values["mass_kg"]
     foot, height = t.values["base_m"], t.values["height_m"]
@@ -50,7 +55,7 @@ def stand(t: Trials, i: Index) -> None:
 
 
 def drag(t: Trials, i: Index) -> None:
-    """What holds a thing that tips is its weight's lever alone."""
+    """Let only the lever of its weight hold an object that tips."""
     own, mover = t.own["tipping"], t.own["sliding"]
     tips, force, slide = pick(own.tips, i), pick(own.force, i), pick(mover.slide, i)
     mover.leans[i] = tips & (slide > 0.0)

@@ -1,11 +1,11 @@
-"""A push beside the middle of what is pushed turns it about the vertical as it slides.
+"""A push beside an object's middle turns the object about the vertical as it slides.
 
 A disc-like foot of radius R under even pressure bears a force F at a distance e from its middle
-until (F / f)^2 + (F e / (c f))^2 = 1, with f = mu m g and c = 2 R / 3: an ellipsoid stands for its
-limit surface, and it moves along that surface's normal (Goyal, Ruina and Papadopoulos, Wear 143,
-1991; Lynch and Mason, Int. J. Robotics Research 15, 1996). So it takes f / sqrt(1 + e^2 / c^2) to
-move it, and where it is pushed it turns by e / (c^2 + e^2) a metre. Its face turns with it, and so
-do the columns of the forearm that touch it.
+until (F / f)^2 + (F e / (c f))^2 = 1, with f = mu m g and c = 2 R / 3. This ellipsoid approximates
+its limit surface, and the object moves along the normal of that surface (Goyal, Ruina and
+Papadopoulos, Wear 143, 1991; Lynch and Mason, Int. J. Robotics Research 15, 1996). So f / sqrt(1 +
+e^2 / c^2) moves it, and it turns by e / (c^2 + e^2) for each metre at the contact. As its face
+turns, other columns of the forearm touch it.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from train.simulate.plan import Index
 from train.simulate.trials import Trials, pick
 
 LEVER = 2.0 / 3.0
-"""Of a disc's radius: the moment of its friction for each newton of it."""
+"""Moment of a disc's friction for each newton of it, as a part of its radius."""
 TRACES = {"turn_rad": "turned"}
 
 
 @dataclass
 class Turning:
-    """Radians for each metre that an object moves at the contact, and radians turned; (n,)."""
+    """Radians for each metre of the contact's way, and radians turned so far; (n,)."""
 
     per_metre: Array
     turned: Array
 
 
 def stand(t: Trials, i: Index) -> None:
-    """What an off-centre push finds of friction and of mass."""
+    """Reduce friction and mass to those felt by an off-centre push."""
     aside, radius = pick(t.values["aside_m"], i), 0.5 * pick(t.values["foot_m"], i)
     lever = LEVER * radius
     mover, easier = t.own["sliding"], 1.0 / np.sqrt(1.0 + aside * aside / (lever * lever))
@@ -47,8 +47,10 @@ def stand(t: Trials, i: Index) -> None:
 
 
 def pass_on(t: Trials, i: Index) -> None:
-    """The image moves around the forearm with the face; a load between two columns is shared by
-    them, and one beyond the window is its last column's."""
+    """Move the image around the forearm with the face.
+
+    A load between two columns is shared by them; a load beyond the window goes to its last column.
+    """
     own = t.own["turning"]
     turned = pick(own.per_metre, i) * pick(t.own["sliding"].slide, i)
     own.turned[i] = turned

@@ -1,4 +1,4 @@
-"""Forces that answer to speed: a Maxwell element and a dashpot beside a contact's elastic law.
+"""Forces that depend on speed: a Maxwell element and a dashpot beside a contact's elastic law.
 
 Beside the elastic force F a Maxwell element (Zener's) adds z with z' = -z / tau + r dF/dt, and a
 dashpot adds T dF/dt. Let w = r F - z be the part of F already relaxed. A step is the exact answer
@@ -7,11 +7,11 @@ to a ramp of F within it, stable for any tau: with e = exp(-h / tau) and s = r (
     z+ = e z + s (F+ - F),    w+ = e w + (s - e r) F + (r - s) F+,
 
 so the contact bears (1 + s + T / h) F+ - L with L = e w + (s - e r + T / h) F. No term of w or L is
-negative: the law stays convex, its solvers hold, no step can make energy, and nothing but the step
-itself depends on its length.
+negative. So the law stays convex, its solvers still apply, no step can make energy, and the length
+of a step affects only that step.
 
-Where the forearm pivots, each of the skin's rows has its own; elsewhere the first row's stands for
-the whole contact. The effects `relaxation` and `inertia` build upon this one.
+Where the forearm pivots, each row of the skin has its own element; elsewhere the first row holds
+that of the whole contact. The effects `relaxation` and `inertia` share this module.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from train.simulate.trials import Trials, pick
 
 @dataclass
 class Viscous:
-    """What answers to speed.
+    """The Maxwell elements and dashpots.
 
     Attributes:
         loss_s, ratio, relax_s: (n,) T, r and tau.
-        kept, let_go, late, damped, gain: (n,) of a step: e, r - s, s - e r, T / h, 1 + s + T / h.
+        kept, let_go, late, damped, gain: (n,) for the present step: e, r - s, s - e r, T / h and
+            1 + s + T / h.
         force, given, load: (rows, n) F, w and -L.
     """
 
@@ -48,7 +49,7 @@ class Viscous:
     load: Array
 
     def set_step(self, i: Index, h: Array) -> None:
-        """What a step of this length comes to."""
+        """Set the terms for a step of this length."""
         ratio = pick(self.ratio, i)
         damped, part = pick(self.loss_s, i) / h, h / pick(self.relax_s, i)
         relaxes = ratio > 0.0
@@ -59,15 +60,15 @@ class Viscous:
         self.bear_on(i)
 
     def bear_on(self, i: Index) -> None:
-        """The load that each row's next step begins with."""
+        """Set the load with which each row's next step begins."""
         given, force = pick(self.given, i), pick(self.force, i)
         late = pick(self.late, i) + pick(self.damped, i)
         self.load[:, i] = -(pick(self.kept, i) * given + late * force)
 
     def move_on(self, i: Index, borne: Array) -> None:
-        """What a step's forces (rows, n of i) leave behind for the next.
+        """Update the state by a step's forces (rows, n of i).
 
-        Where nothing is borne the surface comes back by itself: there gain F = L.
+        Where no force is borne, the surface recovers by itself with gain F = L.
         """
         elastic = np.maximum((borne - pick(self.load, i)) / pick(self.gain, i), 0.0)
         given = pick(self.kept, i) * pick(self.given, i)
@@ -78,24 +79,24 @@ class Viscous:
 
 
 def begin(rows: int, n: int) -> Viscous:
-    """Neither an element nor a dashpot, of n trials."""
+    """The state of n trials without an element or a dashpot."""
     own = Viscous(*[*np.zeros((8, n)), *np.zeros((3, rows, n))])
     own.relax_s[:] = own.gain[:] = 1.0
     return own
 
 
 def stand(t: Trials, i: Index) -> None:
-    """Begin without any; the effects that build upon it set theirs right after."""
+    """Begin without any; the effects that share this module add theirs next."""
     t.own["viscous"] = begin(t.rows, t.n)
 
 
 def tune(t: Trials, i: Index) -> None:
-    """The law in steps of this length."""
+    """Set the law for steps of this length."""
     t.own["viscous"].set_step(i, pick(t.h, i))
 
 
 def settle(t: Trials, i: Index) -> None:
-    """Each row moves on, under what the step has it bear."""
+    """Update each row by the step's forces."""
     upright = np.arange(t.n)[i][~t.plan.also("tilt", i)]
     t.row_force[0, upright] = pick(t.loads[0], upright)
     t.own["viscous"].move_on(i, pick(t.row_force, i))
