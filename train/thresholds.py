@@ -21,6 +21,8 @@ MISSED_SHARE = 0.02
 """Of the touches, which a proposal may miss."""
 LOWER = (0.5, 0.25, 0.0)
 """Parts of the recorded thresholds that are tried where touches are missed."""
+FEWEST_GAINED = 1.5
+"""Recordings that lower thresholds must decide right more often."""
 
 
 def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:
@@ -62,8 +64,9 @@ def chosen(
 ) -> tuple[DataSet, list[str]]:
     """The data set at the thresholds whose decisions are most accurate, and sentences that say so.
 
-    Lower ones are tried where a recording that is labelled with a touch shows none. Of equally
-    accurate ones the highest are taken.
+    Lower ones are tried where a recording that is labelled with a touch shows none. They are taken
+    where they gain more than a standard error and a single recording, as they find a contact in any
+    noise. Of equally accurate ones the highest are taken.
 
     Args:
         dataset: at the recorded thresholds.
@@ -78,7 +81,9 @@ def chosen(
     tried = [dataset, *(load(*level) for level in levels if level != own)]
     shares = [accuracy(one) for one in tried]
     best = int(np.argmax(shares))
-    if best == 0:
+    n = len(dataset.trials) + len(dataset.untouched)
+    error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
+    if n * (shares[best] - shares[0]) <= max(error, FEWEST_GAINED):
         return dataset, []
     layout = tried[best].layout
     return tried[best], [

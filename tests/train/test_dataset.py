@@ -152,7 +152,7 @@ def skinned(recording, **skin):
     ("change", "word"),
     [
         (lambda r: skinned(r, wraps=False), "odd.npz: this skin has 16 x 24 taxels, flat"),
-        (lambda r: skinned(r, counts_per_newton=None), "odd.npz: this skin measures count"),
+        (lambda r: skinned(r, counts_per_newton=None), "closed around, with forces in counts"),
         (
             lambda r: replace(r, joints=np.zeros((len(r.t), 3))),
             "odd.npz: has 3 joint angles and names no arm",
