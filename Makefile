@@ -85,7 +85,7 @@ endif
 
 # FRONT=fast, balanced, accurate, milliseconds or an accuracy: a point that `make tradeoff` found.
 ifdef FRONT
-FRONTED := --front $(FRONT) $(addprefix --fronts ,$(wildcard $(OUT)/tradeoff/front.json))
+FRONTED := --front $(FRONT) --fronts $(OUT)/tradeoff/front.json
 endif
 
 export: $(READY)
@@ -107,10 +107,9 @@ demo: $(READY)
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make
 
-# The README's pictures, and the settings that `make export FRONT=` uses before a `make tradeoff`.
+# The README's pictures.
 docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
-	cp $(OUT)/tradeoff/front.json train/tradeoff/front.json
 
 docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \
@@ -148,20 +147,17 @@ endif
 study: $(READY)
 	$(BIN)/python -m train study --data $(RECORDINGS) $(STUDIED) --out $(OUT)/study $(STUDY)
 
-# Without a BOARD: time a model of these recordings on this machine, with the features that the
-# report measures.
+# Without a BOARD: time the quick model of these recordings on this machine.
 ifdef BOARD
 tradeoff: $(READY)
 else
 BOARD := $(OUT)/tradeoff/board.json
 tradeoff: $(READY)
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --features paper contact \
-	  --projection lda
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 endif
-	$(BIN)/python -m export.prices --data $(RECORDINGS) --out $(OUT)/tradeoff/prices.json
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
-	  --prices $(OUT)/tradeoff/prices.json --out $(OUT)/tradeoff $(TRADEOFF)
+	  --out $(OUT)/tradeoff $(TRADEOFF)
 
 # The site, with the Python reference from the docstrings; a broken link is an error.
 $(VENV)/.docs: $(READY)

@@ -23,13 +23,16 @@ from sklearn.ensemble import ExtraTreesClassifier
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
 from edge.touch.features import FEATURES, SAMPLES
-from train.dataset import load_trials
+from train.dataset import read
 from train.evaluate import stratified_folds
 from train.stopping import THRESHOLDS, finest
-from train.tradeoff.early import FOLDS, Chooser, compare_stopping
-from train.tradeoff.run import DECISION_POINTS_S, GRIDS, NAMES
+from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
+from train.tradeoff.choices import followed, some
+from train.tradeoff.early import FOLDS, compare_stopping
 
 TREES = 300
+NAMES = ("paper", "contact")
+"""The features of the extra trees."""
 Curve = list[tuple[float, float]]
 """(mean seconds, share wrong) at each threshold."""
 
@@ -88,18 +91,15 @@ def at(rows: Curve, seconds: float) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print the table."""
-    dataset = load_trials(arguments.data, horizon_s=DECISION_POINTS_S[-1], features=NAMES)
+    dataset = followed(read(arguments.data), NAMES)
     n = len(dataset.trials)
     rows = np.sort(np.random.default_rng(0).permutation(n)[: arguments.trials or n])
-    y = {task: dataset.labels(task)[rows] for task in dataset.tasks}
-    X = np.stack([dataset.features(s, SAMPLES, NAMES) for s in DECISION_POINTS_S])[:, rows]
-    columns = dataset.widths(SAMPLES)
-    choose = Chooser(X[-1], y, GRIDS, dataset.names, columns)
-    compared = compare_stopping(
-        X, y, DECISION_POINTS_S, dataset.names, choose, widths=columns, jobs=arguments.jobs
-    )
+    dataset = some(dataset, rows)
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    X = np.stack([dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S])
+    compared = compare_stopping(dataset, DECISION_POINTS_S, jobs=arguments.jobs)
     folds = stratified_folds(y[finest(y)], FOLDS)
-    paper = dataset.features(DECISION_POINTS_S[-1], SAMPLES, expand(["paper"]))[rows]
+    paper = dataset.features(DECISION_POINTS_S[-1], SAMPLES, expand(["paper"]))
     series = paper.reshape(len(rows), len(FEATURES), SAMPLES)
     print("| task | mean time, s | fixed window, % wrong | when sure | gain | trees | TEASER |")
     print("|---|---|---|---|---|---|---|")

@@ -17,13 +17,15 @@ from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import measure, report, save
 from train.choose import LEAVE_OUT, TRIAL
+from train.dataset import read
 from train.fitting import MOST_TRIALS, fit
 from train.projection import KINDS
 from train.scaling import SCALINGS
 from train.stopping import FEWEST
 from train.tradeoff import front as fronts
 
-FRONTS = Path("build/tradeoff/front.json")
+FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
+"""Options that would make another model than the one that a point was measured with."""
 DECISION_POINTS = "0.2:1.2:0.1"
 LONGEST_S = 60.0
 """Longest window."""
@@ -101,15 +103,15 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument(
         "--front",
         metavar="WHAT",
-        help="take window, features and scaling from a point that `make tradeoff` found: fast, "
-        "balanced, accurate, the most milliseconds, or the least accuracy (0 to 1)",
+        help="the quick choice at the window of a point of `make tradeoff`: fast, balanced, "
+        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
     )
     top.add_argument(
         "--fronts",
         type=Path,
         metavar="front.json",
-        help="the file of the points (default: build/tradeoff/front.json, or else the points of "
-        "the simulated set)",
+        default=Path("build/tradeoff/front.json"),
+        help="the file with the points (default: %(default)s)",
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
     top.add_argument(
@@ -121,19 +123,17 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
-    window_s, features, scaling = arguments.window, arguments.features, arguments.scaling
+    window_s, quick = arguments.window, arguments.quick
     if arguments.front is not None:
-        front, point = _of_front(arguments)
-        window_s, features = point.window_s, list(point.features)
-        scaling = scaling or point.scaling
+        window_s, quick = _of_front(arguments).window_s, True
     points = arguments.decision_points
     if window_s is None and points not in (None, "none"):
         window_s = WINDOW_S
     fitted = fit(
         arguments.data,
-        features=features,
+        features=arguments.features,
         projection=arguments.projection,
-        scaling=scaling,
+        scaling=arguments.scaling,
         components=arguments.components,
         k=arguments.k,
         window_s=window_s,
@@ -146,16 +146,10 @@ def run(arguments: argparse.Namespace) -> int:
         threshold=arguments.threshold,
         onset=arguments.onset,
         arm=open_arm(arguments),
-        quick=arguments.quick,
+        quick=quick,
         jobs=arguments.jobs,
         progress=True,
     )
-    if arguments.front is not None and front.digest != fitted.dataset.digest:
-        print(
-            "warning: the points were measured on other recordings, so accuracy and time may "
-            "differ with yours; `make tradeoff DATA=...` measures them",
-            file=sys.stderr,
-        )
     path = arguments.out / "model.onnx"
     size = save(path, fitted)
     print(report(fitted, measure(fitted)), file=sys.stderr)
@@ -163,22 +157,19 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _of_front(
-    arguments: argparse.Namespace,
-) -> tuple[fronts.ParetoFront, fronts.OperatingPoint]:
-    """The front, and the point on it that the options ask for."""
-    path = arguments.fronts or FRONTS
-    if arguments.fronts is None and not path.exists():
-        path = fronts.SHIPPED
-    front = fronts.ParetoFront.read(path)
+def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
+    """The operating point that was asked for."""
+    given = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
+    if given:
+        raise InputError(f"--front makes the model that was measured; leave out {', '.join(given)}")
+    front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
     point = front.pick(arguments.front)
     print(
-        f"{path}: {arguments.front} is {point.window_s:g} s of {' '.join(point.features)}, scaling "
-        f"{point.scaling}; measured there: {front.task} {point.accuracy:.1%} in "
-        f"{point.milliseconds:.0f} ms",
+        f"{arguments.front}: a window of {point.window_s:g} s, {front.task} {point.accuracy:.1%} "
+        f"in {point.milliseconds:.0f} ms",
         file=sys.stderr,
     )
-    return front, point
+    return point
 
 
 def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:

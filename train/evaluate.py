@@ -53,6 +53,8 @@ class Result:
             choice.
         k: likewise.
         said: (n,) the label answered for each trial, or None.
+        hits: (n,) whether each trial is answered right, or None; two results on the same trials
+            are compared by it.
     """
 
     right: int
@@ -60,6 +62,7 @@ class Result:
     components: int = 0
     k: int = 0
     said: NDArray[np.str_] | None = None
+    hits: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
 
     @property
     def accuracy(self) -> float:
@@ -268,13 +271,14 @@ class AnswerTable:
 
     def nested(self, task: str, *rule: Any, **more: Any) -> Result:
         """The accuracy of the choice itself, with the numbers that it most often takes."""
-        right, picked = 0, []
+        hits, picked = np.zeros(len(self.folds), dtype=bool), []
         for fold in range(int(self.folds.max()) + 1):
             candidate = self.without(task, fold, *rule, **more)
-            right += int(self.right[task][fold][candidate, self.folds == fold].sum())
+            own = self.folds == fold
+            hits[own] = self.right[task][fold][candidate, own]
             picked.append(candidate)
         usual = self.choices[task][int(np.bincount(picked).argmax())]
-        return Result(right, len(self.folds), usual.components, usual.k)
+        return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
 
 
 def choose(

@@ -109,23 +109,3 @@ def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, cap
     assert main([*command, *PAPER]) == 0
     err = capsys.readouterr().err
     assert "span 5 components, 15 fewer than asked for" in err
-
-
-@pytest.mark.parametrize("known", [True, False])
-def test_an_operating_point_of_other_recordings_is_said_to_be_so(
-    recordings, exported, tmp_path, capsys, known
-):
-    front = {
-        "task": "object",
-        "data_digest": Model(exported / "model.onnx").info.data_digest if known else "0" * 64,
-        "points": [
-            {"window_s": 0.6, "features": ["max_force"], "scaling": "II",
-             "milliseconds": 612.0, "accuracy": 0.7}
-        ],
-    }  # fmt: skip
-    (tmp_path / "front.json").write_text(json.dumps(front))
-    command = ["--data", str(recordings), "--out", str(tmp_path), "--projection", "pca"]
-    assert main([*command, "--front", "fast", "--fronts", str(tmp_path / "front.json")]) == 0
-    info = Model(tmp_path / "model.onnx").info
-    assert (info.window_s, info.features) == (0.6, ("max_force",))
-    assert ("measured on other recordings" in capsys.readouterr().err) is not known

@@ -7,7 +7,9 @@ front.json, which `python -m export --front` reads.
 from __future__ import annotations
 
 import argparse
+import math
 import os
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -23,17 +25,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="what `edge-classify bench` wrote of a model that was fitted on these recordings",
     )
     parser.add_argument(
-        "--prices",
-        metavar="prices.json",
-        help="what `python -m export.prices` wrote of these recordings: shows what "
-        "components, neighbours and training rows cost",
+        "--cost",
+        type=cost,
+        default=(10.0, 1.0),
+        metavar="wrong=10,second=1",
+        help="what a wrong decision and a second's wait cost you: the report names the window of "
+        "least cost (default: wrong=10,second=1)",
     )
     parser.add_argument(
         "--scene", help="the scene that they were simulated from: adds the physical limit"
     )
     parser.add_argument(
         "--task",
-        help="task of the picture and of front.json (default: category, or else the first)",
+        help="task of front.json (default: category, or else the first)",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("build/tradeoff"), help="folder (default: %(default)s)"
@@ -41,6 +45,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
     )
+
+
+def cost(text: str) -> tuple[float, float]:
+    """The prices of a wrong decision and of a second, out of `wrong=10,second=1`.
+
+    Raises:
+        ArgumentTypeError: it has another form, or a price is below 0 or not finite.
+    """
+    with suppress(ValueError, KeyError):
+        prices = dict(part.split("=") for part in text.split(","))
+        wrong, second = float(prices.pop("wrong")), float(prices.pop("second"))
+        if not prices and 0.0 <= wrong < math.inf and 0.0 <= second < math.inf:
+            return wrong, second
+    raise argparse.ArgumentTypeError(f"must be like wrong=10,second=1, not {text!r}")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,7 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
         scene_path=arguments.scene,
         jobs=arguments.jobs,
         main=arguments.task,
-        prices_path=arguments.prices,
+        wrong=arguments.cost[0],
+        second=arguments.cost[1],
     )
     print(report)
     return 0

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
-from train.evaluate import Labels, Result
+from train.evaluate import Result
 from train.report.figures import COLOURS, STYLE, canvas, curve, png
 from train.report.score import interval, majority
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.early import FOLDS, StoppingComparison
+from train.tradeoff.choices import unseen
+from train.tradeoff.early import FOLDS, Certified, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
 
@@ -28,71 +26,96 @@ ROOM = 0.15
 """Accuracy above which there is room for words below the line of the most frequent label."""
 
 
-def answers(compared: StoppingComparison, after_s: float) -> list[Row]:
-    """The rows of a task's table: fixed windows, then early decisions.
+def answers(measured: Measured, task: str) -> list[Row]:
+    """The rows of a task's table: fixed windows, then early decisions."""
+    compared, after_s = measured.comparisons[task], measured.after_s
 
-    Args:
-        compared: the task's held-out decisions.
-        after_s: seconds from the end of the window to the decision, on the wire and in arithmetic.
-    """
-
-    def row(how: str, seconds: float, result: Result, command: str) -> Row:
+    def row(how: str, seconds: float, result: Result, met: Result | None, command: str) -> Row:
         return {
             "time s": round(seconds + after_s, 3),
             "accuracy %": round(100 * result.accuracy, 1),
             "95 % interval": interval(result),
+            "objects never met %": "" if met is None else round(100 * met.accuracy, 1),
             "how": how,
             "command": f"`{command}`" if command else "",
         }
 
     rows = [
-        row(f"after {window:g} s", window, result, f"make export EXPORT='--window {window:g}'")
-        for window, result in compared.results.items()
+        row(f"after {window:g} s", window, tasks[task].by_trial, unseen(tasks[task]),
+            f"make export EXPORT='--quick --window {window:g}'")
+        for window, tasks in measured.points.items()
         if window in SHOWN_S
-    ]
-    able = [certified for certified in compared.certified if certified.folds > FOLDS // 2]
-    for before, now in zip([None, *able], able, strict=False):
-        # The same rule may be certified for the smaller error already.
-        if before is None or (now.mean_s, now.wrong) != (before.mean_s, before.wrong):
-            how = f"when sure, at most {100 * now.asked:g} % wrong"
-            command = f"edge-classify run --error {now.asked:g}"
-            rows.append(row(how, now.mean_s, compared.result(now.wrong), command))
+    ]  # fmt: skip
+    able = distinct(compared)
+    for now in able:
+        how = f"when sure, at most {100 * now.asked:g} % wrong"
+        command = f"edge-classify run --error {now.asked:g}"
+        rows.append(row(how, now.mean_s, compared.result(now.wrong), None, command))
     for threshold, seconds, wrong in [] if able else compared.when_sure():
         if threshold in SURE:
             how = f"when {100 * threshold:.0f} % sure; no error rate is certified"
-            rows.append(row(how, seconds, compared.result(wrong), ""))
+            rows.append(row(how, seconds, compared.result(wrong), None, ""))
     return rows
 
 
-def sentence(task: str, compared: StoppingComparison, labels: NDArray[np.str_]) -> str:
-    """A line on a task's best fixed window, the most careful early decision, and guessing."""
-    window, full = list(compared.results.items())[-1]
-    early = "no error rate can be certified"
+def distinct(compared: StoppingComparison) -> list[Certified]:
+    """The errors that most folds certify; a rule that serves two errors stands at the smaller."""
     able = [certified for certified in compared.certified if certified.folds > FOLDS // 2]
-    if able:
+    return list({(own.mean_s, own.wrong): own for own in reversed(able)}.values())[::-1]
+
+
+def sentence(measured: Measured, task: str) -> str:
+    """A line on a task's longest window, the most careful early decision, and guessing."""
+    window, tasks = list(measured.points.items())[-1]
+    met = unseen(tasks[task])
+    never = "" if met is None else f" ({100 * met.accuracy:.0f} % for objects never met)"
+    early = "no error rate can be certified"
+    compared = measured.comparisons[task]
+    if able := distinct(compared):
         share, command = 100 * (1 - able[0].wrong), f"edge-classify run --error {able[0].asked:g}"
         early = f"{share:.0f} % at {able[0].mean_s:.2f} s on average with `{command}`"
     return (
-        f"{task}: {100 * full.accuracy:.0f} % after {window:g} s; {early}; always naming the most "
-        f"frequent label, {100 * majority(labels).accuracy:.0f} %."
+        f"{task}: {100 * tasks[task].by_trial.accuracy:.0f} % after {window:g} s{never}; {early}; "
+        f"always naming the most frequent label, "
+        f"{100 * majority(measured.y[task]).accuracy:.0f} %."
     )
 
 
 def section(measured: Measured) -> Section:
     """The answer for each task, and the picture."""
-    after_s = measured.wire_s + measured.arithmetic_s
-    compared = measured.comparisons
     wide, narrow = (picture(measured, phone=phone) for phone in (False, True))
     title = "Accuracy against time to decision, a panel a task; below, where the time goes"
     return Section(
         "The answer",
-        [sentence(task, own, measured.y[task]) for task, own in compared.items()],
-        [
-            Table(f"answer_{task}", task, answers(own, after_s), narrow=4)
-            for task, own in compared.items()
-        ],
+        [sentence(measured, task) for task in measured.y],
+        [Table(f"answer_{task}", task, answers(measured, task), narrow=4) for task in measured.y],
         [Figure("tradeoff", title, wide, narrow)],
-        widget=slider({task: own.results for task, own in compared.items()}),
+        widget=slider(measured.points),
+    )
+
+
+def prices(measured: Measured) -> Section:
+    """The window that costs least, by the price of a wrong decision and of a second's wait."""
+    rows: list[Row] = []
+    for task in measured.y:
+        paid = {
+            window: measured.wrong * (1.0 - result.accuracy)
+            + measured.second * (window + measured.after_s)
+            for window, result in measured.results(task).items()
+        }
+        best = min(paid, key=paid.__getitem__)
+        rows.append(
+            {"task": task, "best window s": best, "mean price": round(paid[best], 2)}
+            | {"command": f"`make export EXPORT='--quick --window {best:g}'`"}
+        )
+    return Section(
+        "The price of a wrong decision",
+        [
+            f"Where a wrong decision costs {measured.wrong:g} and a second {measured.second:g} "
+            '(`make tradeoff TRADEOFF="--cost wrong=10,second=1"`), a decision costs least on '
+            "average after:"
+        ],
+        [Table("price", "The window that costs least", rows)],
     )
 
 
@@ -101,7 +124,7 @@ def reasons(measured: Measured) -> Section:
     notes = [
         f"Nearly all of the time is waiting. The last frame's way over the wire takes "
         f"{1e3 * measured.wire_s:.1f} ms, all arithmetic of a decision "
-        f"{1e3 * measured.arithmetic_s:.2f} ms on {measured.board.name}."
+        f"{1e3 * measured.board.arithmetic_s:.2f} ms on {measured.board.name}."
     ]
     if measured.breakaways:
         times = measured.breakaways.values()
@@ -111,12 +134,14 @@ def reasons(measured: Measured) -> Section:
             f"takes {min(times):.2f} to {max(times):.2f} s from onset, depending on the object."
         )
     notes.append(
-        "`make export FRONT=fast`, `FRONT=balanced` or `FRONT=accurate` takes window, features and "
-        "scaling from the best settings below, `FRONT=500` the most accurate setting within "
-        "500 ms, `FRONT=0.8` the fastest that reaches 80 %. `edge-classify run --error 0.1` "
-        "decides as soon as it is sure, with at most one decision in ten wrong. An error rate that "
-        "the trials cannot certify is refused, with the smallest one that they can; leave a margin "
-        "above it."
+        "Accuracies are those of the quick choice, `make export EXPORT=--quick`, made again at "
+        "each window. `make export FRONT=fast`, `FRONT=balanced` (a window of at most 0.9 s) or "
+        "`FRONT=accurate` exports the very model whose accuracy stands here, `FRONT=500` the most "
+        "accurate within 500 ms, `FRONT=0.8` the fastest that reaches 80 %. Early decisions are "
+        "those of `make export EXPORT='--quick --decision-points 0.2:1.2:0.1'`. "
+        "`edge-classify run --error 0.1` decides as soon as it is sure, with at most one decision "
+        "in ten wrong. An error rate that the trials cannot certify is refused, with the smallest "
+        "one that they can; leave a margin above it."
     )
     return Section("Why, and how to have it", notes)
 
@@ -138,12 +163,7 @@ GLOSSARY = {
     "window": "The time from onset that a decision looks at.",
     "wire": "On average half a frame's period until the next frame, and that frame's time on I2C.",
     "arithmetic": "Tracking the last frame, computing the features, and deciding.",
-    "scaling": "None, or Methods I to V of the paper's Eqs. 1 to 5.",
-    "components, k": "Coordinates that the projection keeps, and neighbours that vote.",
-    "front": "The settings that no other beats in both time and accuracy.",
-    "the paper": "Bhattacharjee, Rehg and Kemp, Haptic classification and recognition of objects "
-    "using a tactile sensing forearm, IROS 2012. Its setting: all taxels, three features, no "
-    "scaling, 1.2 s.",
+    "objects never met": "Accuracy where all trials of an object are held out together.",
     "breakaway": "mu_s m g / (k v): the time until the arm's spring, tightened at its speed v, "
     "overcomes static friction (or tips what is tall and narrow).",
 }
@@ -164,20 +184,20 @@ def picture(measured: Measured, *, phone: bool = False) -> bytes:
         upper, lower = pair
         grid = upper.subplots(down, across, squeeze=False, sharey=True)
         for axes, (task, own) in zip(grid.flat, compared.items(), strict=False):
-            _panel(axes, task, own, measured.y, measured.wire_s + measured.arithmetic_s)
+            _panel(axes, task, own, measured)
         for axes in grid.flat[m:]:
             axes.set_visible(False)
         for axes in grid[:, 0]:
             axes.set_ylabel("decisions that are right, %")
         handles = grid.flat[0].get_legend_handles_labels()
         upper.legend(*handles, loc="outside upper center", ncols=2, fontsize=9)
-        _split(lower, measured.wire_s, measured.arithmetic_s, compared)
+        _split(lower, measured)
         return png(figure)
 
 
-def _panel(axes: Any, task: str, compared: StoppingComparison, y: Labels, after_s: float) -> None:
+def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measured) -> None:
     """Draw a task's accuracy against time, after fixed windows and when sure."""
-    results, labels = compared.results, y[task]
+    results, labels, after_s = measured.results(task), measured.y[task], measured.after_s
     chance = majority(labels).accuracy
     axes.axhline(100 * chance, color="0.55", lw=1, ls=(0, (1, 2)))
     axes.text(
@@ -205,12 +225,12 @@ def _panel(axes: Any, task: str, compared: StoppingComparison, y: Labels, after_
     axes.set_title(f"{task} ({len(set(labels.tolist()))} labels)")
 
 
-def _split(
-    figure: Any, wire_s: float, arithmetic_s: float, compared: Mapping[str, StoppingComparison]
-) -> None:
+def _split(figure: Any, measured: Measured) -> None:
     """Draw the time of a decision after the full window, and its end magnified."""
-    window = next(iter(compared.values())).decision_points_s[-1]
-    after_ms = 1e3 * (wire_s + arithmetic_s)
+    window, wire_s, arithmetic_s = (
+        max(measured.points), measured.wire_s, measured.board.arithmetic_s
+    )  # fmt: skip
+    after_ms = 1e3 * measured.after_s
     stages = [
         (f"waiting {window:g} s", 1e3 * window, COLOURS[0], ""),
         (f"wire {1e3 * wire_s:.0f} ms", 1e3 * wire_s, COLOURS[1], "//"),

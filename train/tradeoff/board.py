@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from edge.config import json_file
 from edge.errors import InputError
+from train.report.section import Section, Table
 
 STAGES = ("track", "features", "decision")
 
@@ -21,7 +22,6 @@ class Board:
         stages_us: {stage: (median, 99th percentile) in microseconds}.
         memory_mb: the largest resident size.
         cold_start_ms: from starting Python to a model that is ready.
-        features: how many the model measures.
         model: SHA-256 of the model file.
     """
 
@@ -30,17 +30,12 @@ class Board:
     stages_us: dict[str, tuple[float, float]]
     memory_mb: float
     cold_start_ms: float
-    features: int
     model: str
 
-    def arithmetic_s(self, features: int) -> float:
-        """Seconds from the window's last frame to the decision.
-
-        The decision itself is the benched model's, of all its tasks: fewer components or
-        neighbours move it by microseconds.
-        """
-        track, vector, decision = (self.stages_us[stage][0] / 1e6 for stage in STAGES)
-        return track + vector * features / self.features + decision
+    @property
+    def arithmetic_s(self) -> float:
+        """Seconds from the window's last frame to the decision, of the benched model."""
+        return sum(self.stages_us[stage][0] for stage in STAGES) / 1e6
 
 
 def read(path: str | os.PathLike[str]) -> Board:
@@ -61,12 +56,29 @@ def read(path: str | os.PathLike[str]) -> Board:
             },
             memory_mb=float(content["memory_mb"]),
             cold_start_ms=float(content["cold_start_ms"]),
-            features=len(content["model"]["features"]),
             model=str(content["model"]["sha256"]),
         )
-        if board.features < 1 or not all(0.0 < board.stages_us[s][0] < 1e9 for s in STAGES):
+        if not all(0.0 < board.stages_us[s][0] < 1e9 for s in STAGES):
             raise ValueError("a stage takes no time")
     return board
+
+
+def section(board: Board) -> Section:
+    """The figures of the board file."""
+    rows = [
+        {"stage": name, "median us": median, "99th percentile us": p99}
+        for name, (median, p99) in board.stages_us.items()
+    ]
+    return Section(
+        "The board",
+        [
+            f"{board.name}, by edge-classify bench with the model {board.model[:12]}: "
+            f"{board.memory_mb:.0f} MB of memory, {board.cold_start_ms:.0f} ms from starting "
+            "Python to a model that is ready. The arithmetic of a decision is the sum of the "
+            "medians of track, features and decision."
+        ],
+        [Table("board", "Stages", rows)],
+    )
 
 
 def check(board: Board, path: str, digest: str) -> None:

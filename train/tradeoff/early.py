@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,82 +11,18 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from edge.model.stopping import StoppingRule
-from train.evaluate import Labels, Result, evaluate, stratified_folds
-from train.evaluate import SearchGrid as Grid
+from train.dataset import DataSet
+from train.evaluate import Result, stratified_folds
+from train.fitting import fit
 from train.pipeline import Choice, ContactClassifier
 from train.progress import bar
-from train.stopping import (
-    FEWER_FOLDS,
-    MANY_TRIALS,
-    NEVER,
-    THRESHOLDS,
-    SequentialClassifier,
-    answers,
-    confidences,
-    finest,
-    stops,
-    withheld,
-)
-from train.stopping import FOLDS as CHOOSING_FOLDS
+from train.stopping import NEVER, THRESHOLDS, answers, confidences, finest, stops, withheld
+from train.tradeoff.choices import some
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
 RATES = (0.02, 0.05, 0.1, 0.2)
 BINS = 10
-
-
-@dataclass(frozen=True)
-class NestedChoice:
-    """What some trials choose, and what they choose without each of their folds.
-
-    Attributes:
-        choices: {task: Choice} by all of them.
-        folds: (n,) from 0.
-        without: [fold]{task: Choice}, by the trials of the other folds.
-    """
-
-    choices: dict[str, Choice]
-    folds: NDArray[np.int64]
-    without: list[dict[str, Choice]]
-
-
-Choose = Callable[[NDArray[np.int64]], NestedChoice]
-"""Chooses every task's features, projection and k by some rows of the trials alone."""
-
-
-@dataclass(frozen=True)
-class Chooser:
-    """Chooses every task's projection and neighbours by some of the trials alone.
-
-    Attributes:
-        X: (n, p) at the full window.
-        y: {task: (n,) labels}.
-        grids: the candidates.
-        features: names of the types in X.
-        widths: columns of each; equal where None.
-    """
-
-    X: NDArray[np.float64]
-    y: Labels
-    grids: tuple[Grid, ...]
-    features: tuple[str, ...]
-    widths: tuple[int, ...] | None = None
-
-    def __call__(self, rows: NDArray[np.int64]) -> NestedChoice:
-        """The candidates that are best in a cross-validation among the rows."""
-        y = {task: labels[rows] for task, labels in self.y.items()}
-        count = CHOOSING_FOLDS if len(rows) < MANY_TRIALS else FEWER_FOLDS
-        folds = stratified_folds(y[finest(y)], count)
-        form = {"features": self.features, "widths": self.widths}
-        table = evaluate(self.X[rows], y, folds, self.grids, **form)  # type: ignore[arg-type]
-        return NestedChoice(
-            {task: table.choices[task][table.chosen(task)] for task in y},
-            folds,
-            [
-                {task: table.choices[task][table.without(task, fold)] for task in y}
-                for fold in range(int(folds.max()) + 1)
-            ],
-        )
 
 
 @dataclass(frozen=True)
@@ -120,8 +56,6 @@ class StoppingComparison:
         confidence: (decision points, n) calibrated.
         labels: (decision points, n) labels named.
         certified: one entry for each asked error.
-        hindsight_s: mean time of stopping each trial at the first window after which its answer
-            stays as right or wrong as at the full one; no rule on these answers can be faster.
     """
 
     decision_points_s: tuple[float, ...]
@@ -129,7 +63,6 @@ class StoppingComparison:
     confidence: NDArray[np.float64]
     labels: NDArray[np.str_]
     certified: list[Certified]
-    hindsight_s: float
 
     @property
     def trials(self) -> int:
@@ -192,39 +125,22 @@ class _Fold:
 
 
 def compare_stopping(
-    X: NDArray[np.float64],
-    y: Labels,
-    decision_points_s: Sequence[float],
-    features: Sequence[str],
-    choose: Choose,
-    *,
-    widths: Sequence[int] | None = None,
-    jobs: int = 1,
+    dataset: DataSet, decision_points_s: Sequence[float], *, jobs: int = 1
 ) -> dict[str, StoppingComparison]:
-    """{task: comparison}. Folds are held out in turn; the others choose, train and calibrate.
-
-    Args:
-        X: (decision points, n, p).
-        y: {task: (n,) labels}.
-        decision_points_s: windows in seconds.
-        features: names of the types.
-        choose: chooses by the training rows alone.
-        widths: columns of each type; equal where None.
-        jobs: processes.
-    """
+    """{task: comparison}. Folds are held out in turn; a quick export of the others answers them."""
+    y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
     work = (
-        delayed(_held_out)(
-            X, y, np.flatnonzero(folds == k), decision_points_s, tuple(features), choose, widths
-        )
+        delayed(_held_out)(dataset, np.flatnonzero(folds == k), decision_points_s)
         for k in range(FOLDS)
     )
-    answered = Parallel(n_jobs=jobs, return_as="generator")(work)
+    answered = Parallel(n_jobs=jobs, return_as="generator", max_nbytes=None)(work)
     held_out = list(bar(answered, total=FOLDS, desc="deciding early"))
+    shape = len(decision_points_s), len(dataset.trials)
     comparisons = {}
     for task, labels in y.items():
-        named = np.empty(X.shape[:2], dtype=labels.dtype)
-        confidence = np.empty(X.shape[:2])
+        named = np.empty(shape, dtype=labels.dtype)
+        confidence = np.empty(shape)
         for fold in held_out:
             named[:, fold.test] = fold.named[task]
             confidence[:, fold.test] = fold.confidence[task]
@@ -235,32 +151,22 @@ def compare_stopping(
             confidence,
             named,
             [_certified(error, task, held_out, right, decision_points_s) for error in ERRORS],
-            hindsight(right, decision_points_s),
         )
     return comparisons
 
 
 def _held_out(
-    X: NDArray[np.float64],
-    y: Labels,
-    test: NDArray[np.int64],
-    decision_points_s: Sequence[float],
-    features: Sequence[str],
-    choose: Choose,
-    widths: Sequence[int] | None,
+    dataset: DataSet, test: NDArray[np.int64], decision_points_s: Sequence[float]
 ) -> _Fold:
-    train = np.setdiff1d(np.arange(X.shape[1]), test)
-    chosen = choose(train)
-    model = SequentialClassifier(chosen.choices, decision_points_s, features, widths=widths).fit(
-        X[:, train],
-        {task: labels[train] for task, labels in y.items()},
-        chosen.folds,
-        chosen.without,
-    )
+    train = some(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
+    fitted = fit(train, quick=True, decision_points_s=decision_points_s, jobs=1)
+    model, others = fitted.sequential, some(dataset, test)
+    assert model is not None
+    names = fitted.dataset.names
+    new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])
     named, confidence, unknown = {}, {}, {}
-    new = X[:, test][..., model.columns_]
     with threadpool_limits(1):
-        for task in y:
+        for task in model.choices:
             named[task], margins, distances = answers(model.decision_points_, task, new)
             stopping = model.stopping_[task]
             confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
@@ -295,13 +201,6 @@ def _certified(
     return Certified(error, len(rows), *means.tolist())
 
 
-def hindsight(right: NDArray[np.bool_], decision_points_s: Sequence[float]) -> float:
-    """Mean seconds until `right` (decision_points, n) keeps its final value."""
-    same = right == right[-1]
-    stays = np.logical_and.accumulate(same[::-1])[::-1]
-    return float(np.array(decision_points_s)[stays.argmax(axis=0)].mean())
-
-
 @dataclass(frozen=True)
 class NoveltyCount:
     """Contacts with trained objects and with others that are called unknown, at one rate.
@@ -320,11 +219,9 @@ class NoveltyCount:
 
 
 def novelty(
-    X: NDArray[np.float64],
+    dataset: DataSet,
     labels: NDArray[np.str_],
     choice: Choice,
-    features: Sequence[str],
-    widths: Sequence[int] | None = None,
     rates: Sequence[float] = RATES,
 ) -> list[NoveltyCount]:
     """One count for each rate; none where too few labels are left.
@@ -332,13 +229,13 @@ def novelty(
     A third of the labels is left out entirely, in turn; of the others, one fold at a time.
 
     Args:
-        X: (n, p) at the full window.
+        dataset: the trials.
         labels: (n,) of the task with most labels.
         choice: of that task.
-        features: names of the types.
-        widths: columns of each; equal where None.
         rates: novelty rates.
     """
+    measured = dataset.of(choice.features)
+    X, widths = measured.features(), measured.widths()
     names = np.unique(labels)
     folds = stratified_folds(labels, FOLDS)
     known: list[NDArray[np.float64]] = []
@@ -350,7 +247,7 @@ def novelty(
                 train = np.flatnonzero(~left_out & (folds != fold))
                 if len(np.unique(labels[train])) < 2 or len(train) <= choice.k:
                     continue
-                model = ContactClassifier({"task": choice}, features, widths).fit(
+                model = ContactClassifier({"task": choice}, measured.names, widths).fit(
                     X[train], {"task": labels[train]}
                 )
                 for rows, trials in ((known, ~left_out), (strange, left_out)):
@@ -364,15 +261,3 @@ def novelty(
         NoveltyCount(rate, len(near), len(far), int((far > np.quantile(near, 1 - rate)).sum()))
         for rate in rates
     ]
-
-
-def fixed_time(compared: StoppingComparison, wrong: float) -> float | None:
-    """The shortest fixed window, interpolated, with at most that share wrong; or None."""
-    lowest, points = np.minimum.accumulate(compared.fixed), compared.decision_points_s
-    if not wrong >= lowest[-1]:
-        return None
-    after = int(np.argmax(lowest <= wrong))
-    if after == 0:
-        return points[0]
-    ends = slice(after - 1, after + 1)
-    return float(np.interp(-wrong, -lowest[ends], points[ends]))

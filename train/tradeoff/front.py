@@ -1,4 +1,4 @@
-"""Ready-made settings for `make export FRONT=`, which trade accuracy against time."""
+"""Points of `make export FRONT=`: windows, with the accuracy of the default choice at each."""
 
 from __future__ import annotations
 
@@ -8,28 +8,23 @@ from pathlib import Path
 
 from edge.config import json_file
 from edge.errors import InputError
-from train.scaling import SCALINGS
 
-SHIPPED = Path(__file__).with_name("front.json")
-"""The front of the simulated `cody18`."""
 NAMES = ("fast", "balanced", "accurate")
+BALANCED_S = 0.9
+"""The longest window that counts as balanced."""
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Settings to export with, and their measured time and accuracy.
+    """A window, and what the quick choice at that window reaches.
 
     Attributes:
         window_s: seconds from onset that a decision waits for.
-        features: names of the feature types.
-        scaling: of the features.
         milliseconds: from onset to decision.
-        accuracy: nested, 0 to 1.
+        accuracy: nested over the entire choice, trials left out; 0 to 1.
     """
 
     window_s: float
-    features: tuple[str, ...]
-    scaling: str
     milliseconds: float
     accuracy: float
 
@@ -41,43 +36,47 @@ class ParetoFront:
     Attributes:
         task: whose accuracy it is.
         points: the fastest first, each more accurate than those before it.
-        digest: SHA-256 over the recordings that they were measured on; empty if unknown.
     """
 
     task: str
     points: tuple[OperatingPoint, ...]
-    digest: str = ""
 
     @classmethod
-    def read(cls, path: Path) -> ParetoFront:
+    def read(cls, path: Path, digest: str) -> ParetoFront:
         """Read the front.json that `make tradeoff` writes.
 
+        Args:
+            path: of the file.
+            digest: SHA-256 over the recordings that a point is wanted for.
+
         Raises:
-            InputError: the file cannot be read, or is not a front.json.
+            InputError: the file cannot be read, is not a front.json, or is of other recordings.
         """
-        with json_file(path, "a front.json", "make one with `make tradeoff`") as content:
+        mend = "make one with `make tradeoff`"
+        with json_file(path, "a front.json", mend) as content:
             points = [
                 OperatingPoint(
-                    window_s=float(point["window_s"]),
-                    features=tuple(map(str, point["features"])),
-                    scaling=str(point["scaling"]),
-                    milliseconds=float(point["milliseconds"]),
-                    accuracy=float(point["accuracy"]),
+                    *(float(point[key]) for key in ("window_s", "milliseconds", "accuracy"))
                 )
                 for point in content["points"]
             ]
-            task, digest = str(content["task"]), str(content.get("data_digest", ""))
-        if not points or not all(point.scaling in SCALINGS for point in points):
-            raise InputError(f"{path}: has no point to choose from; make one with `make tradeoff`")
-        return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)), digest)
+            task, measured = str(content["task"]), str(content["data_digest"])
+            if not points or not all(0.0 < p.window_s <= 60.0 and p.milliseconds for p in points):
+                raise ValueError("no point, or one of no time")
+        if measured != digest:
+            raise InputError(
+                f"{path}: was measured on other recordings (digest {measured[:12]}, these have "
+                f"{digest[:12]}); {mend} DATA=... of these"
+            )
+        return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)))
 
     def pick(self, wanted: str) -> OperatingPoint:
         """The operating point that a user wishes for.
 
         Args:
             wanted: `fast` (the fastest), `accurate` (the most accurate), `balanced` (the most
-                accuracy for its time, both as shares of the front's span), a number above 1 (the
-                most accurate within so many milliseconds) or one of 0 to 1 (the fastest that
+                accurate of a window within `BALANCED_S`, or else the fastest), a number above 1
+                (the most accurate within so many milliseconds) or one of 0 to 1 (the fastest that
                 reaches that accuracy).
 
         Raises:
@@ -89,15 +88,7 @@ class ParetoFront:
         if wanted == "accurate":
             return last
         if wanted == "balanced":
-            longer = (last.milliseconds - first.milliseconds) or 1.0
-            better = (last.accuracy - first.accuracy) or 1.0
-            return max(
-                self.points,
-                key=lambda point: (
-                    (point.accuracy - first.accuracy) / better
-                    - (point.milliseconds - first.milliseconds) / longer
-                ),
-            )
+            return [first, *(p for p in self.points if p.window_s <= BALANCED_S)][-1]
         try:
             number = float(wanted)
         except ValueError:

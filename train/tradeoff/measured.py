@@ -5,63 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from edge.touch.features import FEATURES
 from train.dataset import DataSet
 from train.evaluate import Labels, Result
-from train.pipeline import Choice
 from train.tradeoff.board import Board
+from train.tradeoff.choices import Points
 from train.tradeoff.early import NoveltyCount, StoppingComparison
-from train.tradeoff.prices import Prices
-
-PAPER = ("none", 1.2)
-"""The paper's setting: no scaling, 1.2 s, its three features, all taxels (section IV-A)."""
 
 
 @dataclass(frozen=True)
-class MeasuredPoint:
-    """One setting of one task, with its time and its accuracy.
+class Saving:
+    """One change, and the accuracy that it costs.
 
     Attributes:
-        task: the task.
-        taxels: number of taxels, of the skin itself or of a pooled one.
-        wire: name of the wiring.
-        features: names of the features.
-        scaling: of the features.
-        components, k: those most often chosen.
-        window_s: time waited from onset.
-        wire_s: half a frame's period until the next frame, and that frame on the wire.
-        arithmetic_s: from that frame to the decision.
-        result: nested accuracy.
-        own_skin: whether it is the recordings' own skin, not a pooled one.
+        what: the change.
+        cost: what it saves or costs, other than accuracy.
+        tasks: {task: points gained, and the ends of their 95 % interval, on the same trials}.
     """
 
-    task: str
-    taxels: int
-    wire: str
-    features: tuple[str, ...]
-    scaling: str
-    components: int
-    k: int
-    window_s: float
-    wire_s: float
-    arithmetic_s: float
-    result: Result
-    own_skin: bool
-
-    @property
-    def seconds(self) -> float:
-        """Seconds from onset to decision."""
-        return self.window_s + self.wire_s + self.arithmetic_s
-
-    @property
-    def paper(self) -> bool:
-        """Whether it is the paper's setting, on the wire that carries its 100 frames a second."""
-        return (
-            self.own_skin
-            and (self.scaling, self.window_s) == PAPER
-            and self.features == FEATURES
-            and self.wire.startswith("AD7147, 3")
-        )
+    what: str
+    cost: str
+    tasks: Mapping[str, tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -69,44 +32,35 @@ class Measured:
     """Accuracies and times of one data set on one board.
 
     Attributes:
-        dataset: contacts followed for the features of `paper` and `contact`.
+        dataset: the trials, with the features of every candidate.
         y: {task: (n,) labels}, the main task first.
-        main: the main task: that of the settings' picture and of front.json.
         board: figures of the machine that decides.
-        prices: figures of models of other sizes, if they were measured.
+        wire_s: from the end of the window until its last frame is read.
         breakaways: {object: seconds} until static friction breaks; empty without a scene.
+        points: the quick choice at each window.
         comparisons: {task: deciding early beside fixed windows}.
-        choices: {task: features, projection and k chosen by all trials}.
         novelty: how often contacts are called unknown.
-        points: every setting of every task.
+        costs: changes beside the choice at the usual window.
+        wrong, second: an owner's price of a wrong decision and of a second's wait.
     """
 
     dataset: DataSet
     y: Labels
-    main: str
     board: Board
-    prices: Prices | None
+    wire_s: float
     breakaways: Mapping[str, float]
+    points: Points
     comparisons: Mapping[str, StoppingComparison]
-    choices: Mapping[str, Choice]
     novelty: Sequence[NoveltyCount]
-    points: Sequence[MeasuredPoint]
+    costs: Sequence[Saving]
+    wrong: float = 10.0
+    second: float = 1.0
 
     @property
-    def types(self) -> int:
-        """Number of feature types that are measured."""
-        return len(self.dataset.names)
+    def after_s(self) -> float:
+        """Seconds from the end of the window to the decision."""
+        return self.wire_s + self.board.arithmetic_s
 
-    @property
-    def arithmetic_s(self) -> float:
-        """Seconds of arithmetic of a decision with all the features."""
-        return self.board.arithmetic_s(self.types)
-
-    @property
-    def wire_s(self) -> float:
-        """Seconds from the end of the window until its last frame is read.
-
-        On the wire of the paper's setting, or on the fastest where the skin cannot have that.
-        """
-        fastest = min(point.wire_s for point in self.points if point.own_skin)
-        return next((point.wire_s for point in self.points if point.paper), fastest)
+    def results(self, task: str) -> dict[float, Result]:
+        """{window: accuracy of a task, trials left out}."""
+        return {window: tasks[task].by_trial for window, tasks in self.points.items()}

@@ -10,37 +10,31 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.files import write_whole
-from edge.touch.feature_sets import SETS, expand
-from edge.touch.features import FEATURES, SAMPLES
-from train.dataset import load_trials
-from train.evaluate import SearchGrid
+from train.dataset import read
 from train.report.page import write
 from train.report.section import Section, counted
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.stopping import finest
-from train.tradeoff import answer, arithmetic, early, prices, settings, stopping
+from train.tradeoff import answer, costs, early, stopping
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
+from train.tradeoff.choices import WINDOWS_S, chosen, followed, front
 from train.tradeoff.measured import Measured
+from train.tradeoff.wires import waited_s
 
 SECTIONS: tuple[Callable[[Measured], Section | None], ...] = (
     answer.section,
     answer.reasons,
+    costs.section,
+    answer.prices,
     stopping.section,
-    settings.section,
-    arithmetic.section,
     stopping.unknown,
-    arithmetic.sizes,
-    arithmetic.board,
+    lambda measured: boards.section(measured.board),
     answer.glossary,
 )
 """The report's sections in their order; None where there is nothing to show."""
-DECISION_POINTS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 FEWEST = 40
-NAMES = expand(["paper", "contact"])
-GRIDS = (SearchGrid("IV", features=FEATURES), SearchGrid("IV", "lda", features=SETS["contact"]))
-"""Candidates for every task's decision: the paper's way, and the discriminants of `contact`."""
 
 
 def tradeoff(
@@ -51,9 +45,10 @@ def tradeoff(
     scene_path: str | None = None,
     jobs: int = 1,
     main: str | None = None,
-    prices_path: str | None = None,
+    wrong: float = 10.0,
+    second: float = 1.0,
 ) -> Path:
-    """Measure every setting worth showing and write the report; its path.
+    """Measure the quick choice at each window and with each change; write the report; its path.
 
     Args:
         data: recordings and folders of them.
@@ -61,18 +56,17 @@ def tradeoff(
         board_path: board.json of a model that was fitted on these recordings.
         scene_path: the scene that they were simulated from, for the physical limit.
         jobs: processes.
-        main: the task of the settings' picture and of front.json; `category` where there is one.
-        prices_path: prices.json of these recordings, for the price of a model's size.
+        main: the task of front.json; `category` where there is one.
+        wrong, second: an owner's price of a wrong decision and of a second's wait.
 
     Raises:
         InputError: the data cannot be used, or a file is of another kind or of other recordings.
     """
     board = boards.read(board_path)
     scene = None if scene_path is None else scenes.load(scene_path)
-    horizon_s = max(settings.WINDOWS[-1], DECISION_POINTS_S[-1])
-    dataset = load_trials(data, horizon_s=horizon_s, features=NAMES, progress=True)
-    boards.check(board, board_path, dataset.digest)
-    sizes = None if prices_path is None else prices.read(prices_path, dataset.digest)
+    raw = read(data, progress=True)
+    boards.check(board, board_path, raw.digest)
+    dataset = followed(raw, progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}")
     if main is None:
@@ -81,24 +75,23 @@ def tradeoff(
         raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     y = {task: dataset.labels(task) for task in order}
-    X = np.stack([dataset.features(window, SAMPLES, NAMES) for window in DECISION_POINTS_S])
-    names, columns = dataset.names, dataset.widths(SAMPLES)
-    choose = early.Chooser(X[-1], y, GRIDS, names, columns)
-    compared = early.compare_stopping(
-        X, y, DECISION_POINTS_S, names, choose, widths=columns, jobs=jobs
-    )
-    choices, most = choose(np.arange(X.shape[1])).choices, finest(y)
+    workers, most = Workers(jobs), finest(y)
+    made = workers.map("windows", chosen, [(dataset, window) for window in WINDOWS_S])
+    points = dict(zip(WINDOWS_S, made, strict=True))
+    full = points[WINDOWS_S[-1]]
+    rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
     measured = Measured(
         dataset=dataset,
         y=y,
-        main=main,
         board=board,
-        prices=sizes,
+        wire_s=waited_s(dataset.layout, rate),
         breakaways={} if scene is None else breakaway_times(scene),
-        comparisons=compared,
-        choices=choices,
-        novelty=early.novelty(X[-1], y[most], choices[most], names, columns),
-        points=settings.measure(dataset, board, Workers(jobs)),
+        points=points,
+        comparisons=early.compare_stopping(dataset, WINDOWS_S, jobs=jobs),
+        novelty=early.novelty(dataset, y[most], full[most].choice),
+        costs=costs.measure(raw, dataset, points, workers),
+        wrong=wrong,
+        second=second,
     )
     simulated = "" if scene is None else f" that were simulated ({scene.name})"
     lead = [
@@ -107,7 +100,7 @@ def tradeoff(
     ]
     sections = [section for make in SECTIONS if (section := make(measured)) is not None]
     report = write(out, "What accuracy costs in time", lead, sections)
-    front = settings.fronts(measured.points, main, board.name, dataset.digest)
+    best = front(points, main, measured.after_s, dataset.digest)
     with write_whole(out / "front.json") as file:
-        file.write(json.dumps(front, indent=1).encode() + b"\n")
+        file.write(json.dumps(best, indent=1).encode() + b"\n")
     return report

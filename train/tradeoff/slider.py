@@ -6,8 +6,10 @@ import html
 import json
 from collections.abc import Mapping
 
+from train.choose import Chosen
 from train.evaluate import Result
 from train.report.score import interval
+from train.tradeoff.choices import Points, unseen
 
 FIRST_S = 1.0
 """The time that is shown first, and without a script."""
@@ -33,45 +35,60 @@ function show() {
     const row = box.querySelectorAll('tr')[i], x = 100 * wait / data.windows.at(-1);
     row.querySelector('.share').textContent = rows[at][0];
     row.querySelector('.interval').textContent = rows[at][1];
+    row.querySelector('.unseen').textContent = rows[at][2];
     row.querySelector('line').setAttribute('x1', x);
     row.querySelector('line').setAttribute('x2', x);
   });
 }
-input.addEventListener('input', show);
+input.addEventListener('input', () => { show(); copy.textContent = 'copy'; });
+const copy = box.querySelector('button');
+copy.addEventListener('click', () => {
+  const range = document.createRange();
+  range.selectNodeContents(box.querySelector('code'));
+  getSelection().removeAllRanges();
+  getSelection().addRange(range);
+  copy.textContent = document.execCommand('copy') ? 'copied' : 'selected';
+});
+copy.hidden = false;
 input.parentElement.hidden = false;
 show();
 </script>"""
 
 
-def slider(answers: Mapping[str, Mapping[float, Result]]) -> str:
+def slider(points: Points) -> str:
     """The HTML of the first screen.
 
     Without a script the curves stand still, and the lines show the accuracy after `FIRST_S`.
-
-    Args:
-        answers: {task: {window: result}}, with the same rising windows for every task.
     """
-    windows = list(next(iter(answers.values())))
+    windows = list(points)
     first = min(range(len(windows)), key=lambda i: abs(windows[i] - FIRST_S))
     shown = {
-        task: [(f"{100 * r.accuracy:.0f} %", f"({interval(r)})") for r in results.values()]
-        for task, results in answers.items()
+        task: [_texts(tasks[task]) for tasks in points.values()] for task in points[windows[0]]
     }
     lines = "".join(
-        f'<tr><td>{html.escape(task)}</td><td class="share">{shown[task][first][0]}</td>'
-        f'<td class="interval">{shown[task][first][1]}</td><td>{_curve(results, first)}</td></tr>'
-        for task, results in answers.items()
+        f'<tr><td>{html.escape(task)}</td><td class="share">{texts[first][0]}</td>'
+        f'<td class="interval">{texts[first][1]}</td><td class="unseen">{texts[first][2]}</td>'
+        f"<td>{_curve({w: tasks[task].by_trial for w, tasks in points.items()}, first)}</td></tr>"
+        for task, texts in shown.items()
     )
     data = json.dumps({"windows": windows, "tasks": list(shown.values())})
     wait = f'<span class="wait">{windows[first]:g}</span>'
     return (
         f'{STYLE}<div class="slider" data-answers="{html.escape(data)}">'
         f"<p>Wait <b>{wait} s</b> from first contact, and this share of the decisions is right "
-        f"(95 % interval):</p>"
+        f"(95 % interval; then of objects never met):</p>"
         f'<label hidden><input type="range" min="0" max="{len(windows) - 1}" value="{first}" '
         f'aria-label="seconds to wait"></label><table>{lines}</table>'
-        f"<p><code>make export EXPORT='--window {wait}'</code></p></div>{SCRIPT}"
+        f"<p><code>make export EXPORT='--quick --window {wait}'</code> "
+        f'<button hidden type="button">copy</button></p></div>{SCRIPT}'
     )
+
+
+def _texts(choice: Chosen) -> tuple[str, str, str]:
+    """Accuracy, interval, and accuracy on objects never met."""
+    met, result = unseen(choice), choice.by_trial
+    never = "" if met is None else f"; {100 * met.accuracy:.0f} %"
+    return f"{100 * result.accuracy:.0f} %", f"({interval(result)})", never
 
 
 def _curve(results: Mapping[float, Result], first: int) -> str:

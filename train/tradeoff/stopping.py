@@ -11,7 +11,7 @@ import numpy as np
 from train.report.figures import STROKES, STYLE, canvas, png
 from train.report.section import Figure, Row, Section, Table
 from train.stopping import finest
-from train.tradeoff.early import FOLDS, StoppingComparison, fixed_time
+from train.tradeoff.early import FOLDS, StoppingComparison
 from train.tradeoff.measured import Measured
 
 LEAST_SHARE = 0.02
@@ -22,7 +22,7 @@ def section(measured: Measured) -> Section:
     """Deciding early in every task, beside fixed windows."""
     compared, board = measured.comparisons, measured.board
     decision_us = sum(board.stages_us[stage][0] for stage in ("features", "decision"))
-    count = len(compared[measured.main].decision_points_s)
+    count = len(measured.points)
     text = [
         f"{FOLDS} folds are held out in turn; the others choose, train and calibrate. An error "
         "rate is certified where the calibration trials show, with 90 % confidence, that decisions "
@@ -34,8 +34,7 @@ def section(measured: Measured) -> Section:
         "of arithmetic for a contact, while the program waits anyway.",
         *(
             f"{task}: confidences differ from the share that is right by "
-            f"{100 * own.calibration_error:.1f} points on average. With hindsight, "
-            f"{1e3 * own.hindsight_s:.0f} ms would have been enough."
+            f"{100 * own.calibration_error:.1f} points on average."
             for task, own in compared.items()
         ),
     ]
@@ -54,15 +53,6 @@ def section(measured: Measured) -> Section:
                 "early",
                 "Asked for an error rate",
                 [r for t in compared.items() for r in _asked(*t)],
-            ),
-            Table(
-                "fixed",
-                "Fixed windows on the same trials",
-                [
-                    {"task": task, "window ms": round(1e3 * seconds), "wrong %": _percent(wrong)}
-                    for task, own in compared.items()
-                    for seconds, wrong in zip(own.decision_points_s, own.fixed, strict=True)
-                ],
             ),
             Table(
                 "sure",
@@ -92,13 +82,11 @@ def _asked(task: str, compared: StoppingComparison) -> list[Row]:
     """The rows of a task's asked error rates."""
     rows = []
     for asked in compared.certified:
-        window = fixed_time(compared, asked.wrong)
         cells = {
             "wrong %": _percent(asked.wrong),
             "names nothing %": _percent(asked.unknown),
             "decided early %": _percent(asked.early),
             "mean time s": round(asked.mean_s, 3),
-            "fixed window as accurate s": "none" if window is None else round(window, 3),
         }
         rows.append(
             {"task": task, "asked error %": _percent(asked.asked)}

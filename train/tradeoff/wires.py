@@ -88,3 +88,15 @@ def wires(layout: SkinLayout) -> list[Wire]:
     served = SkinFile("block", layout, (BusSpec("fake", (chip,), clock_hz=1_000_000),))
     choices.append(count("microcontroller, 1 bus at 1 MHz", served))
     return choices
+
+
+def waited_s(layout: SkinLayout, rate_hz: float) -> float:
+    """Seconds from the end of a window until its last frame is read.
+
+    On average half a period until the next frame, then that frame's time: on three buses of
+    AD7147, which carry the paper's 100 frames a second, or else on the fastest wire.
+    """
+    choices = wires(layout)
+    fastest = min(choices, key=lambda wire: wire.frame_s)
+    wire = next((w for w in choices if w.name.startswith("AD7147, 3")), fastest)
+    return 0.5 * wire.every(rate_hz) / rate_hz + wire.frame_s

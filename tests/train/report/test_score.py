@@ -11,6 +11,7 @@ from train.report.score import (
     interval,
     majority,
     nested,
+    paired,
     percent,
     score,
     transfer,
@@ -82,3 +83,16 @@ def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
     assert searched["from %"] < 50.0 < searched["to %"]
     assert (searched["k"], plain["k"]) == (2, "")
     assert interval(Result(10, 20)) == "30 to 70"
+
+
+def test_the_interval_of_a_paired_difference_holds_what_it_should():
+    """Of 2,000 pairs that err on many of the same trials, one in twenty lies outside."""
+    rng = np.random.default_rng(0)
+    inside = []
+    for _ in range(2000):
+        before = rng.random(140) < 0.8
+        after = np.where(rng.random(140) < 0.7, before, rng.random(140) < 0.9)
+        points, low, high = paired(before, after)
+        assert points == pytest.approx(100 * (after.mean() - before.mean()))
+        inside.append(low <= 3.0 <= high)
+    assert 0.935 < np.mean(inside) < 0.97

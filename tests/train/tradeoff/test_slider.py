@@ -3,21 +3,30 @@
 import pytest
 
 from tests.browser import chromium
+from train.choose import Chosen
 from train.evaluate import Result
+from train.pipeline import Choice
 from train.report.page import write
 from train.report.section import Section
 from train.tradeoff.slider import slider
 
+
+def chosen(right, left_out="trial"):
+    return Chosen(Choice("IV", 1, 1), Result(73, 100), Result(right, 100), left_out)
+
+
 ANSWERS = {
-    "mobility": {0.4: Result(60, 100), 1.0: Result(97, 100), 1.2: Result(99, 100)},
-    "<b>": {0.4: Result(50, 100), 1.0: Result(80, 100), 1.2: Result(91, 100)},
+    0.4: {"mobility": chosen(60, "object"), "<b>": chosen(50)},
+    1.0: {"mobility": chosen(97, "object"), "<b>": chosen(80)},
+    1.2: {"mobility": chosen(99, "object"), "<b>": chosen(91)},
 }
 
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
     text = slider(ANSWERS)
     assert '<td class="share">97 %</td><td class="interval">(92 to 99)</td>' in text
-    assert "make export EXPORT='--window" in text
+    assert text.count('<td class="unseen">; 73 %</td>') == 1
+    assert "make export EXPORT='--quick --window" in text
     assert text.index("<label hidden>") < text.index("<script>")
     assert "<td>&lt;b&gt;</td>" in text
 
@@ -32,6 +41,9 @@ def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
             "i.dispatchEvent(new Event('input'));"
         )
         text = browser.find_element("css selector", ".slider").text
+        browser.find_element("css selector", "button").click()
+        copied = browser.execute_script("return getSelection().toString()")
     assert "Wait 0.4 s" in text
     assert "60 %" in text
     assert "--window 0.4" in text
+    assert copied == "make export EXPORT='--quick --window 0.4'"

@@ -1,27 +1,34 @@
 """What accuracy costs in time: wires, boards, nested accuracy, points, and early stopping."""
 
+import argparse
 import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from edge.errors import InputError
+from edge.model.model import Model
+from edge.recording import save
 from edge.skin import file as skinfile
 from edge.touch.layout import SkinLayout
+from export.__main__ import main as export
 from tests import browser
 from train.__main__ import main as train
-from train.evaluate import Result, SearchGrid
+from train.choose import Chosen
+from train.commands.tradeoff import cost
+from train.dataset import read
+from train.evaluate import Result
 from train.pipeline import Choice
-from train.tradeoff import answer, board, early
+from train.tradeoff import answer, board, costs, early
 from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.early import Chooser, NestedChoice
+from train.tradeoff.choices import chosen as make_choice
+from train.tradeoff.choices import followed, front, unseen
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.measured import MeasuredPoint
 from train.tradeoff.run import tradeoff
-from train.tradeoff.settings import pareto_front
 from train.tradeoff.wires import count, spread, wires
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
@@ -54,63 +61,128 @@ class TestWires:
         assert "MPR121" in {wire.name.split(",")[0] for wire in wires(quarter)}
 
 
-def test_what_is_chosen_without_a_fold_is_chosen_by_the_others_alone():
-    """One feature tells all trials but those of a fold, the other nearly all."""
-    rng = np.random.default_rng(0)
-    labels = rng.choice(["a", "b"], 60)
-    names = ("max_force", "contact_area")
-    grids = tuple(SearchGrid(features=(f,), components=(1,), neighbours=(5,)) for f in names)
-    rows = np.arange(5, 60)
-    X = np.repeat(9.0 * (labels == "a")[:, None], 4, axis=1) + rng.normal(size=(60, 4))
+def chosen(hits, left_out="trial"):
+    """A choice that answers these trials rightly, trials left out."""
+    result = Result(int(np.sum(hits)), len(hits), hits=np.array(hits, dtype=bool))
+    return Chosen(Choice("IV", 1, 1), Result(1, 2), result, left_out)
 
-    def chosen():
-        return Chooser(X, {"t": labels}, grids, names)(rows)
 
-    folds = chosen().folds
-    X[rows[folds == 3], :2] = 9.0 - X[rows[folds == 3], :2]
-    X[rows[::25], 2:] = 9.0 - X[rows[::25], 2:]
-    found = chosen()
-    assert found.choices["t"].features == names[1:]
-    assert [one["t"].features == names[:1] for one in found.without] == [
-        fold == 3 for fold in range(10)
+def test_the_front_is_what_no_other_window_beats_in_both():
+    shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
+    points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
+    best = front(points, "t", 0.01, "0" * 64)
+    assert [(p["window_s"], p["milliseconds"], p["accuracy"]) for p in best["points"]] == [
+        (0.2, 210.0, 0.5),
+        (0.4, 410.0, 0.7),
+        (0.8, 810.0, 0.9),
     ]
+    assert best["points"][0]["low"] < 0.5 < best["points"][0]["high"]
 
 
-def point(seconds, right, **changes):
-    given = {
-        "task": "t",
-        "taxels": 384,
-        "wire": "w",
-        "features": ("max_force",),
-        "scaling": "IV",
-        "components": 1,
-        "k": 1,
-        "window_s": seconds,
-        "wire_s": 0.0,
-        "arithmetic_s": 0.0,
-        "result": Result(right, 100),
-        "own_skin": True,
-    }
-    return MeasuredPoint(**{**given, **changes})
+def test_objects_never_met_have_a_figure_only_where_they_were_left_out():
+    assert unseen(chosen([1, 0])) is None
+    assert unseen(chosen([1, 0], "object")).accuracy == 0.5
 
 
-def test_the_front_is_what_no_other_beats_in_both():
-    a, b, c, d = point(0.2, 50), point(0.4, 70), point(0.6, 70), point(0.8, 90)
-    assert pareto_front([d, c, b, a]) == [a, b, d]
-    assert pareto_front([point(0.2, 50), point(0.2, 60)]) == [point(0.2, 60)]
+@pytest.fixture(scope="module")
+def fronted(recordings, tmp_path_factory):
+    """front.json with one point: 0.4 s."""
+    path = tmp_path_factory.mktemp("front") / "front.json"
+    dataset = followed(read([recordings]))
+    points = {0.4: make_choice(dataset, 0.4)}
+    path.write_text(json.dumps(front(points, "category", 0.01, dataset.digest)))
+    return path, points[0.4]["category"]
 
 
-def test_a_point_s_time_is_the_sum_of_its_three_parts():
-    assert point(0.2, 1, wire_s=0.01, arithmetic_s=0.001).seconds == pytest.approx(0.211)
+def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, capsys):
+    path, choice = fronted
+    given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1"]
+    assert export([*given, "--front", "fast", "--fronts", str(path)]) == 0
+    said = capsys.readouterr().err
+    assert f"category {choice.by_trial.accuracy:.1%} in 410 ms" in said
+    info = Model(tmp_path / "model.onnx").info
+    task = info.tasks["category"]
+    assert info.window_s == 0.4
+    assert (task.features, task.scaling, task.k, task.projection) == (
+        choice.choice.features, choice.choice.scaling, choice.choice.k, choice.choice.projection
+    )  # fmt: skip
+    assert task.accuracy == choice.accuracy.accuracy
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        (["--k", "3"], "--front makes the model that was measured; leave out --k"),
+        (["--front", "1.5"], "the fastest point takes 410 ms"),
+        (["--data", "hard_0.npz", "hard_1.npz"], "was measured on other recordings"),
+    ],
+)
+def test_a_point_that_cannot_be_exported_is_one_sentence(
+    recordings, fronted, tmp_path, capsys, more, sentence
+):
+    given = ["--data", str(recordings), "--out", str(tmp_path), "--front", "fast"]
+    if more[0] == "--data":
+        more = ["--data", *(str(recordings / name) for name in more[1:])]
+    assert export([*given, "--fronts", str(fronted[0]), *more]) == 2
+    assert sentence in capsys.readouterr().err.splitlines()[-1]
+    assert not list(tmp_path.iterdir())
+
+
+class TestCosts:
+    def test_every_other_frame_is_left_of_half_the_rate(self, make_touch):
+        touch = make_touch()
+        half = costs.every_nth(touch, 2)
+        assert half.t.tolist() == touch.t[::2].tolist()
+        assert (half.frames == touch.frames[::2]).all()
+        assert len(half.joints) == len(half.t)
+
+    def test_a_contact_no_longer_noticed_is_wrong_but_a_trial_left_out_is_not_counted(self):
+        before = {(Path(name), 0): True for name in "abcd"}
+        after = {(Path(name), 0): True for name in "ab"}
+        assert costs.difference(before, after, fewer=False)[0] == -50.0
+        assert costs.difference(before, after, fewer=True)[0] == 0.0
+
+    def test_every_change_is_measured_on_its_own_recordings(self, recordings):
+        raw = read([recordings])
+        cases = {case.what: case for case in costs.changes(raw, followed(raw))}
+        assert list(cases) == [
+            "50 frames a second", "25 frames a second",
+            "96 taxels", "24 taxels", "6 taxels", "1 taxel", "the paper's features",
+        ]  # fmt: skip
+        assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
+        assert cases["50 frames a second"].cost == "enough: AD7147, 2 buses at 400 kHz"
+
+
+@pytest.mark.parametrize(
+    ("text", "prices"),
+    [("wrong=10,second=1", (10.0, 1.0)), ("second=0,wrong=2.5", (2.5, 0.0)), ("wrong=10", None),
+     ("wrong=-1,second=1", None), ("wrong=inf,second=1", None), ("wrong=1,second=1,x=1", None)],
+)  # fmt: skip
+def test_prices_are_two_numbers(text, prices):
+    if prices is None:
+        with pytest.raises(argparse.ArgumentTypeError, match="like wrong=10,second=1"):
+            cost(text)
+    else:
+        assert cost(text) == prices
+
+
+def test_the_dearer_an_error_the_longer_it_pays_to_wait():
+    """Errors fall by 40 of 100 for 0.4 s, then by 5 for 0.4 s more."""
+    shares = {0.4: 50, 0.8: 90, 1.2: 95}
+    points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
+    fixed = SimpleNamespace(y={"t": None}, after_s=0.0, points=points)
+    fixed.results = lambda task: {w: tasks[task].by_trial for w, tasks in points.items()}
+    best = []
+    for fixed.wrong, fixed.second in ((0.5, 1.0), (2.0, 1.0), (10.0, 1.0)):
+        best.append(answer.prices(fixed).tables[0].rows[0]["best window s"])
+    assert best == [0.4, 0.8, 1.2]
 
 
 def comparison(right, seconds=(0.2, 0.6, 1.0)):
     """Fixed windows with these outcomes; every confidence is a half."""
     right = np.array(right, dtype=bool)
     labels = np.where(right, "a", "b")
-    return early.StoppingComparison(
-        seconds, right, np.full(right.shape, 0.5), labels, [], early.hindsight(right, seconds)
-    )
+    return early.StoppingComparison(seconds, right, np.full(right.shape, 0.5), labels, [])
 
 
 def share_right(*shares):
@@ -118,23 +190,25 @@ def share_right(*shares):
     return np.arange(100) < 100 * np.array(shares)[:, None]
 
 
+class Vectors:
+    """Stands in for a data set that has these vectors of one feature."""
+
+    names = ("max_force",)
+
+    def __init__(self, X):
+        self.X = X
+
+    def of(self, names):
+        return self
+
+    def features(self):
+        return self.X
+
+    def widths(self):
+        return (self.X.shape[1],)
+
+
 class TestEarly:
-    def test_the_fixed_window_that_is_as_accurate_is_interpolated(self):
-        found = comparison(share_right(0.5, 0.7, 0.9))
-        assert early.fixed_time(found, 0.1 + 1e-9) == pytest.approx(1.0)
-        assert early.fixed_time(found, 0.2) == pytest.approx(0.8)
-        assert early.fixed_time(found, 0.9) == pytest.approx(0.2)
-        assert early.fixed_time(found, 0.05) is None
-
-    def test_a_longer_window_that_is_worse_is_no_excuse(self):
-        found = comparison(share_right(0.5, 0.9, 0.7))
-        assert early.fixed_time(found, 0.1 + 1e-9) == pytest.approx(0.6)
-
-    def test_hindsight_stops_each_trial_once_its_answer_stays_as_it_ends(self):
-        found = comparison([[1, 0, 1, 0], [1, 1, 0, 1], [1, 1, 1, 0]])
-        # From the first decision point on, the second, the last, and the last.
-        assert found.hindsight_s == pytest.approx(np.mean([0.2, 0.6, 1.0, 1.0]))
-
     def test_confidence_that_says_what_comes_true_has_no_calibration_error(self):
         found = comparison(share_right(0.5, 0.5, 0.5))
         assert found.calibration_error == pytest.approx(0.0)
@@ -145,43 +219,27 @@ class TestEarly:
         rule = early.Certified(0.1, early.FOLDS, 0.1, 0.0, 1.0, 0.6)
         bolder = early.Certified(0.3, early.FOLDS, 0.3, 0.0, 1.0, 0.4)
         found.certified.extend([rule, replace(rule, asked=0.2), bolder])
-        commands = [row["command"].strip("`") for row in answer.answers(found, 0.01)]
-        assert [c for c in commands if "--error" in c] == [
-            "edge-classify run --error 0.1",
-            "edge-classify run --error 0.3",
-        ]
+        listed = [rule.asked for rule in answer.distinct(found)]
+        assert listed == [0.1, 0.3]
 
-    def test_what_is_plain_from_the_second_decision_point_on_is_decided_then(self):
-        """Before it the labels look alike; once they differ no one waits for the full window."""
-        rng = np.random.default_rng(6)
-        labels = np.repeat(["a", "b"], 60)
-        X = rng.normal(size=(3, 120, 12))
-        X[1:, :, 0] += 30.0 * (labels == "a")
-
-        def choose(rows):
-            choices = {"task": Choice("none", 3, 3)}
-            return NestedChoice(choices, np.arange(len(rows)) % 5, [choices] * 5)
-
-        found = early.compare_stopping(
-            X, {"task": labels}, (0.2, 0.6, 1.0), ("max_force",), choose
-        )["task"]
-        assert found.fixed[0] > 0.3
-        assert found.fixed[1:].tolist() == [0.0, 0.0]
-        assert 0.2 < found.hindsight_s <= 0.6
-        one = next(e for e in found.certified if e.asked == 0.1)
-        assert one.folds == early.FOLDS
-        assert one.wrong <= 0.1
-        assert one.mean_s <= 0.61
+    def test_what_is_plain_at_the_first_decision_point_is_decided_then(self, make_touch, tmp_path):
+        for kind in ("hard", "soft"):
+            for seed in range(20):
+                save(tmp_path / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
+        found = early.compare_stopping(followed(read([tmp_path])), (0.6, 1.2))["category"]
+        assert found.right.all()
+        rule = next(certified for certified in found.certified if certified.asked == 0.15)
+        assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
 
     def test_things_left_out_far_away_are_unknown_and_those_alike_are_not(self):
         rng = np.random.default_rng(0)
         labels = np.repeat(["a", "b", "c", "d", "e", "f"], 20)
         X = rng.normal(size=(120, 12))
         choice = Choice("none", 3, 1)
-        alike = early.novelty(X, labels, choice, ("max_force",), rates=(0.1,))[0]
+        alike = early.novelty(Vectors(X), labels, choice, rates=(0.1,))[0]
         assert alike.unknown / alike.strange < 0.3
         X[:, 0] += 100.0 * np.repeat(np.arange(6), 20)
-        apart = early.novelty(X, labels, choice, ("max_force",), rates=(0.1,))[0]
+        apart = early.novelty(Vectors(X), labels, choice, rates=(0.1,))[0]
         assert apart.unknown == apart.strange
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
@@ -212,17 +270,14 @@ class TestBoard:
             whole.replace("cold_start_ms", "start"),
             whole.replace('"median_us": 100.0', '"median_us": NaN'),
             whole.replace('"median_us": 100.0', '"median_us": "soon"'),
-            whole.replace('["a", "b", "c"]', "[]"),
         ):
             path.write_text(wrong)
             with pytest.raises(InputError, match="not a board file: .*; make one with"):
                 board.read(path)
 
-    def test_arithmetic_follows_the_number_of_features(self):
+    def test_arithmetic_is_the_sum_of_three_stages(self):
         stages = {"track": (1e6, 2e6), "features": (3e6, 4e6), "decision": (10e6, 11e6)}
-        one = board.Board("b", "d", stages, 60.0, 500.0, 3, "m")
-        assert one.arithmetic_s(3) == pytest.approx(14.0)
-        assert one.arithmetic_s(1) == pytest.approx(12.0)
+        assert board.Board("b", "d", stages, 60.0, 500.0, "m").arithmetic_s == 14.0
 
 
 def board_file(path, digest):
@@ -247,39 +302,33 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, cap
     assert not (tmp_path / "out").exists()
 
 
-def test_report_pictures_tables_and_settings_are_written(make_touch, tmp_path, monkeypatch):
-    from edge.recording import save
-    from train.dataset import load_trials
+def test_report_pictures_tables_and_front_are_written(make_touch, tmp_path, monkeypatch):
     from train.tradeoff import run as running
-    from train.tradeoff import settings
 
     for kind in ("hard", "soft"):
         for seed in range(14):
             touch = make_touch(kind=kind, seed=seed, rate=50.0)
             save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", touch)
     monkeypatch.setattr(running, "FEWEST", 28)
-    monkeypatch.setattr(running, "GRIDS", running.GRIDS[:1])
-    monkeypatch.setattr(settings, "WINDOWS", (1.2,))
-    monkeypatch.setattr(running, "DECISION_POINTS_S", (0.4, 1.2))
-    digest = load_trials([tmp_path / "data"], horizon_s=1.2).digest
+    monkeypatch.setattr(costs, "PARTS", (1,))
+    monkeypatch.setattr(running, "WINDOWS_S", (0.4, 1.2))
+    monkeypatch.setattr(costs, "WAITS_S", (0.4,))
+    monkeypatch.setattr(costs, "EVERY", (4,))
+    digest = read([tmp_path / "data"]).digest
     path = board_file(tmp_path / "board.json", digest)
     out = tmp_path / "out"
     report = tradeoff([str(tmp_path / "data")], out, str(path), scene_path=str(SCENE))
     text = report.read_text()
     assert "http" not in text.replace("http-equiv", "")
-    assert "a board (here)" in text
     assert "62 MB of memory, 812 ms from starting Python" in text
-    again = tradeoff([str(tmp_path / "data")], tmp_path / "2", str(path), scene_path=str(SCENE))
-    assert again.read_bytes() == report.read_bytes()
     assert not browser.available() or browser.faults(report) == []
-    for name in ("tradeoff.png", "settings.png", "breakaway.png", "reliability.png"):
+    for name in ("tradeoff.png", "breakaway.png", "reliability.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
-    rows = list(csv.DictReader((out / "points.csv").read_text().splitlines()))
-    for cells in rows:
-        parts = [float(cells[f"{part} ms"]) for part in ("window", "wire", "arithmetic")]
-        assert float(cells["time ms"]) == pytest.approx(sum(parts), abs=0.1)
-        assert float(cells["low %"]) <= float(cells["accuracy %"]) <= float(cells["high %"])
-    assert sum(cells["paper's point"] == "yes" for cells in rows) == 2  # once a task
-    front = ParetoFront.read(out / "front.json")
-    assert front.task == "category"
-    assert front.points[-1].accuracy > 0.9
+    saved = {
+        row["what"]: row for row in csv.DictReader((out / "costs.csv").read_text().splitlines())
+    }
+    assert saved["waiting 0.4 s"]["category, points"].startswith("+0 (-")
+    assert saved["28 of 28 trials"]["what it saves"] == "less to record"
+    best = ParetoFront.read(out / "front.json", digest)
+    assert best.task == "category"
+    assert best.points[-1].accuracy > 0.9

@@ -1,0 +1,66 @@
+"""The quick choice of `make export`, made again at each window and for changed recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.touch.feature_sets import expand
+from edge.touch.features import WINDOW_S
+from train.choose import TRIAL, Chosen, candidates
+from train.dataset import DataSet, Recordings, load_trials
+from train.evaluate import Result
+from train.fitting import fit
+
+WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
+"""Windows of the report, and the decision points of its early decisions."""
+Points = Mapping[float, Mapping[str, Chosen]]
+"""{window: {task: the choice at that window}}."""
+
+
+def followed(raw: Recordings, features: Sequence[str] = (), *, progress: bool = False) -> DataSet:
+    """The trials of some recordings, with the features of every candidate and those named."""
+    quick = candidates({}, joints=raw.joints, quick=True)
+    sets = [name for candidate in quick for name in candidate.sets]
+    return load_trials(
+        raw, horizon_s=WINDOWS_S[-1], features=expand([*sets, *features]), progress=progress
+    )
+
+
+def some(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
+    """The trials of these rows."""
+    return replace(dataset, trials=tuple(dataset.trials[i] for i in rows))
+
+
+def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:
+    """Each task's choice, as `python -m export --quick --window` makes it; `given` is fixed."""
+    form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1}
+    return fit(dataset, **form, **given).chosen  # type: ignore[arg-type]
+
+
+def unseen(choice: Chosen) -> Result | None:
+    """The accuracy on objects never met; None where no objects could be left out."""
+    return None if choice.left_out == TRIAL else choice.accuracy
+
+
+def front(points: Points, task: str, after_s: float, digest: str) -> dict[str, Any]:
+    """The contents of front.json: the windows that no other beats in both time and accuracy."""
+    best: list[dict[str, float]] = []
+    for window_s, tasks in points.items():
+        result = tasks[task].by_trial
+        if not best or result.accuracy > best[-1]["accuracy"]:
+            low, high = result.interval
+            best.append(
+                {
+                    "window_s": window_s,
+                    "milliseconds": round(1e3 * (window_s + after_s), 2),
+                    "accuracy": result.accuracy,
+                    "low": low,
+                    "high": high,
+                }
+            )
+    return {"format": 2, "task": task, "data_digest": digest, "points": best}
