@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from edge.touch.feature_sets import expand
 from edge.touch.features import WINDOW_S
-from train.choose import TRIAL, Chosen, candidates
+from train.choose import TRIAL, Chosen, candidates, kinds_of
 from train.dataset import DataSet, Recordings, load_trials
 from train.evaluate import Result
 from train.fitting import fit
@@ -24,7 +24,8 @@ Points = Mapping[float, Mapping[str, Chosen]]
 
 def followed(raw: Recordings, features: Sequence[str] = (), *, progress: bool = False) -> DataSet:
     """The trials of some recordings, with the features of every candidate and those named."""
-    quick = candidates({}, joints=raw.joints, quick=True)
+    drawn = kinds_of(raw.recordings) is not None
+    quick = candidates({}, joints=raw.joints, drawn=drawn, quick=True)
     sets = [name for candidate in quick for name in candidate.sets]
     return load_trials(
         raw, horizon_s=WINDOWS_S[-1], features=expand([*sets, *features]), progress=progress
