@@ -119,7 +119,7 @@ class Skin:
         self._silent, self._since_silent = 0, 0
         self._touched_at = self._followed_at = -math.inf
         self._since_follow = 0
-        self._states = self._chip_states()
+        self._states = [_state(slot) for slot in self._slots]
         self._lost = [False for _ in self.readers]
         self._threads = [ThreadPoolExecutor(1) for _ in self.readers[1:]]
         """A thread for each bus but the first, which the caller's thread reads."""
@@ -173,7 +173,7 @@ class Skin:
         """
         for reader in self.readers:
             reader.start()
-        self._states = self._chip_states()
+        self._states = [_state(slot) for slot in self._slots]
         down = [s for s in self.status() if s.state != ChipState.RUNNING.value]
         if len(down) == len(self._slots):
             raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {down[0].error}")
@@ -187,15 +187,12 @@ class Skin:
                 route=slot.spec.route,
                 kind=slot.spec.kind.name,
                 taxels=slot.spec.taxels,
-                state=state.value,
+                state=_state(slot).value,
                 error="" if slot.error is None else str(slot.error),
                 recoveries=slot.recoveries,
             )
-            for (reader, slot), state in zip(
-                ((reader, slot) for reader in self.readers for slot in reader.slots),
-                self._chip_states(),
-                strict=True,
-            )
+            for reader in self.readers
+            for slot in reader.slots
         ]
 
     def bus_changes(self) -> list[tuple[str, bool]]:
@@ -214,16 +211,13 @@ class Skin:
 
         A chip that is down stays so until it runs, whatever is tried.
         """
-        states = self._chip_states()
+        states = [_state(slot) for slot in self._slots]
         if states == self._states:
             return []
         pairs = zip(self.status(), states, self._states, strict=True)
         changed = [status for status, now, before in pairs if now != before]
         self._states = states
         return changed
-
-    def _chip_states(self) -> list[ChipState]:
-        return [slot.state if slot.error is None else ChipState.DOWN for slot in self._slots]
 
     @property
     def invalid_for(self) -> NDArray[np.int64]:
@@ -327,6 +321,11 @@ class Skin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _state(slot: Slot) -> ChipState:
+    """The state of a chip for a person: it is down until it runs, whatever is being tried."""
+    return slot.state if slot.error is None else ChipState.DOWN
 
 
 def _open(spec: BusSpec, timeout_s: float) -> Bus:
