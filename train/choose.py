@@ -23,10 +23,12 @@ from train.evaluate import (
     SearchGrid,
     choose,
     evaluate,
+    fits,
     group_folds,
     stratified_folds,
 )
 from train.pipeline import Choice
+from train.progress import bar
 from train.projection import KINDS
 
 PLAIN = (
@@ -309,9 +311,14 @@ class Choosing:
             jobs=self._jobs,
             nested=nested,
         )
-        bars = (what, self._leave_out if nested else what) if self._progress else (None, None)
-        trials = answers(self._y, self._folds, grids, progress=bars[0])
+        total = fits(self._folds, nested)
+        if self._grouped:
+            total += fits(self._group_folds, nested)
+        # One bar for both tables, so that the time left is that of the whole choice.
+        progress = bar(total=total, desc=what, unit=" fits", disable=not self._progress)
+        trials = answers(self._y, self._folds, grids, progress=progress.update)
         if not self._grouped:
+            progress.close()
             return trials, trials
         unseen = [
             replace(g, shrinkages=tuple(s for s in g.shrinkages if s >= UNSEEN_SHRINKAGE))
@@ -320,7 +327,8 @@ class Choosing:
         y = self._y
         if not any(grid.targets for grid in grids):
             y = {task: y[task] for task in y if task in self._grouped}
-        return trials, answers(y, self._group_folds, unseen, progress=bars[1])
+        with progress:
+            return trials, answers(y, self._group_folds, unseen, progress=progress.update)
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
         """{task: (n,) answers of the candidate that is best in plain cross-validation}."""

@@ -12,7 +12,7 @@ take 55 fits, not 110.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -27,7 +27,6 @@ from edge.statistics import wilson
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of, types_of
-from train.progress import bar as progress_bar
 from train.projection import Spectrum
 from train.scaling import centred_and_scaled, widths_of
 
@@ -312,6 +311,12 @@ def choose(
     return int(candidates[best[within.argmax()]])
 
 
+def fits(folds: NDArray[np.int64], nested: bool) -> int:
+    """How many fits `evaluate` makes."""
+    count = int(folds.max()) + 1
+    return count * (count + 1) // 2 if nested else count
+
+
 def evaluate(
     X: NDArray[np.float64],
     y: Labels,
@@ -321,7 +326,7 @@ def evaluate(
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,
     jobs: int = 1,
-    progress: str | None = None,
+    progress: Callable[[], object] | None = None,
     nested: bool = True,
 ) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
@@ -334,7 +339,7 @@ def evaluate(
         features: names of the types, in the order of X.
         widths: columns of each; equal where None.
         jobs: processes.
-        progress: title of a progress bar on stderr; no bar where None.
+        progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the table,
             `AnswerTable.held_out` alone is then valid.
 
@@ -361,9 +366,6 @@ def evaluate(
         for test in tests
     )
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
-    bar = progress_bar(
-        results, total=len(pairs), desc=progress, unit=" fits", disable=progress is None
-    )
     choices = {
         task: [
             choice
@@ -374,7 +376,9 @@ def evaluate(
         for task in classes
     }
     right = {task: np.zeros((count, len(choices[task]), len(X)), dtype=bool) for task in classes}
-    for (i, j), test, result in zip(pairs, tests, bar, strict=True):
+    for (i, j), test, result in zip(pairs, tests, results, strict=True):
+        if progress is not None:
+            progress()
         for task, answers in result.items():
             # For fold i these are answers to fold j, and the other way round.
             for without, tested in {(i, j), (j, i)}:

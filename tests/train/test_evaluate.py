@@ -7,7 +7,7 @@ import pytest
 from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
-from train.evaluate import SearchGrid, choose, evaluate, group_folds, stratified_folds
+from train.evaluate import SearchGrid, choose, evaluate, fits, group_folds, stratified_folds
 from train.pipeline import NearestNeighbours
 from train.projection import Projection
 
@@ -168,3 +168,13 @@ def test_what_cannot_be_parted_or_measured_is_one_sentence():
     X[5, 3] = np.nan
     with pytest.raises(InputError, match="trial 5 are not finite"):
         evaluate(X, {"t": y}, stratified_folds(y, 3), GRIDS, features=TWO)
+
+
+def test_progress_is_told_after_each_of_the_fits_that_are_announced():
+    X, y = np.random.default_rng(0).normal(size=(20, 4)), np.array(list("ab") * 10)
+    folds, seen = stratified_folds(y, 5), []
+    for nested, count in ((True, 15), (False, 5)):
+        seen.clear()
+        told = {"progress": lambda: seen.append(1), "nested": nested, "features": TWO}
+        evaluate(X, {"t": y}, folds, GRIDS[:1], **told)
+        assert len(seen) == fits(folds, nested) == count

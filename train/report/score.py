@@ -11,8 +11,9 @@ from threadpoolctl import threadpool_limits
 
 from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, MAX_K, accuracies, neighbours, split_neighbours
-from train.evaluate import Labels, Result, SearchGrid, evaluate, stratified_folds
+from train.evaluate import Labels, Result, SearchGrid, evaluate, fits, stratified_folds
 from train.pipeline import vote
+from train.progress import bar
 from train.stopping import finest
 
 
@@ -63,9 +64,11 @@ def nested(
         progress: heading of a progress bar, if one is wanted.
     """
     folds = stratified_folds(y[finest(y)]) if folds is None else folds
-    table = evaluate(
-        X, y, folds, [grid], features=features, widths=widths, jobs=jobs, progress=progress
-    )
+    total = fits(folds, nested=True)
+    with bar(total=total, desc=progress, unit=" fits", disable=progress is None) as shown:
+        table = evaluate(
+            X, y, folds, [grid], features=features, widths=widths, jobs=jobs, progress=shown.update
+        )
     return {task: table.nested(task) for task in y}
 
 
