@@ -25,6 +25,7 @@ STYLE = """<style>
 @media (prefers-color-scheme: dark) { .slider polyline { stroke: #8ab8f0; }
   .slider polygon { fill: #8ab8f0; } }
 </style>"""
+HEADINGS = ("task", "right", "95 %", "never met", "against time")
 SCRIPT = """<script>
 const box = document.querySelector('.slider'), data = JSON.parse(box.dataset.answers);
 const input = box.querySelector('input');
@@ -32,7 +33,7 @@ function show() {
   const at = +input.value, wait = data.windows[at];
   box.querySelectorAll('.wait').forEach(e => e.textContent = wait);
   data.tasks.forEach((rows, i) => {
-    const row = box.querySelectorAll('tr')[i], x = 100 * wait / data.windows.at(-1);
+    const row = box.querySelectorAll('tbody tr')[i], x = 100 * wait / data.windows.at(-1);
     row.querySelector('.share').textContent = rows[at][0];
     row.querySelector('.interval').textContent = rows[at][1];
     row.querySelector('.unseen').textContent = rows[at][2];
@@ -71,14 +72,15 @@ def slider(points: Points) -> str:
         f"<td>{_curve({w: tasks[task].by_trial for w, tasks in points.items()}, first)}</td></tr>"
         for task, texts in shown.items()
     )
+    head = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
     data = json.dumps({"windows": windows, "tasks": list(shown.values())})
     wait = f'<span class="wait">{windows[first]:g}</span>'
     return (
         f'{STYLE}<div class="slider" data-answers="{html.escape(data)}">'
-        f"<p>Wait <b>{wait} s</b> from first contact, and this share of the decisions is right "
-        f"(95 % interval; then of objects never met):</p>"
+        f"<p>Wait <b>{wait} s</b> from first contact, and this share of the decisions is right:</p>"
         f'<label hidden><input type="range" min="0" max="{len(windows) - 1}" value="{first}" '
-        f'aria-label="seconds to wait"></label><table>{lines}</table>'
+        f'aria-label="seconds to wait"></label>'
+        f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>"
         f"<p><code>make export EXPORT='--quick --window {wait}'</code> "
         f'<button hidden type="button">copy</button></p></div>{SCRIPT}'
     )
@@ -87,7 +89,7 @@ def slider(points: Points) -> str:
 def _texts(choice: Chosen) -> tuple[str, str, str]:
     """Accuracy, interval, and accuracy on objects never met."""
     met, result = unseen(choice), choice.by_trial
-    never = "" if met is None else f"; {100 * met.accuracy:.0f} %"
+    never = "" if met is None else f"{100 * met.accuracy:.0f} %"
     return f"{100 * result.accuracy:.0f} %", f"({interval(result)})", never
 
 
