@@ -16,19 +16,18 @@ def test_the_report_says_what_was_chosen_among_and_what_was_chosen(recordings, t
     assert main(command) == 0
     out = capsys.readouterr()
     lines = out.err.splitlines()
-    rows = [line for line in lines if line.startswith(("paper ", "contact ", "moments "))]
+    rows = [line for line in lines if line.startswith(("paper ", "contact joints ", "moments "))]
     assert [row[:22].split() for row in rows] == [
         ["paper", "pca"],
         ["contact", "joints", "lda"],
         ["moments", "joints", "lda"],
     ]
     assert sum(row.count("*") for row in rows) == 2  # one a task
-    told = [line for line in lines if line.startswith(("category:", "object:"))]
-    assert all("% (" in line and "of 16 trials, nested" in line for line in told)
+    answers = [line for line in lines if line.startswith(("category:", "object:"))]
+    assert all("% (" in line and "of 16 trials, nested" in line for line in answers)
     info = Model(tmp_path / "model.onnx").info
-    assert f"{info.tasks['category'].accuracy:.1%}" in told[0]
+    assert f"{info.tasks['category'].accuracy:.1%}" in answers[0]
     assert set(info.features) == {f for task in info.tasks.values() for f in task.features}
-    assert "reading: 100%" in out.err
     assert out.out.splitlines()[1].endswith("golden.npz")
 
 
@@ -68,8 +67,6 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
         (["--threshold", "200", "--onset", "100"], "onset_counts 100 is below"),
         (["--tasks", "colour"], "label 'colour'; all have category, object"),
         (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
-        (["--samples", "1"], "--samples must be 2 to 1000"),
-        (["--samples", "1001"], "--samples must be 2 to 1000"),
     ],
 )
 def test_options_that_make_no_sense_are_one_sentence(options, word, recordings, tmp_path, capsys):
@@ -87,6 +84,7 @@ def test_options_that_make_no_sense_are_one_sentence(options, word, recordings, 
     [
         ("--components", "0", "must be a whole number from 1"),
         ("-k", "0", "must be a whole number from 1"),
+        ("--samples", "1", "must be a whole number from 2 to 1000"),
         ("--samples", "1001", "must be a whole number from 2 to 1000"),
         ("--window", "0", "must be a number from 0.01 to 60"),
         ("--threshold", "-3", "must be a whole number from 0 to 65534"),

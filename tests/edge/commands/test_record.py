@@ -118,7 +118,11 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
         return push(trials, frame)
 
     monkeypatch.setattr(Trials, "push", interrupted)
-    status, (event,), _ = record("--lead", 0.1)
+    before = signal.signal(number, signal.SIG_DFL)  # nohup, for one, has SIGHUP ignored
+    try:
+        status, (event,), _ = record("--lead", 0.1)
+    finally:
+        signal.signal(number, before)
     assert (status, event["complete"], len(pushed)) == (0, False, 61)
     # Onset is at frame 20.
     source = load(recordings / "soft_1.npz").frames
