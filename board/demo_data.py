@@ -12,6 +12,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import load, save_arrays
@@ -21,6 +23,8 @@ from train.dataset import load_trials
 CHECKOUT = Path(__file__).resolve().parents[1]
 TOUCHES = ("cardboard-box-fixed", "cardboard-box-movable", "foam-block-fixed", "pillow-movable")
 META = ("arm", "labels", "skin", "source", "trial")
+ENCODER_STEPS = 2**17
+"""Steps of a radian: an encoder of 20 bits a turn is about as fine, and such angles pack well."""
 
 
 def main(folder: Path) -> None:
@@ -38,7 +42,7 @@ def main(folder: Path) -> None:
         # Every other frame takes half the bytes; features are sampled in time.
         arrays = {"t": (short.t - short.t[0])[::2], "frames": short.frames[::2]}
         if short.joints is not None:
-            arrays["joints"] = short.joints[::2]
+            arrays["joints"] = np.rint(short.joints[::2] * ENCODER_STEPS) / ENCODER_STEPS
         meta = {key: short.meta[key] for key in META if key in short.meta}
         save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
     info = model.info
