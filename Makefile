@@ -152,12 +152,15 @@ ifdef BOARD
 tradeoff: $(READY)
 else
 BOARD := $(OUT)/tradeoff/board.json
+FORMATS := $(OUT)/tradeoff/formats.json
 tradeoff: $(READY)
 	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
+	$(BIN)/python -m export.arithmetic --model $(OUT)/tradeoff/model.onnx \
+	  --golden $(OUT)/tradeoff/golden.npz --out $(FORMATS)
 endif
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
-	  --out $(OUT)/tradeoff $(TRADEOFF)
+	  $(addprefix --formats ,$(FORMATS)) --out $(OUT)/tradeoff $(TRADEOFF)
 
 # The site, with the Python reference from the docstrings; a broken link is an error.
 $(VENV)/.docs: $(READY)

@@ -25,6 +25,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="what `edge-classify bench` wrote of a model that was fitted on these recordings",
     )
     parser.add_argument(
+        "--formats",
+        metavar="formats.json",
+        help="what `python -m export.arithmetic` wrote of that model: adds its number formats",
+    )
+    parser.add_argument(
         "--cost",
         type=cost,
         default=(10.0, 1.0),
@@ -74,6 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
         main=arguments.task,
         wrong=arguments.cost[0],
         second=arguments.cost[1],
+        formats_path=arguments.formats,
     )
     print(report)
     return 0

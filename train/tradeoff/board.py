@@ -63,6 +63,24 @@ def read(path: str | os.PathLike[str]) -> Board:
     return board
 
 
+FORMAT = ("format", "decision us", "size kB", "other labels %")
+
+
+def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
+    """What each number format of a model costs and gives, by `python -m export.arithmetic`.
+
+    Raises:
+        InputError: the file is missing or has other contents; the sentence names it.
+    """
+    name = os.fspath(path)
+    mend = f"make one with `python -m export.arithmetic --out {name}`"
+    with json_file(name, "a file of number formats", mend) as content:
+        return [
+            {"format": str(row["format"]), **{key: float(row[key]) for key in FORMAT[1:]}}
+            for row in content
+        ]
+
+
 def section(board: Board) -> Section:
     """The figures of the board file."""
     rows = [

@@ -182,3 +182,25 @@ def section(measured: Measured) -> Section:
     )
     title = "What each saving costs, in points of accuracy"
     return Section("What each saving costs", [text], [Table("costs", title, rows, narrow=3)])
+
+
+def formats(measured: Measured) -> Section | None:
+    """The number formats of the graph that ships, side by side."""
+    if not measured.formats:
+        return None
+    return Section(
+        "The number format",
+        [
+            "The same graph in other number formats, by python -m export.arithmetic on this "
+            "machine. The last column counts decisions on the model's golden vectors that name "
+            "another label than the shipped graph. Only that graph gives the same bits everywhere."
+        ],
+        [
+            Table(
+                "formats",
+                "Number formats",
+                [dict(row) for row in measured.formats],
+                timed=("decision us",),
+            )
+        ],
+    )

@@ -42,6 +42,7 @@ class Measured:
         novelty: how often contacts are called unknown.
         costs: changes beside the choice at the usual window.
         wrong, second: an owner's price of a wrong decision and of a second's wait.
+        formats: what each number format costs and gives (`board.read_formats`); empty if unknown.
     """
 
     dataset: DataSet
@@ -55,6 +56,7 @@ class Measured:
     costs: Sequence[Saving]
     wrong: float = 10.0
     second: float = 1.0
+    formats: Sequence[Mapping[str, str | float]] = ()
 
     @property
     def after_s(self) -> float:

@@ -31,6 +31,7 @@ SECTIONS: tuple[Callable[[Measured], Section | None], ...] = (
     stopping.section,
     stopping.unknown,
     lambda measured: boards.section(measured.board),
+    costs.formats,
     answer.glossary,
 )
 """The report's sections in their order; None where there is nothing to show."""
@@ -47,6 +48,7 @@ def tradeoff(
     main: str | None = None,
     wrong: float = 10.0,
     second: float = 1.0,
+    formats_path: str | None = None,
 ) -> Path:
     """Measure the quick choice at each window and with each change; write the report; its path.
 
@@ -58,11 +60,13 @@ def tradeoff(
         jobs: processes.
         main: the task of front.json; `category` where there is one.
         wrong, second: an owner's price of a wrong decision and of a second's wait.
+        formats_path: what `python -m export.arithmetic` wrote of that model.
 
     Raises:
         InputError: the data cannot be used, or a file is of another kind or of other recordings.
     """
     board = boards.read(board_path)
+    formats = [] if formats_path is None else boards.read_formats(formats_path)
     scene = None if scene_path is None else scenes.load(scene_path)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
@@ -92,6 +96,7 @@ def tradeoff(
         costs=costs.measure(raw, dataset, points, workers),
         wrong=wrong,
         second=second,
+        formats=formats,
     )
     simulated = "" if scene is None else f" that were simulated ({scene.name})"
     lead = [

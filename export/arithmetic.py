@@ -1,0 +1,160 @@
+"""Measure what a model's number format costs and gives, on the graph that ships.
+
+The exported graph computes on whole numbers in float64. This program runs it beside two copies: one
+with every number in float32, and one whose matrices are in int8 besides (ONNX Runtime's dynamic
+quantisation). Each row says the time of a decision, the size, and how many labels become others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, numpy_helper
+
+from edge.cli import dispatch
+from edge.files import write_whole
+from edge.model.model import Model
+from edge.recording import load_arrays
+
+ROUNDS, CALLS = 7, 200
+
+
+def _single(tensor: onnx.TensorProto) -> None:
+    """Turn a tensor of float64 into one of float32; a limit beyond its range becomes infinite."""
+    if tensor.data_type == TensorProto.DOUBLE:
+        with np.errstate(over="ignore"):
+            values = numpy_helper.to_array(tensor).astype(np.float32)
+        tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
+
+
+def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
+    """A copy of a graph with every float64 in float32."""
+    copy = onnx.ModelProto()
+    copy.CopyFrom(model)
+    graph = copy.graph
+    for tensor in graph.initializer:
+        _single(tensor)
+    for value in (*graph.input, *graph.output, *graph.value_info):
+        if value.type.tensor_type.elem_type == TensorProto.DOUBLE:
+            value.type.tensor_type.elem_type = TensorProto.FLOAT
+    stored = {tensor.name for tensor in graph.initializer}
+    plain: dict[str, str] = {}
+    for node in list(graph.node):
+        for attribute in node.attribute:
+            if node.op_type == "Cast" and attribute.i == TensorProto.DOUBLE:
+                attribute.i = TensorProto.FLOAT
+            elif attribute.HasField("t"):
+                _single(attribute.t)
+        if node.op_type == "Cast" and node.input[0] in stored:
+            # Matrices are stored in float32 already; nothing is left to convert.
+            plain[node.output[0]] = node.input[0]
+            graph.node.remove(node)
+    for node in graph.node:
+        node.input[:] = [plain.get(name, name) for name in node.input]
+    return copy
+
+
+def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:
+    """A copy of a float32 graph whose matrices are in int8."""
+    from onnxruntime.quantization import quantize_dynamic
+
+    logging.getLogger().setLevel(logging.ERROR)  # it advises steps that change nothing here
+    before, after = folder / "float32.onnx", folder / "int8.onnx"
+    onnx.save(model, before)
+    quantize_dynamic(before, after)
+    return onnx.load(after)
+
+
+def answers(
+    model: onnx.ModelProto, vectors: NDArray[Any], tasks: list[str]
+) -> tuple[NDArray[np.int64], float]:
+    """The labels (tasks, n) of vectors, and the median microseconds of one decision."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.log_severity_level = 3
+    options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+    session = onnxruntime.InferenceSession(
+        model.SerializeToString(), options, providers=["CPUExecutionProvider"]
+    )
+    labels = session.run([f"{task}_label" for task in tasks], {"features": vectors})
+    times = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter()
+        for i in range(CALLS):
+            session.run(None, {"features": vectors[i % len(vectors)][None]})
+        times.append((time.perf_counter() - began) / CALLS * 1e6)
+    return np.stack(labels), statistics.median(times)
+
+
+def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
+    """A row for each number format: microseconds, kilobytes, and labels that become others.
+
+    Args:
+        model: an exported model.
+        golden: its golden file, whose finite vectors are decided on.
+
+    Raises:
+        InputError: a file is missing, or no such file.
+    """
+    tasks = list(Model(model).info.tasks)
+    vectors = load_arrays(str(golden))["vectors"]
+    vectors = vectors[np.isfinite(vectors).all(axis=1)]
+    shipped = onnx.load(model)
+    single = in_float32(shipped)
+    with tempfile.TemporaryDirectory() as folder:
+        formats = {
+            "whole numbers in float64 (as shipped)": (shipped, np.float64),
+            "float32": (single, np.float32),
+            "int8 matrices": (in_int8(single, Path(folder)), np.float32),
+        }
+    rows: list[dict[str, Any]] = []
+    expected = None
+    for name, (graph, dtype) in formats.items():
+        labels, microseconds = answers(graph, vectors.astype(dtype), tasks)
+        expected = labels if expected is None else expected
+        others = float((labels != expected).mean())
+        rows.append(
+            {
+                "format": name,
+                "decision us": round(microseconds, 1),
+                "size kB": round(graph.ByteSize() / 1e3, 1),
+                "other labels %": round(100 * others, 2),
+            }
+        )
+    return rows
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the program's options."""
+    parser.add_argument("--model", type=Path, required=True, help="model.onnx")
+    parser.add_argument("--golden", type=Path, required=True, help="its golden.npz")
+    parser.add_argument("--out", type=Path, required=True, help="the JSON file to write")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare, and write the rows."""
+    rows = compare(arguments.model, arguments.golden)
+    with write_whole(arguments.out) as file:
+        file.write(json.dumps(rows, indent=1).encode() + b"\n")
+    for row in rows:
+        print(", ".join(f"{key} {value}" for key, value in row.items()))
+    return 0
+
+
+if __name__ == "__main__":
+    top = argparse.ArgumentParser(prog="export.arithmetic", description=__doc__)
+    add_options(top)
+    top.set_defaults(run=run)
+    raise SystemExit(dispatch(top, None))

@@ -1,0 +1,57 @@
+"""What a model's number format costs and gives, on the committed golden model."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from export import arithmetic
+from train.tradeoff.board import FORMAT, read_formats
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+
+
+@pytest.fixture
+def rows(monkeypatch):
+    monkeypatch.setattr(arithmetic, "CALLS", 2)
+    monkeypatch.setattr(arithmetic, "ROUNDS", 1)
+    return arithmetic.compare(GOLDEN / "model.onnx", GOLDEN / "golden.npz")
+
+
+def test_each_format_has_its_price_and_the_shipped_one_no_other_label(rows):
+    assert [row["format"].split()[0] for row in rows] == ["whole", "float32", "int8"]
+    assert all(tuple(row) == FORMAT and row["decision us"] > 0.0 for row in rows)
+    assert rows[0]["other labels %"] == 0.0
+
+
+def test_labels_that_differ_are_counted(monkeypatch):
+    """A copy that answers every second vector otherwise has half of the labels wrong."""
+    monkeypatch.setattr(arithmetic, "in_int8", lambda model, folder: model)
+    shipped = np.zeros((2, 8), np.int64)
+    answers = iter([(shipped, 1.0), (shipped + np.arange(8) % 2, 2.0), (shipped + 1, 3.0)])
+    monkeypatch.setattr(arithmetic, "answers", lambda *_: next(answers))
+
+    rows = arithmetic.compare(GOLDEN / "model.onnx", GOLDEN / "golden.npz")
+
+    assert [row["other labels %"] for row in rows] == [0.0, 50.0, 100.0]
+
+
+def test_the_copy_in_float32_has_no_float64_left():
+    copy = arithmetic.in_float32(onnx.load(GOLDEN / "model.onnx"))
+
+    assert all(tensor.data_type != onnx.TensorProto.DOUBLE for tensor in copy.graph.initializer)
+    onnx.checker.check_model(copy, full_check=True)
+
+
+def test_what_the_program_writes_the_report_reads(tmp_path, monkeypatch, rows, capsys):
+    monkeypatch.setattr(arithmetic, "compare", lambda *_: rows)
+    path = tmp_path / "formats.json"
+    top = ["--model", "m", "--golden", "g", "--out", str(path)]
+    parser = arithmetic.argparse.ArgumentParser()
+    arithmetic.add_options(parser)
+
+    assert arithmetic.run(parser.parse_args(top)) == 0
+    assert read_formats(path) == json.loads(path.read_text()) == rows
+    assert capsys.readouterr().out.count("\n") == 3
