@@ -78,7 +78,8 @@ class Classifier:
 
     A task that was trained with recordings of no contact is decided by `finish` where there was
     none, flagged `no_contact` and at the time of the last frame; `missing_taxels` says that a
-    frame lacked some.
+    frame lacked some, and `near_contact` that a taxel rose above the contact threshold, so that a
+    weak touch may have been missed. `strongest` says how near it came.
     """
 
     def __init__(
@@ -126,6 +127,7 @@ class Classifier:
         self._begun = 0
         self._end_s: float | None = None
         self._missing_taxels = False
+        self._strongest = 0
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -136,6 +138,10 @@ class Classifier:
         began = time.perf_counter()
         events: list[Event] = []
         self._end_s = frame.t
+        if self._begun == 0:
+            readable = True if frame.valid is None else frame.valid
+            strongest = int(frame.counts.max(initial=0, where=readable))
+            self._strongest = max(self._strongest, strongest)
         if frame.valid is not None and self._begun == 0 and not self._missing_taxels:
             self._missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         for contact in self.tracker.push(frame):
@@ -169,11 +175,19 @@ class Classifier:
 
     def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
         """Decisions on a stream without contact, for the tasks that have a label for it."""
-        flags = ("no_contact", "missing_taxels") if self._missing_taxels else ("no_contact",)
+        near = self._strongest > self.layout.threshold_counts
+        flags = (
+            "no_contact",
+            *(("missing_taxels",) if self._missing_taxels else ()),
+            *(("near_contact",) if near else ()),
+        )
+        strongest = round(self._strongest / max(self.layout.onset, 1), 3)
         for name, task in self.model.info.tasks.items():
             if task.no_contact is not None:
                 latency_ms = round((time.perf_counter() - began) * 1e3, 3)
-                yield Decided(name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags)
+                yield Decided(
+                    name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags, strongest=strongest
+                )
 
     def classify(self, recording: Recording) -> Iterator[Event]:
         """Decide on a recording as the board would have; this classifier's own state stays.

@@ -57,6 +57,8 @@ class Decided:
         contact: as in `Onset`.
         position: (x, y, z) of the contact's last position, if several are followed and it is known
             (see `edge.touch.contact.Contact.position`).
+        strongest: without a contact, the largest count of any taxel, as a part of the count at
+            which a contact begins; else None.
         decision: the model's own answer, with the votes and the nearest training trials; None
             without a label.
     """
@@ -72,6 +74,7 @@ class Decided:
     stopped_by: str | None = None
     contact: int | None = None
     position: tuple[float, float, float] | None = None
+    strongest: float | None = None
     decision: Decision | None = field(default=None, compare=False, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -90,6 +93,8 @@ class Decided:
             "confidence": self.confidence,
             "latency_ms": self.latency_ms,
         }
+        if self.strongest is not None:
+            line["strongest"] = self.strongest
         if self.stopped_by is not None:
             line |= {"error": self.error, "stopped_by": self.stopped_by}
         return {**line, "flags": list(self.flags)}

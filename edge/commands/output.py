@@ -97,6 +97,8 @@ def decision_text(line: Mapping[str, Any], contact: str = "") -> str:
     """A decision as text: its time, task, label, confidence and flags."""
     label = "out of range" if line["label"] is None else line["label"]
     notes = [", ".join(line["flags"])] if line["flags"] else []
+    if "strongest" in line:
+        notes.append(f"the strongest taxel came to {line['strongest']:.0%} of the onset")
     if "expected" in line and line["expected"] != line["label"]:
         notes.append(f"labelled {line['expected']}")
     time = line["onset_s"] + line["window_s"]

@@ -69,6 +69,12 @@ def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_
     lacking = replace(quiet, valid=np.arange(384).reshape(16, 24) > 0)
     (said,) = Classifier(model).classify(lacking)
     assert said.flags == ("no_contact", "missing_taxels")
+    assert said.strongest == 0.0
+    weak = quiet.frames.copy()
+    weak[30, 4, 5] = (model.info.layout.threshold_counts + model.info.layout.onset) // 2
+    (said,) = Classifier(model).classify(replace(quiet, frames=weak))
+    assert said.flags == ("no_contact", "near_contact")
+    assert said.to_dict()["strongest"] == round(weak.max() / model.info.layout.onset, 3) < 1.0
     decided = [event for _, event in watch(model, touch) if isinstance(event, Decided)]
     assert [event.task for event in decided] == ["category", "object"]
     assert all(event.label != "none" for event in decided)
