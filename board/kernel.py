@@ -29,11 +29,11 @@ INIT = """\
 b=/bin/busybox
 $b mount -t proc proc /proc; $b mount -t sysfs sys /sys; $b mount -t devtmpfs dev /dev
 for module in {modules}; do $b insmod /modules/$module.ko || echo "$module cannot be loaded"; done
-$b mount -t 9p -o trans=virtio,version=9p2000.L,msize=1048576,cache=loose,ro host /root
-for folder in proc sys dev; do $b mount --bind /$folder /root/$folder; done
-$b mount -t tmpfs run /root/run
+$b mount -t 9p -o trans=virtio,version=9p2000.L,msize=1048576,cache=loose,ro host /host
+for folder in proc sys dev; do $b mount --bind /$folder /host/$folder; done
+$b mount -t tmpfs run /host/run
 $b ip link set lo up
-$b chroot /root /usr/bin/env -i TMPDIR=/run PATH=/usr/sbin:/usr/bin:/sbin:/bin {command}
+$b chroot /host /usr/bin/env -i TMPDIR=/run PATH=/usr/sbin:/usr/bin:/sbin:/bin {command}
 echo "{ended} $?"
 $b poweroff -f
 """
@@ -93,7 +93,7 @@ def _initrd(system: Path, command: Sequence[str]) -> Path:
     """Make the archive that the kernel unpacks into memory and starts from."""
     root, archive = FOLDER / "initrd.root", FOLDER / "initrd"
     shutil.rmtree(root, ignore_errors=True)
-    for name in ("bin", "dev", "modules", "proc", "root", "sys"):
+    for name in ("bin", "dev", "host", "modules", "proc", "sys"):
         (root / name).mkdir(parents=True)
     busybox = shutil.copy(system / "bin" / "busybox", root / "bin")
     for name in MODULES.split():

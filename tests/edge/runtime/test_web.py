@@ -160,8 +160,9 @@ def test_every_browser_gets_the_latest_picture(server):
 
     for client in clients:
         text = b""
-        while b'data: {"t":1.5}\n\n' not in text:
+        while not text.endswith(b"}\n\n"):
             text += client.recv(4096)
+        assert b'data: {"t":1.5}\n\n' in text
         client.close()
 
 
