@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, numpy_helper
 
 from edge.cli import dispatch
+from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import load_arrays
@@ -108,8 +109,13 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
     Raises:
         InputError: a file is missing, or no such file.
     """
-    tasks = list(Model(model).info.tasks)
-    vectors = load_arrays(str(golden))["vectors"]
+    info = Model(model).info
+    tasks, vectors = list(info.tasks), load_arrays(golden).get("vectors")
+    if vectors is None or vectors.ndim != 2 or vectors.shape[1] != info.width:
+        raise InputError(
+            f"{golden}: has no vectors of {info.width} features; give the golden file that was "
+            "exported with the model"
+        )
     vectors = vectors[np.isfinite(vectors).all(axis=1)]
     shipped = onnx.load(model)
     single = in_float32(shipped)

@@ -110,8 +110,8 @@ def scale_of(
         return np.ldexp(mean, powers), inverse(deviation)
     if method == "V":
         gain = ones.copy()
-        whole = np.ldexp(largest, powers)
-        ranges = [whole[i] for i, name in enumerate(features) if name in FEATURES[:2]]
+        magnitudes = np.ldexp(largest, powers)
+        ranges = [magnitudes[i] for i, name in enumerate(features) if name in FEATURES[:2]]
         if ranges and FEATURES[2] in features:
             motion = list(features).index(FEATURES[2])
             gain[motion] = max(ranges) * inverse(largest)[motion]

@@ -73,13 +73,13 @@ def chosen(
         load: the data set at a threshold and an onset.
         accuracy: of decisions on a data set, where missed touches count as wrong.
     """
-    missed = sum(NO_CONTACT not in labels.values() for _, labels in dataset.untouched)
+    unfelt = sum(NO_CONTACT not in labels.values() for _, labels in dataset.untouched)
     own = dataset.layout.threshold_counts, dataset.layout.onset
     levels = dict.fromkeys((round(part * own[0]), round(part * own[1])) for part in LOWER)
-    if not missed or own[1] == 0:
+    if not unfelt or own[1] == 0:
         return dataset, []
     tried = [dataset, *(load(*level) for level in levels if level != own)]
-    shares = [accuracy(one) for one in tried]
+    shares = [accuracy(candidate) for candidate in tried]
     best = int(np.argmax(shares))
     n = len(dataset.trials) + len(dataset.untouched)
     error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
@@ -88,6 +88,6 @@ def chosen(
     layout = tried[best].layout
     return tried[best], [
         f"the threshold is {layout.threshold_counts} and the onset {layout.onset} counts: at "
-        f"{own[0]} and {own[1]} counts, {missed} recordings show no contact; in cross-validation "
+        f"{own[0]} and {own[1]} counts, {unfelt} recordings show no contact; in cross-validation "
         f"{shares[best]:.1%} against {shares[0]:.1%} (--threshold and --onset set them)"
     ]

@@ -7,6 +7,8 @@ import numpy as np
 import onnx
 import pytest
 
+from edge.demo import MODEL
+from edge.errors import InputError
 from export import arithmetic
 from train.tradeoff.board import FORMAT, read_formats
 
@@ -24,6 +26,12 @@ def test_each_format_has_its_price_and_the_shipped_one_no_other_label(rows):
     assert [row["format"].split()[0] for row in rows] == ["whole", "float32", "int8"]
     assert all(tuple(row) == FORMAT and row["decision us"] > 0.0 for row in rows)
     assert rows[0]["other labels %"] == 0.0
+
+
+@pytest.mark.parametrize("file", ["golden/golden.npz", "../edge/demo/pillow-movable.npz"])
+def test_a_golden_file_of_another_model_is_named(file):
+    with pytest.raises(InputError, match=r"has no vectors of \d+ features"):
+        arithmetic.compare(MODEL, GOLDEN.parent / file)
 
 
 def test_labels_that_differ_are_counted(monkeypatch):
