@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -374,21 +374,30 @@ class Choosing:
             f"cross-validation {shares} (--window sets it)"
         ]
 
-    def choose(self, window_s: float) -> tuple[dict[str, Chosen], AnswerTable]:
-        """Each task's settings, and the candidates' answers to left-out trials."""
+    def choose(
+        self, window_s: float
+    ) -> tuple[dict[str, Chosen], NDArray[np.int64], list[dict[str, Choice]]]:
+        """Each task's settings.
+
+        Returns:
+            {task: its settings}, the fold of each trial, and
+            [fold]{task: the choice made without the fold's trials}.
+        """
         trials, groups = self._tables(window_s, True, "choosing")
+        without: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
         chosen: dict[str, Chosen] = {}
         for task in self._y:
             grouped = task in self._grouped
             table, margin = (groups, UNSEEN_MARGIN) if grouped else (trials, 0.0)
             choices, prices = table.choices[task], costs(table.choices[task], self._widths)
             own = [_places_of(candidate, choices) for candidate in self._tried]
-            by_trial, allowed = trials.choices[task], None
-            if grouped:
-                allowed = _allowed(by_trial, self._widths.keys(), unseen=True)
+            chosen_without = without_folds(task, trials, table, prices, margin)
+            for by_task, choice in zip(without, chosen_without, strict=True):
+                by_task[task] = choice
+            picked = [trials.choices[task].index(choice) for choice in chosen_without]
             accuracies = [
                 table.nested(task, prices, margin=margin),
-                trials.nested(task, costs(by_trial, self._widths), allowed, margin),
+                trials.answered(task, picked),
                 *(table.nested(task, prices, places) for places in own),
             ]
             untouched = self._dataset.untouched_labels(task)
@@ -401,18 +410,31 @@ class Choosing:
                 tuple(rest),
                 tuple(choices[table.chosen(task, prices, places)] for places in own),
             )
-        return chosen, trials
+        return chosen, trials.folds, without
 
 
-def _allowed(choices: Sequence[Choice], names: Set[str], *, unseen: bool) -> NDArray[np.int64]:
-    """Places of the choices made of the features `names`, shrunk enough for objects `unseen`."""
-    return np.flatnonzero(
-        [
-            set(choice.features) <= names
-            and (not unseen or choice.projection == "pca" or choice.shrinkage >= UNSEEN_SHRINKAGE)
-            for choice in choices
-        ]
-    )
+def without_folds(
+    task: str, trials: AnswerTable, table: AnswerTable, prices: NDArray[np.int64], margin: float
+) -> list[Choice]:
+    """[fold] the settings chosen without a fold's trials, by the rule that chooses them with all.
+
+    By answers to left-out groups, where the settings are chosen so; the fits behind these answers
+    may have seen the fold's trials, of other groups.
+
+    Args:
+        task: the task.
+        trials: the candidates' answers to left-out trials.
+        table: the answers that choose; `trials`, or those to left-out groups.
+        prices, margin: of `choose`.
+    """
+    count = int(trials.folds.max()) + 1
+    if table is trials:
+        places = [trials.without(task, fold, prices, margin=margin) for fold in range(count)]
+    else:
+        answers = table.held_out(task)
+        others = (answers[:, trials.folds != fold] for fold in range(count))
+        places = [choose(each, prices, margin=margin) for each in others]
+    return [table.choices[task][place] for place in places]
 
 
 def _places_of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:
@@ -425,20 +447,3 @@ def _with_untouched(labels: Sequence[str], result: Result) -> Result:
     """Count missed touches as wrong, and recordings of no touch without a contact as right."""
     right = result.right + list(labels).count(NO_CONTACT)
     return replace(result, right=right, total=result.total + len(labels))
-
-
-def without_folds(
-    trials: AnswerTable, dataset: DataSet, samples: int, chosen: Mapping[str, Chosen]
-) -> list[dict[str, Choice]]:
-    """[fold]{task: the choice made without the fold's trials}."""
-    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    by_fold: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
-    for task, choices in trials.choices.items():
-        unseen = chosen[task].left_out != TRIAL
-        allowed = _allowed(choices, widths.keys(), unseen=unseen)
-        prices = np.zeros(len(choices), dtype=np.int64)
-        prices[allowed] = costs([choices[i] for i in allowed], widths)
-        margin = UNSEEN_MARGIN if unseen else 0.0
-        for fold, choice_of in enumerate(by_fold):
-            choice_of[task] = choices[trials.without(task, fold, prices, allowed, margin)]
-    return by_fold

@@ -270,12 +270,15 @@ class AnswerTable:
 
     def nested(self, task: str, *rule: Any, **more: Any) -> Result:
         """The accuracy of the choice itself, with the numbers that it most often takes."""
-        hits, picked = np.zeros(len(self.folds), dtype=bool), []
-        for fold in range(int(self.folds.max()) + 1):
-            candidate = self.without(task, fold, *rule, **more)
+        folds = range(int(self.folds.max()) + 1)
+        return self.answered(task, [self.without(task, fold, *rule, **more) for fold in folds])
+
+    def answered(self, task: str, picked: Sequence[int]) -> Result:
+        """The accuracy where the candidate `picked` for a fold answers the trials of that fold."""
+        hits = np.zeros(len(self.folds), dtype=bool)
+        for fold, candidate in enumerate(picked):
             own = self.folds == fold
             hits[own] = self.right[task][fold][candidate, own]
-            picked.append(candidate)
         usual = self.choices[task][int(np.bincount(picked).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
 

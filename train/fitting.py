@@ -18,7 +18,7 @@ from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
-from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, kinds_of, without_folds
+from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, kinds_of
 from train.dataset import DataSet, load_trials, read
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
@@ -192,7 +192,7 @@ def fit(
         windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
     window_s, why = choosing.window(windows)
     notes += why
-    chosen, trials = choosing.choose(window_s)
+    chosen, folds, without = choosing.choose(window_s)
     dataset = dataset.with_kernels(window_s)
     choices = {task: settings.choice for task, settings in chosen.items()}
     measured = dataset
@@ -202,13 +202,12 @@ def fit(
     points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes)
     sequential = None
     if points:
-        without = without_folds(trials, measured, samples, chosen)
         used = [choice for by_task in (choices, *without) for choice in by_task.values()]
         seen = measured.of([name for choice in used for name in choice.features])
         at_points = np.stack([seen.features(s, samples) for s in points])
         sequential = SequentialClassifier(
             choices, points, seen.names, jobs=jobs, widths=seen.widths(samples)
-        ).fit(at_points, y, trials.folds, without)
+        ).fit(at_points, y, folds, without)
         classifier = sequential.decision_points_[-1]
     else:
         classifier = ContactClassifier(choices, dataset.names, dataset.widths(samples)).fit(X, y)

@@ -9,7 +9,17 @@ import pytest
 import train
 from edge.recording import save
 from edge.touch.feature_sets import expand
-from train.choose import PLAIN, WITH_JOINTS, candidates, costs, groupable, kinds_of, products
+from train.choose import (
+    PLAIN,
+    WITH_JOINTS,
+    candidates,
+    costs,
+    groupable,
+    kinds_of,
+    products,
+    without_folds,
+)
+from train.evaluate import AnswerTable
 from train.pipeline import Choice
 
 TASKS = {
@@ -110,6 +120,17 @@ def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
 def test_of_equally_many_weights_those_listed_first_are_cheaper():
     choices = [Choice("IV", 1, 1, "lda", features=(name,)) for name in ("b", "a", "c")]
     assert costs(choices, {"a": 5, "b": 5, "c": 4}).tolist() == [1, 2, 0]
+
+
+def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_trials():
+    """One candidate is right on other trials of known objects, the other on new objects."""
+    near, far = Choice("IV", 1, 1, "lda"), Choice("IV", 1, 3, "lda")
+    folds, prices = np.arange(12) % 3, np.zeros(2, dtype=np.int64)
+    right = np.repeat([[True], [False]], 12, axis=1)
+    by_trial = AnswerTable(folds, {"t": [near, far]}, {"t": np.stack([right] * 3)})
+    by_group = AnswerTable(folds // 2, {"t": [near, far]}, {"t": np.stack([~right] * 2)})
+    assert without_folds("t", by_trial, by_trial, prices, 0.0) == [near] * 3
+    assert without_folds("t", by_trial, by_group, prices, 0.0) == [far] * 3
 
 
 FEW = {"features": ["max_force"], "projection": "pca", "scaling": "none", "k": 1, "jobs": 1}
