@@ -22,9 +22,10 @@ from edge.touch import measures
 from export import golden
 from export.graph import to_onnx
 from train.choose import TRIAL, Candidate, Chosen
-from train.dataset import NO_CONTACT, DataSet
+from train.dataset import DataSet
 from train.evaluate import Result
 from train.fitting import Fitted
+from train.labels import NO_CONTACT
 from train.pipeline import Choice, ContactClassifier, squared_distances
 from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
 from train.stopping import SequentialClassifier

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from edge.recording import Recording
 from edge.touch.feature_sets import expand
-from train.dataset import NO_CONTACT, DataSet
+from train.dataset import DataSet
 from train.evaluate import (
     NEIGHBOURS,
     SHRINKAGES,
@@ -27,6 +27,7 @@ from train.evaluate import (
     group_folds,
     stratified_folds,
 )
+from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
 from train.projection import KINDS

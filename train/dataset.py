@@ -30,12 +30,8 @@ from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
 from train.kernels import MOST_TOUCHES, kernel_table
+from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
-
-NO_CONTACT = "none"
-"""The label of a recording in which nothing is touched."""
-ALIKE = "alike"
-"""`meta.contacts` of a recording whose contacts all have its labels."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +80,9 @@ class DataSet:
         digest: SHA-256 over the recordings' bytes.
         names: the features that were measured, by default the paper's three.
         joints: number of joint angles, where a feature is made of them; else 0.
-        tasks: keys of the labels, sorted; every trial has them all.
-        left_out: {missing label or joint angles: recordings left out for lack of it}.
+        tasks: keys of the labels, sorted.
+        left_out: {missing label or joint angles: recordings left out for lack of it}. Where each
+            task is fitted on the trials that have it, those that lack it are left out of it alone.
         unused: recordings with more contacts than were used.
         kernels: {feature: its table} of the features that are made of kernels, see `with_kernels`.
     """
@@ -108,17 +105,22 @@ class DataSet:
         return [labels[task] for _, labels in self.untouched if task in labels]
 
     def groups(self, key: str) -> NDArray[np.str_] | None:
-        """(n,) each trial's value of a key in its labels or metadata; None where one lacks it."""
+        """(n,) each trial's value of a key in its labels or metadata; None where most lack it.
+
+        Those that lack it are one group, as nobody knows which of them belong together.
+        """
         values = [trial.labels.get(key, trial.recording.meta.get(key)) for trial in self.trials]
-        return None if None in values else np.array([str(value) for value in values])
+        if 2 * values.count(None) > len(values):
+            return None
+        return np.array(["" if value is None else str(value) for value in values])
 
     def widths(self, samples: int = SAMPLES) -> tuple[int, ...]:
         """Columns of each feature in `features`."""
         return widths(self.names, samples, self.layout, self.joints)
 
     def labels(self, task: str) -> NDArray[np.str_]:
-        """(n,) the trials' labels for a task."""
-        return np.array([trial.labels[task] for trial in self.trials])
+        """(n,) the trials' labels for a task; empty where a trial has none."""
+        return np.array([trial.labels.get(task, "") for trial in self.trials])
 
     def features(
         self,
@@ -234,14 +236,16 @@ def load_trials(
     horizon_s: float = 2.0,
     features: Sequence[str] = FEATURES,
     arm: Chain | None = None,
+    partial: bool = False,
     progress: bool = False,
 ) -> DataSet:
     """Follow the contacts of recordings.
 
     A recording's first contact is a trial, with the recording's labels. Where `meta.contacts` is
     "alike", each of its contacts is a trial with these labels. Where it is a list of labels, they
-    belong to the contacts in their order. Recordings that lack a label, or joint angles that a
-    feature needs, are left out and named in `left_out`, if most recordings have it.
+    belong to the contacts in their order. Labels that follow from others are added
+    (`train.labels.completed`). Recordings that lack a label, or joint angles that a feature needs,
+    are left out and named in `left_out`, if most recordings have it.
 
     Args:
         data: recordings, or `.npz` files and folders of them.
@@ -251,6 +255,7 @@ def load_trials(
         horizon_s: seconds from onset that are kept of each contact.
         features: names of the features measured (see `edge.touch.measures`).
         arm: for recordings with joint angles that name no arm.
+        partial: keep trials that have a label for some task.
         progress: show progress bars on stderr.
 
     Raises:
@@ -261,9 +266,10 @@ def load_trials(
     reference = with_thresholds(raw.recordings[0].layout, threshold, onset)
     reference = replace(reference, dead=_dead(raw.recordings))
     needed = any(feature.of_joints for feature in types)
-    tasks, left_out = _lacking(raw, needed or any(feature.moves for feature in types))
-    out = {path for paths in left_out.values() for path in paths}
-    kept = [(r, p) for r, p in zip(raw.recordings, raw.paths, strict=True) if p not in out]
+    wanting = raw.joints and (needed or any(feature.moves for feature in types))
+    every = list(zip(raw.recordings, raw.paths, strict=True))
+    kept = [(r, path) for r, path in every if not wanting or r.joints is not None]
+    bare = tuple(path for r, path in every if wanting and r.joints is None)
     arms = [arm_of(recording, str(path), arm) for recording, path in kept]
     kept = [
         (recording if own is None else recording.for_joints(own.names), path)
@@ -307,17 +313,39 @@ def load_trials(
             f"no contact in any of {len(kept)} recordings; lower the threshold "
             f"of {reference.threshold_counts} counts"
         )
+    labels = completed([t.labels for t in trials] + [own for _, own in untouched])
+    tasks = shared_tasks(labels, partial=partial)
+    paths = [t.path for t in trials] + [path for path, _ in untouched]
+    lacking = {
+        f"a label for {task}": tuple(
+            dict.fromkeys(p for p, own in zip(paths, labels, strict=True) if task not in own)
+        )
+        for task in tasks
+    }
+    enough = any if partial else all
+    used = [
+        (path, own)
+        for path, own in zip(paths, labels, strict=True)
+        if enough(task in own for task in tasks)
+    ]
+    trials = [
+        replace(trial, labels=own)
+        for trial, own in zip(trials, labels, strict=False)
+        if enough(task in own for task in tasks)
+    ]
+    if not trials:
+        raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
     return DataSet(
         tuple(trials),
         reference,
         settings,
         chain,
-        tuple(untouched),
+        tuple(used[len(trials) :]),
         raw.digest,
         names,
         joints,
         tasks,
-        left_out,
+        {need: left for need, left in (*lacking.items(), ("joint angles", bare)) if left},
         tuple(unused),
     )
 
@@ -330,28 +358,6 @@ def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> list[tuple[flo
     return [(contact.onset_s, contact.series()) for contact in followed.values()]
 
 
-def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
-    """The labels of those of a recording's `count` contacts that are trials."""
-    each = recording.meta.get("contacts")
-    if each is None:
-        return [recording.labels]
-    if each == ALIKE:
-        return [recording.labels] * count
-    if not isinstance(each, list) or not all(isinstance(labels, dict) for labels in each):
-        raise InputError(f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact')
-    if len(each) != count:
-        raise InputError(
-            f"meta.contacts labels {len(each)} contacts, {count} are found; correct the labels or "
-            "the threshold"
-        )
-    return [{**recording.labels, **{str(k): str(v) for k, v in own.items()}} for own in each]
-
-
-def _each(recording: Recording) -> list[dict[str, str]]:
-    each = recording.meta.get("contacts")
-    return [own for own in each if isinstance(own, dict)] if isinstance(each, list) else []
-
-
 def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None) -> SkinLayout:
     """The skin with these thresholds; one that is None stays, or scales with the other."""
     if threshold is not None:
@@ -359,30 +365,6 @@ def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None
         begin = round(threshold * ratio) if onset is None else onset
         return replace(layout, threshold_counts=threshold, onset_counts=begin)
     return layout if onset is None else replace(layout, onset_counts=onset)
-
-
-def _lacking(raw: Recordings, joints: bool) -> tuple[tuple[str, ...], dict[str, tuple[Path, ...]]]:
-    """The tasks that most recordings have a label for, and the recordings that lack one."""
-    labels = [set(r.labels).union(*_each(r)) for r in raw.recordings]
-    keys = sorted(set().union(*labels))
-    tasks = tuple(
-        key for key in keys if 2 * sum(key in own for own in labels) > len(raw.recordings)
-    )
-    if not tasks:
-        raise InputError(
-            "the recordings share no label; give every one the same keys under meta.labels"
-        )
-    lacking = {
-        f"a label for {task}": tuple(
-            path for path, own in zip(raw.paths, labels, strict=True) if task not in own
-        )
-        for task in tasks
-    }
-    if joints and raw.joints:
-        lacking["joint angles"] = tuple(
-            path for path, r in zip(raw.paths, raw.recordings, strict=True) if r.joints is None
-        )
-    return tasks, {need: paths for need, paths in lacking.items() if paths}
 
 
 def _joint_angles(kept: Sequence[tuple[Recording, Path]]) -> int:

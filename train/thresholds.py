@@ -9,7 +9,8 @@ import numpy as np
 from edge.recording import Recording
 from edge.touch.layout import for_device
 from edge.touch.track import ContactTracker
-from train.dataset import NO_CONTACT, DataSet, contacts, with_thresholds
+from train.dataset import DataSet, contacts, with_thresholds
+from train.labels import NO_CONTACT
 
 QUIET_S = 0.1
 """The time from the start of each recording that is taken to lie before the contact."""

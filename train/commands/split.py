@@ -16,7 +16,8 @@ from edge.files import parsing
 from edge.recording import Recording, save
 from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
-from train.dataset import labels_of, read
+from train.dataset import read
+from train.labels import labels_of
 from train.progress import bar
 
 LEAD_S = 0.25

@@ -1,0 +1,80 @@
+"""Labels of contacts, and those that follow from others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import permutations
+
+from edge.errors import InputError
+from edge.recording import Recording
+
+NO_CONTACT = "none"
+"""The label of a recording in which nothing is touched."""
+ALIKE = "alike"
+"""`meta.contacts` of a recording whose contacts all have its labels."""
+JOINED = ("category", "softness", "mobility")
+"""A task whose labels are those of two others, joined by a hyphen."""
+ENOUGH = 10
+"""Trials with a label for a task that are enough to fit it, where most trials lack one."""
+
+
+def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
+    """The labels of those of a recording's `count` contacts that are trials."""
+    each = recording.meta.get("contacts")
+    if each is None:
+        return [recording.labels]
+    if each == ALIKE:
+        return [recording.labels] * count
+    if not isinstance(each, list) or not all(isinstance(labels, dict) for labels in each):
+        raise InputError(f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact')
+    if len(each) != count:
+        raise InputError(
+            f"meta.contacts labels {len(each)} contacts, {count} are found; correct the labels or "
+            "the threshold"
+        )
+    return [{**recording.labels, **{str(k): str(v) for k, v in own.items()}} for own in each]
+
+
+def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
+    """Each trial's {task: label}, with the labels that follow from its others.
+
+    Where a task's labels are those of two others joined by a hyphen, `soft-fixed` follows from
+    `soft` and `fixed`, and the reverse. This is so for `JOINED`, and for tasks for which it holds
+    in every trial that has all three. No task is added that no trial has.
+    """
+    tasks = set().union(*trials)
+    out = [dict(labels) for labels in trials]
+    for triple in permutations(sorted(tasks | set(JOINED)), 3):
+        whole, first, second = triple
+        known = [own for own in trials if tasks.issuperset(triple) and own.keys() >= set(triple)]
+        if triple != JOINED and not known:
+            continue
+        if any(own[whole] != f"{own[first]}-{own[second]}" for own in known):
+            continue
+        for own in out:
+            follows = {}
+            if own.get(whole, "").count("-") == 1:
+                follows = dict(zip((first, second), own[whole].split("-"), strict=True))
+            if own.keys() >= {first, second}:
+                follows[whole] = f"{own[first]}-{own[second]}"
+            own.update({t: label for t, label in follows.items() if t in tasks and t not in own})
+    return out
+
+
+def shared_tasks(trials: Sequence[Mapping[str, str]], *, partial: bool = False) -> tuple[str, ...]:
+    """The tasks that most trials have a label for; `partial`, also those that `ENOUGH` have.
+
+    Raises:
+        InputError: there is none.
+    """
+    counts = {task: sum(task in own for own in trials) for task in set().union(*trials)}
+    tasks = sorted(
+        task
+        for task, count in counts.items()
+        if 2 * count > len(trials) or (partial and count >= ENOUGH)
+    )
+    if not tasks:
+        raise InputError(
+            "the recordings share no label; give every one the same keys under meta.labels"
+        )
+    return tuple(tasks)
