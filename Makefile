@@ -189,8 +189,14 @@ soak: $(READY)
 soak-day: $(READY)
 	$(BIN)/python -m bench.soak --minutes 1440 --every 60
 
-requirements-board.txt: $(READY) pyproject.toml constraints.txt
-	$(BIN)/python -m board.requirements
+$(VENV)/.upkeep: $(READY)
+	$(PIP) --group upkeep
+	@touch $@
+
+COMPILE = $(BIN)/uv pip compile pyproject.toml --quiet --no-annotate -c constraints.txt
+
+requirements-board.txt: $(VENV)/.upkeep pyproject.toml constraints.txt
+	$(COMPILE) --universal --generate-hashes --custom-compile-command "make $@" -o $@
 
 # setuptools would pack modules that an earlier build left behind.
 wheel: $(READY)
@@ -245,8 +251,13 @@ $(VENV)/.mutants: $(READY)
 mutants: $(VENV)/.mutants
 	$(BIN)/python -m tests.mutants $(MUTANTS)
 
-constraints: $(READY)
-	$(BIN)/python -m board.requirements --check-constraints
+# The lines that differ are missing pins (<) and pins that nothing needs (>).
+GROUPS := train dev docs browser mutants bench upkeep
+constraints: $(VENV)/.upkeep
+	$(COMPILE) --no-header --python-version 3.11.9 --python-platform x86_64-manylinux_2_28 \
+	  --all-extras $(GROUPS:%=--group %) -o $(VENV)/constraints.txt
+	tail -n +2 constraints.txt | diff $(VENV)/constraints.txt -
+	@echo "constraints.txt pins exactly what the groups need"
 
 # FUZZ="-k scene": only the readers whose names contain this.
 fuzz: $(READY)
