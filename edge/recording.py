@@ -21,6 +21,7 @@ from edge.files import open_regular, parsing, write_whole
 from edge.touch.arm import joint_columns
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.thresholds import doubt
 
 LARGEST_BYTES = 1 << 27
 """Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111 MB, two
@@ -337,7 +338,8 @@ def save(
             all recordings of a data set the same.
         overwrite, lasting: see `write_whole`.
 
-    A warning names the likely unit of times that do not seem to be in seconds.
+    A warning names the likely unit of times that do not seem to be in seconds, and thresholds for
+    a recording that has none, or whose first frame is above its onset.
 
     Raises:
         InputError: the recording breaks the contract, `path` cannot be written, or it exists and
@@ -352,6 +354,11 @@ def save(
         likely = [u for u, factor in units.items() if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ]
         guess = f", and these may be in {likely[0]}" if likely else ""
         LOG.warning(f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}")
+    why = doubt(
+        recording.t, recording.frames, recording.meta.get("skin", {}), recording.layout.onset
+    )
+    if why is not None:
+        LOG.warning(f"{name}: {why}")
     arrays = {key: getattr(recording, key) for key in KEYS[:-1]}
     arrays = {key: array for key, array in arrays.items() if array is not None}
     save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)

@@ -248,10 +248,15 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
     """Warnings where the first frame gives labels away, or most recordings begin in contact."""
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):
+        mend = "record from before the touch"
+        recordings = [t.recording for t in dataset.trials]
+        low, high = thresholds.proposed(recordings)
+        felt, _ = thresholds.count_contacts(recordings, low, high)
+        if felt >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
+            mend += f", or take --threshold {low} --onset {high}, by which it begins later"
         return [
             f"warning: {(~untouched).mean():.0%} of the touches begin with their recording, so "
-            "their onset is not known; record from before the touch, or raise the threshold "
-            "(`python -m train thresholds` proposes one)"
+            f"their onset is not known; {mend}"
         ]
     X = np.stack([t.recording.frames[0].reshape(-1) for t in dataset.trials])[untouched]
     squares = cdist(X, X, "sqeuclidean")

@@ -8,16 +8,13 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
+from edge.touch.thresholds import MARGIN, above, noise
 from edge.touch.track import ContactTracker
 from train.dataset import DataSet, contacts, with_thresholds
 from train.labels import NO_CONTACT
 
-QUIET_S = 0.1
-"""The time from the start of each recording that is taken to lie before the contact."""
-MARGINS = (2.0, 1.0)
+MARGINS = (MARGIN, 1.0)
 """Ratios of the threshold to the noise: the lower one where touches are missed at the other."""
-ONSET = 1.5
-"""Ratio of the onset to the threshold, so that a force that fluctuates is one contact."""
 MISSED_SHARE = 0.02
 """Of the touches, which a proposal may miss."""
 LOWER = (0.5, 0.25, 0.0)
@@ -29,20 +26,12 @@ FEWEST_GAINED = 1.5
 def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:
     """Threshold and onset in counts, from the noise before contact.
 
-    The noise is the 90th percentile over the recordings of the largest count in the first
-    `QUIET_S`, so that a few recordings that begin in contact do not raise it. Of slow recordings
-    this is one frame. The threshold is twice the noise, or as high as the noise where that misses
-    more of the recordings labelled with a touch.
+    The noise is the 90th percentile over the recordings of `edge.touch.thresholds.noise`, so that a
+    few recordings that begin in contact do not raise it. The threshold is twice the noise, or as
+    high as the noise where that misses more of the recordings labelled with a touch.
     """
-    largest = [
-        int(recording.frames[recording.t < recording.t[0] + QUIET_S].max(initial=0))
-        for recording in recordings
-    ]
-    noise = float(np.quantile(largest, 0.9))
-    pairs = []
-    for margin in MARGINS:
-        threshold = max(round(margin * noise), int(margin > 1.0))
-        pairs.append((min(threshold, 65534), min(round(ONSET * threshold), 65534)))
+    largest = [noise(recording.t, recording.frames) for recording in recordings]
+    pairs = [above(float(np.quantile(largest, 0.9)), margin) for margin in MARGINS]
     labelled = [r for r in recordings if r.labels and NO_CONTACT not in r.labels.values()]
     if not labelled:
         return pairs[0]

@@ -8,7 +8,7 @@ import pytest
 
 import train
 from edge.errors import InputError
-from edge.recording import save
+from edge.recording import Recording, save
 from train.dataset import load_trials
 from train.fitting import _decision_points, _leaks
 from train.pipeline import Choice
@@ -110,13 +110,15 @@ def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(trials, o
 def test_labels_told_by_the_first_frame_and_recordings_that_begin_in_contact_are_two_warnings():
     """Ten taxels' rest values tell the label; the touch comes later, or is there from the start."""
     labels = np.array(["a", "b"] * 10)
-    frames = np.where(labels == "a", 3, 9)[:, None, None, None] * np.ones((1, 2, 2, 5))
+    frames = np.where(labels == "a", 3, 9)[:, None, None, None] * np.ones((1, 6, 2, 5))
 
     def warning(onset_s):
-        recordings = [SimpleNamespace(t=np.array([0.0, 0.1]), frames=f) for f in frames]
+        recordings = [Recording(np.arange(6) / 10.0, f) for f in frames.astype(np.uint16)]
         trials = [SimpleNamespace(recording=r, onset_s=onset_s) for r in recordings]
         (note,) = _leaks(SimpleNamespace(trials=trials), {"kind": labels})
         return note
 
     assert "the first frame alone tells kind in 100% of the trials" in warning(0.1)
-    assert "100% of the touches begin with their recording" in warning(0.0)
+    assert "begin with their recording, so their onset is not known; record" in warning(0.0)
+    frames[:, 1:] = 50  # and grows
+    assert "or take --threshold 18 --onset 27, by which it begins later" in warning(0.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
-from edge.recording import Recording, load, save
+from edge.recording import Recording, save
 from train.importers import names
 from train.progress import bar
 from train.thresholds import count_contacts, proposed
@@ -50,28 +50,31 @@ def run(arguments: argparse.Namespace) -> int:
         if arm is not None and recording.joints is None:
             raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
         path = arguments.out / f"{name}.npz"
-        save(path, zeroed(recording) if arguments.zero else recording)
-        if "threshold_counts" not in recording.meta["skin"]:
-            without_threshold.append(path)
+        recording = zeroed(recording) if arguments.zero else recording
+        if "threshold_counts" in recording.meta["skin"]:
+            save(path, recording)
+        else:
+            without_threshold.append((path, recording))
         count += 1
+    report = set_thresholds(without_threshold) if without_threshold else ""
     print(f"recordings written to {arguments.out}: {count}")
-    if without_threshold:
-        print(set_thresholds(without_threshold))
+    if report:
+        print(report)
     return 0
 
 
-def set_thresholds(paths: Sequence[Path]) -> str:
-    """Set the recordings' thresholds to those that their noise suggests; returns a report."""
-    recordings = [load(path) for path in paths]
+def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
+    """Save trials with the thresholds that their noise suggests; returns a report."""
+    recordings = [recording for _, recording in trials]
     threshold, onset = proposed(recordings)
-    for path, recording in zip(paths, recordings, strict=True):
+    for path, recording in trials:
         skin = {"threshold_counts": threshold, "onset_counts": onset}
         meta = {**recording.meta, "skin": {**recording.meta.get("skin", {}), **skin}}
         save(path, replace(recording, meta=meta))
     touched, _ = count_contacts(recordings, threshold, onset)
     return (
         f"threshold {threshold} and onset {onset} counts, from the noise before contact: {touched} "
-        f"of {len(paths)} have a contact; `python -m train thresholds` compares other thresholds"
+        f"of {len(trials)} have a contact; `python -m train thresholds` compares other thresholds"
     )
 
 
