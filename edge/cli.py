@@ -17,7 +17,9 @@ from importlib import import_module
 from edge import __version__
 from edge.errors import EdgeError
 
-COMMANDS = tuple("check scan calibrate record run view replay info verify bench fake demo".split())
+COMMANDS = tuple(
+    "check scan calibrate record label run view replay info verify bench fake demo".split()
+)
 """Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
 UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of writing to a full disk, beyond a quota, or to a terminal that has gone."""

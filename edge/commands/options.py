@@ -34,6 +34,14 @@ seconds = within(float, 1e-3, 1e9)
 """The type of an option that takes a duration."""
 
 
+def task_label(text: str) -> tuple[str, str]:
+    """The type of an option that takes a task and its label."""
+    task, equals, label = text.partition("=")
+    if not (task.strip() and equals and label.strip()):
+        raise argparse.ArgumentTypeError(f"must be TASK=LABEL, such as object=box, not {text!r}")
+    return task.strip(), label.strip()
+
+
 def add_skin(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
     parser.add_argument("--skin", metavar="skin.toml", help="the file that describes the skin")

@@ -19,7 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from edge.commands.options import add_arm, add_joints, add_skin, add_web, open_arm, within
+from edge.commands.options import (
+    add_arm,
+    add_joints,
+    add_skin,
+    add_web,
+    open_arm,
+    task_label,
+    within,
+)
 from edge.commands.output import Output
 from edge.commands.source import ending_signals, open_joints, open_page, open_skin, skin_events
 from edge.errors import InputError
@@ -51,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--label",
         action="append",
         default=[],
-        type=_label,
+        type=task_label,
         metavar="TASK=LABEL",
         help="what the skin touches, such as object=box; repeat it for several tasks",
     )
@@ -80,13 +88,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--dof", type=int, help="the number of angles in each line of --joints, without --arm"
     )
     add_arm(parser, "to be stored in each trial (without it, training assumes Cody's)")
-
-
-def _label(text: str) -> tuple[str, str]:
-    task, equals, label = text.partition("=")
-    if not (task.strip() and equals and label.strip()):
-        raise argparse.ArgumentTypeError(f"must be TASK=LABEL, such as object=box, not {text!r}")
-    return task.strip(), label.strip()
 
 
 class Trials:

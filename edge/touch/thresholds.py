@@ -32,12 +32,12 @@ def doubt(
 ) -> str | None:
     """Why a recording's thresholds (`skin`, and the `onset` of them) may not suit it, or None."""
     if "threshold_counts" not in skin:
-        problem = "its skin has no threshold_counts, so that any count above 0 is a contact"
+        problem = "its skin has no threshold_counts, so any count above 0 is a contact"
     elif frames[0].max(initial=0) > onset:
         problem = f"its first frame is above the onset of {onset} counts, so its onset is not known"
     else:
         return None
     threshold, begin = above(noise(t, frames))
     if begin >= frames.max(initial=0):
-        return f"{problem}; record from before the touch"
+        return f"{problem}; record from before the touch, and give thresholds in meta.skin"
     return f"{problem}; threshold_counts = {threshold} and onset_counts = {begin} would do"

@@ -67,7 +67,7 @@ def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(tmp_path,
     assert trial.joint_names == ("shoulder", "elbow")
     assert json.loads(out.getvalue())["frames_without_joints"] == 1
     assert trial.joints[0].tolist() == [0.1, 0.2]
-    assert caplog.messages == [f"{tmp_path}/box-001.npz: 1 of 2 frames have no joint angles"]
+    assert caplog.messages[-1:] == [f"{tmp_path}/box-001.npz: 1 of 2 frames have no joint angles"]
 
 
 @pytest.fixture

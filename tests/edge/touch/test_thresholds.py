@@ -27,7 +27,7 @@ def test_the_threshold_is_twice_the_noise_and_the_onset_half_as_much_again():
 @pytest.mark.parametrize(
     ("skin", "warning"),
     [
-        ({}, "no threshold_counts, so that any count above 0 is a contact; threshold_counts = 40 "
+        ({}, "no threshold_counts, so any count above 0 is a contact; threshold_counts = 40 "
              "and onset_counts = 60 would do"),
         ({"threshold_counts": 5}, "first frame is above the onset of 5 counts, so its onset is not "
                                   "known; threshold_counts = 40"),

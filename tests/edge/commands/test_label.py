@@ -1,0 +1,67 @@
+"""Labels of recordings, listed and changed."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from edge.cli import main
+from edge.recording import load, save
+
+
+@pytest.fixture
+def folder(make_touch, tmp_path):
+    """Two hard things, the second with labels of its own for its contacts."""
+    save(tmp_path / "a.npz", make_touch(seed=0))
+    touch = make_touch(seed=1)
+    contacts = [{"object": "hard 1"}, {"object": "hard 2"}]
+    save(tmp_path / "b.npz", replace(touch, meta={**touch.meta, "contacts": contacts}))
+    return tmp_path
+
+
+def label(capsys, *arguments):
+    """The exit status, and the JSON lines printed."""
+    status = main(["label", *map(str, arguments), "--json"])
+    return status, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, capsys):
+    before = (folder / "a.npz").read_bytes()
+    status, lines = label(capsys, folder)
+    assert status == 0
+    assert lines[0] == {
+        "event": "labels",
+        "file": str(folder / "a.npz"),
+        "labels": {"category": "rigid-fixed", "object": "hard 0"},
+    }
+    assert (folder / "a.npz").read_bytes() == before
+
+
+def test_a_file_is_relabelled_and_keeps_all_else(folder, capsys):
+    before = load(folder / "a.npz")
+    _, lines = label(capsys, folder / "a.npz", "--set", "object=brick", "--set", "softness=rigid")
+    after = load(folder / "a.npz")
+    assert lines[0]["labels"] == after.labels
+    assert after.labels == {"category": "rigid-fixed", "object": "brick", "softness": "rigid"}
+    assert (after.frames == before.frames).all()
+    assert {**after.meta, "labels": before.labels} == before.meta
+
+
+def test_a_task_is_renamed_also_in_the_labels_of_contacts(folder, capsys):
+    label(capsys, folder, "--rename", "object=thing")
+    assert load(folder / "a.npz").labels == {"category": "rigid-fixed", "thing": "hard 0"}
+    assert load(folder / "b.npz").meta["contacts"] == [{"thing": "hard 1"}, {"thing": "hard 2"}]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("--rename", "object=category"), "a.npz: has a label for category already"),
+        (("--set", "object=x"), "b.npz: its contacts have labels of their own for object"),
+    ],
+)
+def test_what_cannot_be_changed_leaves_every_file_as_it_was(change, sentence, folder, capsys):
+    before = (folder / "a.npz").read_bytes()
+    assert main(["label", str(folder), *change]) == 2
+    assert sentence in capsys.readouterr().err
+    assert (folder / "a.npz").read_bytes() == before
