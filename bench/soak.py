@@ -28,7 +28,7 @@ from edge.fake.faults import Fault
 from edge.fake.player import fake_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
-from edge.runtime.touch_map import TouchMap, events_on_map, map_writer
+from edge.runtime.touch_map import TouchMap, map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.touch.track import MAX_CONTACTS
@@ -73,9 +73,10 @@ def main() -> int:
         listener.bind(("127.0.0.1", 0))
         listener.setblocking(False)
         place = Path(folder) / "map.jsonl"
-        lines = Lines(out, f"127.0.0.1:{listener.getsockname()[1]}", patient=lambda: True)
-        writer = map_writer(place, model.info)
-        lines.add(writer)
+        waiting = {"patient": lambda: True}
+        writer = map_writer(place, model.info, **waiting)
+        port = listener.getsockname()[1]
+        lines = Lines(out, f"127.0.0.1:{port}", more=[writer], **waiting)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * arguments.minutes)
         pose = np.zeros(model.info.chain.dof if model.info.chain else 0)
@@ -84,8 +85,6 @@ def main() -> int:
             events = [event.to_dict() for event in classifier.push(frame)]
             written += len(events)
             lines.write(events)
-            for line in events_on_map(events):
-                writer.put(line, lambda: True)
             if frames % 100 == 0:
                 with suppress(BlockingIOError):
                     while listener.recv(65536):

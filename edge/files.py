@@ -42,6 +42,21 @@ def parsing(name: str, what: str, mend: str = "") -> Iterator[None]:
 
 
 @contextmanager
+def refusing(action: str) -> Iterator[None]:
+    """Turn an error of the system into one sentence: `ACTION: REASON`.
+
+    Raises:
+        InputError: the block raised an OSError or, as a name with a NUL does, a ValueError.
+    """
+    try:
+        yield
+    except EdgeError:
+        raise
+    except (OSError, ValueError) as error:
+        raise InputError(f"{action}: {getattr(error, 'strerror', None) or error}") from None
+
+
+@contextmanager
 def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryIO]:
     """Open a regular file for reading. Reading a FIFO could wait, and a device may never end.
 
@@ -49,12 +64,9 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
         InputError: it is missing, a folder, a FIFO or a device, or larger than `at_most` bytes.
     """
     name = os.fspath(path)
-    try:
+    with refusing(f"{name}: cannot be read"):
         # Without O_NONBLOCK, opening a FIFO waits until another process opens it for writing.
         handle = os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{name}: cannot be read: {reason}") from None
     try:
         status = os.fstat(handle)
         if stat.S_ISDIR(status.st_mode):
@@ -103,12 +115,9 @@ def check_writable(folder: str | os.PathLike[str]) -> None:
     """
     import tempfile
 
-    try:
+    with refusing(f"{os.fspath(folder)}: cannot be written"):
         os.makedirs(folder, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{os.fspath(folder)}: cannot be written: {reason}") from None
 
 
 def _name_free(temporary: Path, target: Path) -> None:

@@ -60,10 +60,16 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_joints(parser: argparse.ArgumentParser) -> None:
-    """Add the options that name a source of joint angles; `source.open_joints` opens it."""
+def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
+    """Add the options of commands that read a skin live; `source.reading` reads it.
+
+    Args:
+        parser: of the command.
+        web: ends the help of the option for a live page.
+    """
     from edge.runtime.joint_stream import OLDEST_S  # a replay needs no sockets
 
+    add_skin(parser)
     parser.add_argument(
         "--joints",
         metavar="stdin|udp:[HOST:]PORT",
@@ -82,6 +88,14 @@ def add_joints(parser: argparse.ArgumentParser) -> None:
         "--joints-shared-clock",
         action="store_true",
         help="the lines carry the time of this machine's monotonic clock",
+    )
+    parser.add_argument(
+        "--web",
+        metavar="HOST:PORT",
+        nargs="?",
+        const="127.0.0.1:8000",
+        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; another "
+        f"machine needs the link that is printed, with its token{web}",
     )
 
 
@@ -110,23 +124,6 @@ def open_arm(arguments: argparse.Namespace) -> Chain | None:
     if arguments.base is not None or arguments.tip is not None:
         raise InputError("--base and --tip need --arm arm.urdf")
     return None
-
-
-def add_web(parser: argparse.ArgumentParser, more: str) -> None:
-    """Add the option that serves a live page (`edge.runtime.page`).
-
-    Args:
-        parser: of the command.
-        more: ends the option's help.
-    """
-    parser.add_argument(
-        "--web",
-        metavar="HOST:PORT",
-        nargs="?",
-        const="127.0.0.1:8000",
-        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; another "
-        f"machine needs the link that is printed, with its token{more}",
-    )
 
 
 def add_error(parser: argparse.ArgumentParser) -> None:

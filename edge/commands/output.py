@@ -90,6 +90,8 @@ def event_text(line: Mapping[str, Any]) -> str:
             "" if line["complete"] else "; incomplete, as reading stopped before the contact's end"
         )
         return f"{line['file']}: {line['seconds']:g} s, {line['frames']} frames, {labels}{cut}"
+    if kind == "deleted":
+        return f"{line['file']} is deleted"
     return "no contact" if kind == "no_contact" else json_line(line)
 
 

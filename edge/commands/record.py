@@ -13,28 +13,21 @@ import math
 import re
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from edge.commands.options import (
-    add_arm,
-    add_joints,
-    add_skin,
-    add_web,
-    open_arm,
-    task_label,
-    within,
-)
-from edge.commands.output import Output
-from edge.commands.source import ending_signals, open_joints, open_page, open_skin, skin_events
+from edge.commands import terminal
+from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
+from edge.commands.source import reading
 from edge.errors import InputError
-from edge.files import NameTaken, check_writable
+from edge.files import NameTaken, check_writable, refusing
 from edge.recording import Recording, save
 from edge.runtime.event_writer import Lines
-from edge.skin.loop import Loop, stop_on
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
@@ -47,14 +40,14 @@ at most 4."""
 LEAD_S = 0.2
 LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
+KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
+DIGITS = "123456789"
 _DEBOUNCE = TrackSettings().debounce
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_skin(parser)
-    add_joints(parser)
-    add_web(parser, "; labels are given, changed and corrected there, so --label may be left out")
+    add_reading(parser, "; labels are given and corrected there, --label may be left out")
     parser.add_argument(
         "--label",
         action="append",
@@ -152,88 +145,77 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
     """
     path = Path(out)
     if path.suffix == ".npz":
-        try:
+        # A name of 300 characters, for one, cannot be looked up.
+        with refusing(f"{path}: cannot be written"), suppress(FileNotFoundError):
             path.lstat()
-        except FileNotFoundError:
-            return path
-        except (OSError, ValueError) as error:  # such as a name of 300 characters
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"{path}: cannot be written: {reason}") from None
-        raise InputError(f"{path}: exists already; choose another name or remove it")
+            raise InputError(f"{path}: exists already; choose another name or remove it")
+        return path
     # A listing of the folder omits names that begin with a dot.
     stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
-    taken = {p.name for p in path.glob(f"{stem}-*.npz")} if path.is_dir() else set()
-    number = 1
-    while f"{stem}-{number:03}.npz" in taken:
-        number += 1
-    return path / f"{stem}-{number:03}.npz"
+    taken = {p.name for p in path.glob(f"{stem}-*.npz")}
+    names = (f"{stem}-{number:03}.npz" for number in count(1))
+    return path / next(name for name in names if name not in taken)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
-    labels = dict(arguments.label)
+    labels: dict[str, str] = {}
+    for task, label in arguments.label:
+        labels.setdefault(task, label)
+    by_key = terminal.is_interactive() and arguments.web is None
     if not labels and arguments.web is None:
         raise InputError("give --label TASK=LABEL; a trial without a label teaches nothing")
-    if len(labels) < len(arguments.label):
-        raise InputError("--label names a task twice")
-    single = Path(arguments.out).suffix == ".npz"
-    wanted = 1 if single else arguments.trials
+    if len(labels) < len(arguments.label) and not by_key:
+        raise InputError("--label names a task twice; only in a terminal do keys choose the label")
+    folder = None if arguments.out.endswith(".npz") else Path(arguments.out)
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
     if arguments.joints is not None and dof is None:
         raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
-    if arguments.fake is not None and (arguments.joints or arguments.web):
-        arguments.real_time = True  # angles, or a person, go by the real clock
-    virtual = arguments.fake is not None and not arguments.real_time
     with (
-        open_skin(arguments, arm=arm if arguments.joints is None else None) as opened,
-        # Before this point a signal ends the program at once, as nothing can be lost.
-        stop_on(*ending_signals()) as stop,
-        open_joints(arguments, opened, arm, dof) as joints,
-        open_page(
-            arguments, opened, folder=None if single else Path(arguments.out), labels=labels
-        ) as page,
-        Lines(
-            form=Output.of(arguments).line,
-            patient=lambda: virtual and not stop.asked,
-        ) as lines,
-    ):
-        if arm is not None and arguments.joints is None:
-            given = opened.playback.dof if opened.playback is not None else None
-            if given != dof:
-                raise InputError(
-                    f"{opened.source} gives {given or 'no'} joint angles, but {arguments.arm} has "
-                    f"{dof} joints; name another source with --joints"
-                )
+        # Angles go by the real clock.
+        reading(arguments, arm=arm, dof=dof, real_time=arguments.joints is not None,
+                folder=folder, labels=labels) as live,
+        live.lines() as lines,
+        terminal.keys(live.stop) as typed,
+    ):  # fmt: skip
+        if arm is not None and arguments.joints is None and live.dof != dof:
+            raise InputError(
+                f"{live.source} gives {live.dof or 'no'} joint angles, but {arguments.arm} has "
+                f"{dof} joints; name another source with --joints"
+            )
         names = None if arm is None else arm.names
-        if arguments.joints is None and opened.playback is not None:
-            names = opened.playback.joint_names
-        skin = opened.skin
+        if arguments.joints is None and live.playback is not None:
+            names = live.playback.joint_names
+        skin, page = live.skin, live.page
         meta = {
             "skin": skin.layout.to_dict(),
             "skin_name": skin.file.name,
-            "source": opened.source,
+            "source": live.source,
             "rate_hz": skin.file.reading.rate_hz,
             **({} if arm is None else {"arm": arm.to_dict()}),
         }
-        recorder = Recorder(arguments.out, labels, meta, names, lines, joints is not None)
+        recorder = Recorder(arguments.out, labels, meta, names, lines)
         tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead = round(arguments.lead / skin.period_s)
         trials = Trials(tracker, lead_frames=lead, length_s=arguments.length)
-        loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
-        LOG.info("waiting for a contact")
-        for frame in loop.frames():
-            lines.write(skin_events(skin, frame.t))
+        LOG.info("waiting for a contact" + (KEYS if by_key else ""))
+        for number, (task, label) in enumerate(arguments.label[:9] if by_key else (), 1):
+            LOG.info(f"  {number}  {task}={label}")
+        for frame, faults in live.frames():
+            lines.write(faults)
             frames = trials.push(frame)
             if page is not None:
                 recorder.labels = page.labels
                 frames = frames if page.recording else None
-                page.push(frame, (), loop.schedule)
+            for key in typed() if by_key else "":
+                recorder.press(key, arguments.label)
+            live.show(frame, faults)
             saved = recorder.save(frames, complete=True)
             if page is not None and saved is not None:
                 page.saved(*saved)
-            if recorder.saved == wanted:
+            if recorder.saved == (arguments.trials if folder else 1):
                 break
         else:
             recorder.save(trials.rest(), complete=False)
@@ -253,12 +235,11 @@ class Recorder:
 
     Attributes:
         out: the folder, or the file for a single trial.
-        labels: {task: label} of every trial.
+        labels: {task: label} of the next trial.
         meta: further metadata of every trial.
         names: the joints' names, or None if they are unknown.
-        lines: where the `saved` events go.
-        posed: whether to warn about frames without joint angles.
-        saved: the number of trials saved so far.
+        lines: where the `saved` and `deleted` events go.
+        paths: the trials saved so far.
         any_joints: whether a saved frame had joint angles.
     """
 
@@ -267,9 +248,24 @@ class Recorder:
     meta: dict[str, Any]
     names: Sequence[str] | None
     lines: Lines
-    posed: bool
-    saved: int = 0
+    paths: list[Path] = field(default_factory=list)
     any_joints: bool = False
+
+    @property
+    def saved(self) -> int:
+        """Number of trials saved and not deleted."""
+        return len(self.paths)
+
+    def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
+        """Take a key: the number of a label holds it from now on, d deletes the last trial."""
+        if key in DIGITS[: len(choices)]:
+            task, label = choices[DIGITS.index(key)]
+            self.labels = {**self.labels, task: label}
+            LOG.info("next: " + ", ".join(f"{task}={label}" for task, label in self.labels.items()))
+        elif key in ("d", "D") and self.paths:
+            path = self.paths.pop()
+            path.unlink(missing_ok=True)
+            self.lines.write([{"event": "deleted", "file": str(path)}])
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> tuple[Path, Recording] | None:
         """Save the frames of a trial, if there is one; returns its file and what it holds."""
@@ -288,10 +284,8 @@ class Recorder:
                 break
             except NameTaken:  # another recorder in this folder was faster
                 continue
-        self.saved += 1
+        self.paths.append(path)
         self.any_joints |= trial.joints is not None
-        if without and self.posed:
-            LOG.warning(f"{path}: {without} of {len(frames)} frames have no joint angles")
         event = {
             "event": "saved",
             "file": str(path),
@@ -299,10 +293,13 @@ class Recorder:
             "frames": len(frames),
             "seconds": round(frames[-1].t - frames[0].t, 3),
             "joints": trial.joints is not None,
-            **({"frames_without_joints": without} if 0 < without < len(frames) else {}),
             "missing_taxels": trial.valid is not None,
             "complete": complete,
-            **({} if complete else {"reason": "reading stopped before the contact's end"}),
         }
+        if trial.joints is not None and without:
+            LOG.warning(f"{path}: {without} of {len(frames)} frames have no joint angles")
+            event["frames_without_joints"] = without
+        if not complete:
+            event["reason"] = "reading stopped before the contact's end"
         self.lines.write([event])
         return path, trial

@@ -1,4 +1,4 @@
-"""Opens the skin and the source of joint angles that a command's options name."""
+"""Opens the skin that a command's options name, and reads it with all that they put beside it."""
 
 from __future__ import annotations
 
@@ -6,21 +6,25 @@ import argparse
 import logging
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from edge.commands.output import Output, event_text
 from edge.errors import InputError
+from edge.events import Event
 from edge.fake.clock import PacedClock, VirtualClock
 from edge.fake.player import Playback, play, skin_file
 from edge.model.model import Model, require_joints
 from edge.recording import load
-from edge.runtime import joint_stream
+from edge.runtime.event_writer import Lines, LineWriter
+from edge.runtime.joint_stream import Datagrams, Joints, Source, from_file
 from edge.skin import file as skinfile
-from edge.skin.loop import JointSource
+from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
 from edge.touch.arm import Chain
+from edge.touch.frame import Frame
 from edge.touch.layout import for_device
 
 if TYPE_CHECKING:
@@ -48,38 +52,9 @@ def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
     return {**event, "error": status.error} if status.error else event
 
 
-def skin_events(skin: Skin, t: float) -> list[dict[str, Any]]:
-    """The events of buses that were lost or have come back, and of taxels that give no value."""
-    events: list[dict[str, Any]] = [
-        {"event": "bus", "t": t, "bus": name, "state": "lost" if lost else "back"}
-        for name, lost in skin.bus_changes()
-    ]
-    silent = skin.silent_changes()
-    if silent is not None:
-        events.append({"event": "taxels", "t": t, "invalid": silent, "frames": SILENT_FRAMES})
-    return events
-
-
-@contextmanager
-def open_page(arguments: argparse.Namespace, opened: Opened, **more: Any) -> Iterator[Page | None]:
-    """The live page that `--web` asks for, or None; see `edge.runtime.page.Page`.
-
-    Raises:
-        InputError: the address cannot be used.
-    """
-    if arguments.web is None:
-        yield None
-        return
-    from edge.runtime.page import Page  # a skin without a page needs no web server
-
-    with Page(arguments.web, opened.skin.layout, title=opened.source, **more) as page:
-        LOG.info(f"open {page.server.link} in a browser")
-        yield page
-
-
 @dataclass(frozen=True)
 class Opened:
-    """A skin that is being read.
+    """A skin that has been opened.
 
     Attributes:
         skin: set up and ready to be read.
@@ -93,13 +68,17 @@ class Opened:
     playback: Playback | None
     source: str
 
+    @property
+    def dof(self) -> int | None:
+        """Number of joint angles in the recording that is played; None without any."""
+        return None if self.playback is None else self.playback.dof
+
 
 @contextmanager
 def open_skin(
     arguments: argparse.Namespace,
     *,
     calibrated: bool = True,
-    paced: bool = False,
     model: Model | None = None,
     arm: Chain | None = None,
 ) -> Iterator[Opened]:
@@ -108,7 +87,6 @@ def open_skin(
     Args:
         arguments: with the options of `options.add_skin`.
         calibrated: refuse a real skin that has no calibration.
-        paced: play a recording at its original speed, whatever the options say.
         model: its contact threshold is used if it is lower than the skin's.
         arm: whose joint angles a recording must have; they are put into the arm's order.
 
@@ -134,7 +112,7 @@ def open_skin(
     if recording is None:
         skin = Skin.open(file, calibrated=calibrated, touch_counts=touch)
     else:
-        clock = PacedClock() if paced or arguments.real_time else VirtualClock()
+        clock = PacedClock() if arguments.real_time else VirtualClock()
         skin, playback = play(file, recording, loop=arguments.loop, clock=clock, touch_counts=touch)
         lasts_s, source = min(playback.ends, lasts_s), f"fake {arguments.fake}"
     with skin:
@@ -150,10 +128,7 @@ def open_skin(
 
 @contextmanager
 def open_joints(
-    arguments: argparse.Namespace,
-    opened: Opened,
-    arm: Chain | None,
-    dof: int | None = None,
+    arguments: argparse.Namespace, opened: Opened, arm: Chain | None, dof: int | None
 ) -> Iterator[JointSource | None]:
     """The source of joint angles that the options name, or else the recording being played.
 
@@ -161,54 +136,137 @@ def open_joints(
         arguments: with the options of `options.add_joints`.
         opened: the skin that is being read.
         arm: whose joint angles are wanted, or None if it is unknown.
-        dof: how many angles a line must then have.
+        dof: how many angles a line must have; None if none are wanted.
 
     Raises:
         InputError: the options contradict each other.
     """
     if arguments.joints is None:
-        yield opened.playback if opened.playback is not None and opened.playback.dof else None
+        yield opened.playback if opened.dof else None
         return
-    dof = dof if arm is None else arm.dof
     if dof is None:
         raise InputError("the model uses no joint angles; leave --joints out")
     kind, _, address = arguments.joints.partition(":")
-    source: Any
-    listener: Any = None
-    if kind == "stdin" and not address:
-        source = joint_stream.from_file(sys.stdin.fileno())
-    elif kind == "udp":
-        source, listener = joint_stream.from_udp(address)
-    else:
+    if kind not in ("stdin", "udp") or (kind == "stdin" and address):
         raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {arguments.joints!r}")
     clock = opened.skin.clock
-    stream = joint_stream.Joints(
-        source,
-        dof=dof,
-        names=None if arm is None else arm.names,
-        now=clock.real if isinstance(clock, PacedClock) else clock.now,
-        oldest_s=arguments.joints_oldest,
-        shared_clock=arguments.joints_shared_clock,
-    )
-    try:
+    with ExitStack() as stack:
+        source: Source
+        if kind == "udp":
+            source = stack.enter_context(closing(Datagrams(address)))
+        else:
+            source = from_file(sys.stdin.fileno())
+        stream = Joints(
+            source,
+            dof=dof,
+            names=None if arm is None else arm.names,
+            now=clock.real if isinstance(clock, PacedClock) else clock.now,
+            oldest_s=arguments.joints_oldest,
+            shared_clock=arguments.joints_shared_clock,
+        )
         yield stream
-    finally:
-        if listener is not None:
-            listener.close()
-            for name, count in source.others.items():
-                LOG.warning(f"--joints: ignored {count} datagrams from a second sender, {name}")
         if stream.malformed:
             LOG.warning(
                 f"--joints: unusable lines: {stream.malformed}; the last one: {stream.problem}"
             )
 
 
-def check_joints(model: Model, arguments: argparse.Namespace, opened: Opened) -> None:
-    """Refuse a source of frames without the joint angles that the model needs.
+@dataclass(frozen=True)
+class Reading(Opened):
+    """A skin that is being read, and what the options put beside it.
+
+    Attributes:
+        loop: gives the frames with their joint angles.
+        stop: ends the loop.
+        page: the live page, or None.
+        output: text or JSON.
+    """
+
+    loop: Loop
+    stop: Stop
+    page: Page | None
+    output: Output
+
+    def frames(self) -> Iterator[tuple[Frame, list[dict[str, Any]]]]:
+        """Each frame, with the events of buses, taxels and chips that fail or recover."""
+        skin = self.skin
+        for frame in self.loop.frames():
+            events: list[dict[str, Any]] = [
+                {"event": "bus", "t": frame.t, "bus": name, "state": "lost" if lost else "back"}
+                for name, lost in skin.bus_changes()
+            ]
+            silent = skin.silent_changes()
+            if silent is not None:
+                taxels = {"event": "taxels", "t": frame.t, "invalid": silent}
+                events.append({**taxels, "frames": SILENT_FRAMES})
+            events += [chip_event(status, t=frame.t) for status in skin.changes()]
+            yield frame, events
+
+    def show(
+        self, frame: Frame, faults: Sequence[dict[str, Any]], events: Sequence[Event] = ()
+    ) -> None:
+        """Show a frame on the page, if there is one."""
+        if self.page is not None:
+            for fault in faults:
+                self.page.notice(event_text(fault).strip())
+            self.page.push(frame, events, self.loop.schedule)
+
+    def lines(self, udp: str | None = None, more: Sequence[LineWriter] = ()) -> Lines:
+        """The events' way out; in virtual time it waits for a slow reader of stdout."""
+        virtual = self.playback is not None and not isinstance(self.skin.clock, PacedClock)
+        return Lines(
+            udp=udp,
+            form=self.output.line,
+            patient=lambda: virtual and not self.stop.asked,
+            more=more,
+        )
+
+
+@contextmanager
+def reading(
+    arguments: argparse.Namespace,
+    *,
+    model: Model | None = None,
+    arm: Chain | None = None,
+    dof: int | None = None,
+    needs_joints: bool = True,
+    real_time: bool = False,
+    **page: Any,
+) -> Iterator[Reading]:
+    """Read the skin that the options name, until a signal comes.
+
+    Args:
+        arguments: with the options of `options.add_skin`, `add_joints` and `add_web`.
+        model: decides on the contacts; its arm and its angles are wanted.
+        arm: whose angles are wanted, without a model.
+        dof: how many angles are wanted, without a model.
+        needs_joints: refuse a source without the angles that the model needs.
+        real_time: play a recording at its original speed, whatever the options say, as a page
+            always does.
+        page: further arguments of `edge.runtime.page.Page`.
 
     Raises:
-        InputError: it has none, or a different number of them.
+        InputError: the options cannot be used.
+        EdgeError: the skin cannot be read.
     """
-    if arguments.joints is None:
-        dof = None if opened.playback is None else opened.playback.dof
-        require_joints(model, dof, opened.source)
+    if model is not None:
+        arm, dof = model.info.chain, model.info.dof
+    if arguments.fake is not None and (real_time or arguments.web is not None):
+        arguments.real_time = True
+    played = arm if arguments.joints is None else None
+    with ExitStack() as stack:
+        opened = stack.enter_context(open_skin(arguments, model=model, arm=played))
+        # Before this point a signal ends the program at once, as nothing can be lost.
+        stop = stack.enter_context(stop_on(*ending_signals()))
+        if model is not None and needs_joints and arguments.joints is None:
+            require_joints(model, opened.dof, opened.source)
+        joints = stack.enter_context(open_joints(arguments, opened, arm, dof))
+        loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
+        live = None
+        if arguments.web is not None:
+            from edge.runtime.page import Page  # a skin without a page needs no web server
+
+            live = Page(arguments.web, opened.skin.layout, title=opened.source, **page)
+            stack.enter_context(live.server)
+            LOG.info(f"open {live.server.link} in a browser")
+        yield Reading(**vars(opened), loop=loop, stop=stop, page=live, output=Output.of(arguments))

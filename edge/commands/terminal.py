@@ -1,15 +1,20 @@
-"""Drawing the skin in a terminal with ANSI half-blocks, two rows of taxels in each line."""
+"""A terminal: keys, and the skin in ANSI half-blocks, two rows of taxels in each line."""
 
 from __future__ import annotations
 
 import math
+import os
 import re
+import select
+import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.skin.loop import Stop
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import Region
@@ -94,3 +99,48 @@ def legend(columns: int) -> list[str]:
 def screen(lines: Sequence[str]) -> str:
     """Lines from the upper left corner on, each clearing what it does not overwrite."""
     return HOME + "".join(f"{line}\x1b[K\n" for line in "\n".join(lines).split("\n"))
+
+
+@contextmanager
+def drawing(wanted: bool) -> Iterator[None]:
+    """Within the block, clear the terminal for pictures and hide its cursor, if `wanted`."""
+    if wanted:
+        print(HIDE + CLEAR, end="")
+    try:
+        yield
+    finally:
+        if wanted:
+            print(PLAIN + SHOW, end="", flush=True)
+
+
+def is_interactive() -> bool:
+    """Whether a person at a terminal reads stdout and can press keys."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+@contextmanager
+def keys(stop: Stop) -> Iterator[Callable[[], str]]:
+    """A function that gives the keys pressed since its last call; q asks to stop."""
+    if not is_interactive():
+        yield lambda: ""
+        return
+    import termios
+    import tty
+
+    fd = sys.stdin.fileno()
+    former = termios.tcgetattr(fd)
+
+    def typed() -> str:
+        pressed = ""
+        while select.select([fd], [], [], 0.0)[0] and not stop.asked:
+            key = os.read(fd, 1).decode(errors="replace")
+            stop.asked = key in ("q", "Q", "")
+            pressed += key
+        return pressed
+
+    try:
+        tty.setcbreak(fd)
+        yield typed
+    finally:
+        with suppress(termios.error):  # the terminal has gone
+            termios.tcsetattr(fd, termios.TCSANOW, former)

@@ -9,23 +9,17 @@ same, with the features of each contact over time.
 from __future__ import annotations
 
 import argparse
-import os
-import select
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
 
 from edge.classifier import Classifier
 from edge.commands import terminal
-from edge.commands.options import add_joints, add_skin, add_web, within
-from edge.commands.source import check_joints, ending_signals, open_joints, open_page, open_skin
+from edge.commands.options import add_reading, within
+from edge.commands.source import reading
 from edge.errors import printable
 from edge.events import Decided, Onset
 from edge.model.model import Model
-from edge.skin.loop import Loop, Stop, stop_on
-from edge.skin.skin import Skin
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import find_regions
@@ -45,9 +39,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=RATE_HZ,
         help="pictures per second (default: %(default)s)",
     )
-    add_web(parser, " (in place of the terminal)")
-    add_skin(parser)
-    add_joints(parser)
+    add_reading(parser, " (in place of the terminal)")
 
 
 def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[str]:
@@ -68,30 +60,6 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[st
     ]
 
 
-@contextmanager
-def quit_on_q(stop: Stop) -> Iterator[Callable[[], None]]:
-    """A function that sets `stop` if q has been typed at the terminal."""
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        yield lambda: None
-        return
-    import termios
-    import tty
-
-    fd = sys.stdin.fileno()
-    former = termios.tcgetattr(fd)
-
-    def look() -> None:
-        while select.select([fd], [], [], 0.0)[0] and not stop.asked:
-            stop.asked = os.read(fd, 1) in (b"q", b"Q", b"")
-
-    try:
-        tty.setcbreak(fd)
-        yield look
-    finally:
-        with suppress(termios.error):  # the terminal has gone
-            termios.tcsetattr(fd, termios.TCSANOW, former)
-
-
 def decision_text(event: Decided) -> str:
     """A decision as text."""
     text = f"{printable(str(event.label))} ({event.confidence:.0%})"
@@ -101,53 +69,32 @@ def decision_text(event: Decided) -> str:
 def run(arguments: argparse.Namespace) -> int:
     """Read at the skin's rate, and draw at the rate that the options ask for."""
     model = None if arguments.model is None else Model(arguments.model)
-    chain = None if model is None else model.info.chain
-    dof = None if model is None else model.info.dof
-    with (
-        open_skin(
-            arguments, paced=sys.stdout.isatty() or arguments.web is not None, arm=chain
-        ) as opened,
-        stop_on(*ending_signals()) as stop,
-    ):
-        if model is not None:
-            check_joints(model, arguments, opened)
-        with open_joints(arguments, opened, chain, dof) as joints, quit_on_q(stop) as look:
-            poses = None if dof is None else joints
-            loop = Loop(opened.skin, joints=poses, lasts_s=opened.lasts_s, stop=stop)
-            with open_page(arguments, opened, decides=model is not None) as page:
-                if page is None:
-                    _show(opened.skin, model, loop, 1.0 / arguments.rate, look)
-                    return 0
-                classifier = None if model is None else Classifier(model, opened.skin.layout)
-                for frame in loop.frames():
-                    events = () if classifier is None else classifier.push(frame)
-                    page.push(frame, events, loop.schedule)
-    return 0
-
-
-def _show(
-    skin: Skin, model: Model | None, loop: Loop, interval_s: float, look: Callable[[], None]
-) -> None:
-    classifier = None if model is None else Classifier(model, skin.layout)
-    layout = skin.layout if classifier is None else classifier.layout
     tasks = () if model is None else tuple(model.info.tasks)
     decisions = dict.fromkeys(tasks, "no contact yet")
     due, shown = -float("inf"), ""
-    print(terminal.HIDE + terminal.CLEAR, end="")
-    try:
-        for frame in loop.frames():
-            look()
-            for event in classifier.push(frame) if classifier is not None else ():
+    with (
+        reading(
+            arguments, model=model, real_time=sys.stdout.isatty(), decides=model is not None
+        ) as live,
+        terminal.keys(live.stop) as typed,
+        terminal.drawing(live.page is None),
+    ):
+        classifier = None if model is None else Classifier(model, live.skin.layout)
+        layout = live.skin.layout if classifier is None else classifier.layout
+        interval_s = 1.0 / arguments.rate - 0.5 * live.skin.period_s
+        for frame, faults in live.frames():
+            typed()
+            events = [] if classifier is None else classifier.push(frame)
+            live.show(frame, faults, events)
+            for event in events:
                 if isinstance(event, Onset):
                     decisions = dict.fromkeys(tasks, "in contact")
                 elif isinstance(event, Decided):
                     decisions[event.task] = decision_text(event)
-            if frame.t < due:
-                continue
-            due = frame.t + interval_s - 0.5 * skin.period_s
-            text = terminal.screen(draw(frame, layout, decisions))
-            if text != shown:
-                print(text, end="", flush=True)
-                shown = text
-    finally:
-        print(terminal.PLAIN + terminal.SHOW, end="", flush=True)
+            if live.page is None and frame.t >= due:
+                due = frame.t + interval_s
+                text = terminal.screen(draw(frame, layout, decisions))
+                if text != shown:
+                    print(text, end="", flush=True)
+                    shown = text
+    return 0

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import errno
 import os
-import queue
 import socket
 import sys
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from typing import Any, TextIO
 
 from edge.errors import InputError
 from edge.events import json_line
+from edge.files import refusing
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
@@ -26,6 +26,7 @@ CLOSE_S = 1.0
 PATIENCE_S = 0.05
 """A patient writer asks this often whether to go on waiting."""
 UNREAD = "nobody reads them"
+Event = Mapping[str, Any]
 Patience = Callable[[], bool]
 """Says whether to wait for a slow reader."""
 
@@ -35,8 +36,23 @@ def impatient() -> bool:
     return False
 
 
+def parse_address(
+    option: str, text: str, example: str, host: str = "", ports: range = range(65536)
+) -> tuple[str, int]:
+    """Host and port of `HOST:PORT`, or of `PORT` alone where there is a default host.
+
+    Raises:
+        InputError: the text is not of that form; the message names the option and an example.
+    """
+    given, _, port = text.rpartition(":")
+    host = given.strip("[]") or host
+    if not (host and port.isascii() and port.isdecimal() and int(port[:6]) in ports):
+        raise InputError(f"{option}{text}: give HOST:PORT, for example {example}")
+    return host, int(port)
+
+
 class LineWriter:
-    """A bounded queue of lines, and a thread that writes them.
+    """A bounded queue of events, and a thread that writes each as a line.
 
     Attributes:
         name: of the destination, for messages.
@@ -45,66 +61,80 @@ class LineWriter:
         gone: the reader has gone, as `head` does once it has enough; all further lines are lost.
     """
 
-    def __init__(self, name: str, write: Callable[[bytes], object]) -> None:
+    def __init__(
+        self,
+        name: str,
+        write: Callable[[bytes], object],
+        form: Callable[[Event], str | None] = json_line,
+        patient: Patience = impatient,
+    ) -> None:
         """Start the thread.
 
         Args:
             name: of the destination.
             write: writes a line, and may wait; an OSError loses the line.
+            form: makes the line of an event, or None to leave the event out.
+            patient: says whether a full queue waits for a slow reader rather than lose lines.
         """
         self.name = name
         self.lost, self.problem, self.gone = 0, "", False
-        self._write = write
-        self._queue: queue.Queue[bytes | None] = queue.Queue(MOST_LINES)
+        self._write, self._form, self._patient = write, form, patient
+        self._lines: deque[bytes] = deque()
+        """Lines that wait; the first stays here while it is written."""
+        self._changed = threading.Condition()
         self._closed = False
         self._thread = threading.Thread(target=self._work, name=f"lines to {name}", daemon=True)
         self._thread.start()
 
-    def put(self, line: str, patient: Patience = impatient) -> None:
-        """Queue a line; if the queue is full, the line is lost once `patient` says no."""
-        data = line.encode(errors="backslashreplace") + b"\n"
-        while not (self.gone or self._closed):
-            wait = patient()
-            try:
-                self._queue.put(data, wait, PATIENCE_S)
-                return
-            except queue.Full:
-                if not wait:
-                    self.problem = self.problem or UNREAD
-                    break
-        self.lost += 1
+    def put(self, event: Event) -> None:
+        """Queue an event's line; if the queue is full, it is lost once patience has an end."""
+        text = self._form(event)
+        if text is None:
+            return
+        with self._changed:
+            while len(self._lines) >= MOST_LINES and not self.gone and self._patient():
+                self._changed.wait(PATIENCE_S)
+            if self.gone or self._closed or len(self._lines) >= MOST_LINES:
+                self._lose(1, UNREAD)
+            else:
+                self._lines.append(text.encode(errors="backslashreplace") + b"\n")
+                self._changed.notify_all()
+
+    def _lose(self, lines: int, problem: str) -> None:
+        self.lost += lines
+        self.problem = self.problem or problem
 
     def _work(self) -> None:
-        while (line := self._queue.get()) is not None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._lines or self._closed)
+                if not self._lines or self.gone:
+                    return
             try:
-                if not self.gone:
-                    self._write(line)
-                else:
-                    self.lost += 1
+                self._write(self._lines[0])
             except (OSError, ValueError) as error:  # ValueError: the file is closed
-                self.lost += 1
+                self._lose(1, getattr(error, "strerror", "") or str(error))
                 self.gone |= isinstance(error, BrokenPipeError | ValueError)
-                self.problem = self.problem or getattr(error, "strerror", "") or str(error)
-            self._queue.task_done()
+            with self._changed:
+                self._lines.popleft()
+                if self.gone:
+                    self.lost += len(self._lines)
+                    self._lines.clear()
+                self._changed.notify_all()
 
-    def close(self, patient: Patience = impatient) -> None:
-        """Give the waiting lines a second to leave, or as long as `patient`; twice is fine."""
+    def close(self) -> None:
+        """Give the waiting lines a second to leave, or as long as patience lasts; twice is fine."""
         if self._closed:
             return
-        self._closed = True
-        ended = False
-        while self._thread.is_alive():
-            if not ended:
-                with suppress(queue.Full):
-                    self._queue.put_nowait(None)
-                    ended = True
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        self._thread.join(CLOSE_S)
+        while self._thread.is_alive() and self._patient():
             self._thread.join(CLOSE_S)
-            if not patient():
-                break
         if self._thread.is_alive():
             self.gone = True
-            self.lost += self._queue.unfinished_tasks - ended
-            self.problem = self.problem or UNREAD
+            self._lose(len(self._lines), UNREAD)
 
 
 class Lines:
@@ -123,8 +153,9 @@ class Lines:
         out: TextIO | None = None,
         udp: str | None = None,
         *,
-        form: Callable[[Mapping[str, Any]], str] = json_line,
+        form: Callable[[Event], str] = json_line,
         patient: Patience = impatient,
+        more: Iterable[LineWriter] = (),
     ) -> None:
         """Open the destinations.
 
@@ -134,22 +165,17 @@ class Lines:
             form: makes the file's line of an event; UDP always carries JSON.
             patient: says whether to wait for a slow reader of the file rather than lose lines,
                 as where time is virtual.
+            more: further writers, which get each event and are closed with the others.
 
         Raises:
             InputError: the address is not of that form, or its host is unknown.
         """
         self._socket = None if udp is None else _connected(udp)
-        self._patient, self._form = patient, form
-        self._out = LineWriter("stdout", _line_by_line(sys.stdout if out is None else out))
-        self._udp = None
-        self._writers = [self._out]
+        write = _line_by_line(sys.stdout if out is None else out)
+        self._out = LineWriter("stdout", write, form, patient)
+        self._writers = [self._out, *more]
         if udp is not None and self._socket is not None:
-            self._udp = LineWriter(udp, self._socket.send)
-            self.add(self._udp)
-
-    def add(self, writer: LineWriter) -> None:
-        """Count the lines that another writer loses, and close it with the others."""
-        self._writers.append(writer)
+            self._writers.append(LineWriter(udp, self._socket.send, patient=patient))
 
     @property
     def unheard(self) -> bool:
@@ -159,29 +185,26 @@ class Lines:
     @property
     def lost(self) -> dict[str, int]:
         """{destination: number of lost lines}, without destinations that lost none."""
-        counts = {writer.name: writer.lost for writer in self._writers}
-        return {name: count for name, count in counts.items() if count}
+        return {writer.name: writer.lost for writer in self._writers if writer.lost}
 
-    def write(self, events: Iterable[Mapping[str, Any]]) -> None:
+    def write(self, events: Iterable[Event]) -> None:
         """Write events in their order."""
         for event in events:
-            self._out.put(self._form(event), self._patient)
-            if self._udp is not None:
-                self._udp.put(json_line(event), self._patient)
+            for writer in self._writers:
+                writer.put(event)
 
     def close(self) -> None:
         """Close all destinations, and report lost lines on stderr."""
         for writer in self._writers:
-            writer.close(self._patient)
+            writer.close()
         if self._socket is not None:
             self._socket.close()
-        problems = {writer.name: writer.problem for writer in self._writers}
-        for name, count in self.lost.items():
-            if name == self._out.name and problems[name] == os.strerror(errno.EPIPE):
+        for writer in self._writers:
+            if writer is self._out and writer.problem == os.strerror(errno.EPIPE):
                 continue  # the reader had enough
-            reason = f": {problems[name]}" if problems.get(name) else ""
-            print(f"edge-classify: {count} lines could not be sent to {name}{reason}",
-                  file=sys.stderr)  # fmt: skip
+            if writer.lost:
+                lost = f"{writer.lost} lines could not be sent to {writer.name}: {writer.problem}"
+                print(f"edge-classify: {lost}", file=sys.stderr)
 
     def __enter__(self) -> Lines:
         return self
@@ -213,19 +236,10 @@ def _line_by_line(out: TextIO) -> Callable[[bytes], None]:
 
 
 def _connected(address: str) -> socket.socket:
-    host, _, port = address.rpartition(":")
-    host = host.strip("[]")
-    digits = port.isascii() and port.isdecimal() and len(port) <= 5
-    if not host or not digits or not 1 <= int(port) <= 65535:
-        raise InputError(f"--udp {address}: give HOST:PORT, for example 127.0.0.1:47400")
-    try:
-        family, kind, protocol, _, where = socket.getaddrinfo(
-            host, int(port), type=socket.SOCK_DGRAM
-        )[0]
+    host, port = parse_address("--udp ", address, "127.0.0.1:47400", ports=range(1, 65536))
+    with refusing(f"--udp {address}: cannot be reached"):
+        family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         sender = socket.socket(family, kind, protocol)
         sender.setblocking(False)
         sender.connect(where)
-    except (OSError, ValueError) as error:  # ValueError: a name that IDNA does not allow
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"--udp {address}: cannot be reached: {reason}") from None
     return sender

@@ -9,6 +9,7 @@ longer is older by the difference.
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import select
@@ -22,7 +23,11 @@ from numpy.typing import NDArray
 
 from edge.config import parse_json
 from edge.errors import InputError
+from edge.files import refusing
+from edge.runtime.event_writer import parse_address
 from edge.touch.arm import joint_columns
+
+LOG = logging.getLogger(__name__)
 
 OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
@@ -119,19 +124,19 @@ class Joints:
 
     def _take(self) -> None:
         """Parse the lines that have come."""
-        arrived, taken = self._now(), 0
-        lines: list[bytes] = []
+        arrived, data = self._now(), b""
         for _ in range(MOST_READS):
-            data = None if self._ended or taken >= MOST_BYTES else self._source()
-            if not data:
-                self._ended = self._ended or (data is None and taken < MOST_BYTES)
+            if self._ended or len(data) >= MOST_BYTES:
                 break
-            taken += len(data)
-            *more, self._rest = (self._rest + data).split(b"\n")
-            lines += more
-            if len(self._rest) > LONGEST_LINE:
-                self._rest = b""
-                self._bad(f"a line is longer than {LONGEST_LINE} bytes")
+            piece = self._source()
+            self._ended = piece is None
+            if not piece:
+                break
+            data += piece
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if len(self._rest) > LONGEST_LINE:
+            self._rest = b""
+            self._bad(f"a line is longer than {LONGEST_LINE} bytes")
         if len(lines) > MOST_LINES:
             self._bad(f"more than {MOST_LINES} lines came in one frame", len(lines) - MOST_LINES)
         for line in lines[-MOST_LINES:]:
@@ -201,47 +206,42 @@ class Datagrams:
     The clocks of two senders differ, so that their lines must not be mixed.
 
     Attributes:
-        others: {other sender: number of its datagrams, which are ignored}.
+        listener: the socket that receives them.
+        ignored: number of datagrams from other senders.
     """
 
-    def __init__(self, listener: socket.socket) -> None:
-        self._listener, self._now = listener, time.monotonic
+    def __init__(self, address: str, now: Callable[[], float] = time.monotonic) -> None:
+        """Listen on `PORT` of the loopback interface, or on `HOST:PORT`.
+
+        Raises:
+            InputError: the address is not of that form or cannot be bound.
+        """
+        host, port = parse_address("--joints udp:", address, "udp:127.0.0.1:47401", "127.0.0.1")
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self.listener = socket.socket(family, socket.SOCK_DGRAM)
+        self.listener.setblocking(False)
+        with refusing(f"--joints udp:{address}: cannot be bound"):
+            self.listener.bind((host, port))
+        self._now = now
         self._sender: object = None
         self._heard = -math.inf
-        self.others: dict[str, int] = {}
+        self.ignored = 0
 
     def __call__(self) -> bytes | None:
         """The next datagram as lines, or b"" for none."""
         try:
-            data, sender = self._listener.recvfrom(LONGEST_LINE)
+            data, sender = self.listener.recvfrom(LONGEST_LINE)
         except BlockingIOError:
             return b""
         now = self._now()
         if sender != self._sender and now - self._heard < SILENT_S:
-            name = f"{sender[0]}:{sender[1]}"
-            if name in self.others or len(self.others) < MOST_LINES:
-                self.others[name] = self.others.get(name, 0) + 1
+            self.ignored += 1
             return b"\n"
         self._sender, self._heard = sender, now
         return data + b"\n"
 
-
-def from_udp(address: str) -> tuple[Datagrams, socket.socket]:
-    """Datagrams of one or more lines, on `PORT` of the loopback interface or on `HOST:PORT`.
-
-    Raises:
-        InputError: the address is not of that form or cannot be bound.
-    """
-    host, _, port = address.rpartition(":")
-    if not (port.isascii() and port.isdecimal() and int(port[:6]) <= 65535):
-        raise InputError(f"joints udp:{address}: give udp:PORT or udp:HOST:PORT")
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_DGRAM)
-    try:
-        listener.bind((host.strip("[]") or "127.0.0.1", int(port)))
-    except (OSError, ValueError) as error:  # ValueError: a name that IDNA does not allow
-        listener.close()
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"joints udp:{address}: cannot be bound: {reason}") from None
-    listener.setblocking(False)
-    return Datagrams(listener), listener
+    def close(self) -> None:
+        """Stop listening, and report what other senders sent."""
+        self.listener.close()
+        if self.ignored:
+            LOG.warning(f"--joints: ignored datagrams from another sender: {self.ignored}")

@@ -58,26 +58,24 @@ class Page:
         Raises:
             InputError: the address cannot be used, or a trial in the folder cannot be read.
         """
-        self._layout, self._folder = layout, folder
+        self._folder = folder
         self.labels = dict(labels or {})
         self.recording = bool(self.labels)
         self._trials: dict[str, dict[str, Any]] = {}
-        for path in sorted(folder.glob("*.npz"))[-LAST_TRIALS:] if folder is not None else ():
-            self._trials[path.name] = _trial(load(path))
+        if folder is not None:
+            for path in sorted(folder.glob("*.npz"))[-LAST_TRIALS:]:
+                self.saved(path, load(path))
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
         self._decisions: dict[str, dict[str, Any]] = {}
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._due = -float("inf")
-        scale = layout.counts_per_newton or 1.0
+        self._scale = layout.counts_per_newton or 1.0
         self._fixed = {
             "title": title,
-            "rows": layout.rows,
-            "cols": layout.cols,
-            "wraps": layout.wraps,
-            "dead": list(layout.dead),
+            **{key: getattr(layout, key) for key in ("rows", "cols", "wraps", "dead")},
             "threshold": layout.threshold_counts,
-            "scale": scale,
+            "scale": self._scale,
             "units": {"force": layout.force_unit, "motion": layout.length_unit},
             "folder": None if folder is None else str(folder),
             "decides": decides,
@@ -122,19 +120,8 @@ class Page:
 
     def saved(self, path: Path, trial: Recording) -> None:
         """Add a trial that has been recorded."""
-        self._trials[path.name] = _trial(trial)
-
-    def close(self) -> None:
-        """Stop serving."""
-        self.server.close()
-
-    def __enter__(self) -> Page:
-        """The page itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop serving."""
-        self.close()
+        seconds = round(float(trial.t[-1] - trial.t[0]), 2)
+        self._trials[path.name] = {"labels": trial.labels, "seconds": seconds}
 
     def _curves(self) -> dict[str, Any] | None:
         """The last contact: its taxels, and its features since onset."""
@@ -147,7 +134,7 @@ class Page:
             "ended": contact.ended,
             "taxels": [] if region is None else region.mask.ravel().nonzero()[0].tolist(),
             "t": series.t.round(4).tolist(),
-            "force": (series.peak / (self._layout.counts_per_newton or 1.0)).round(4).tolist(),
+            "force": (series.peak / self._scale).round(4).tolist(),
             "area": series.area.tolist(),
             "motion": [None if value != value else round(value, 5) for value in series.motion],
         }
@@ -167,42 +154,28 @@ class Page:
             if action.get("on") and not self.labels:
                 raise InputError("give a label first; a trial without one teaches nothing")
             self.recording = bool(action.get("on"))
-        elif kind in ("relabel", "delete"):
-            name = action.get("file")
-            if not isinstance(name, str) or name not in self._trials:
-                raise InputError(f"{name!r} is none of the trials that this page shows")
-            path = self._folder / name
-            if kind == "delete":
-                path.unlink(missing_ok=True)
-                del self._trials[name]
-                return
-            labels = _labels(action)
-            trial = load(path)
-            save(path, replace(trial, meta={**trial.meta, "labels": labels}))
-            self._trials[name] = {**self._trials[name], "labels": labels}
-        else:
+        elif kind not in ("relabel", "delete"):
             raise InputError(f"{kind!r} is no action")
-
-
-def _trial(trial: Recording) -> dict[str, Any]:
-    """A trial's row in the table of the page."""
-    return {"labels": dict(trial.labels), "seconds": round(float(trial.t[-1] - trial.t[0]), 2)}
+        elif (name := action.get("file")) not in list(self._trials):
+            raise InputError(f"{name!r} is none of the trials that this page shows")
+        elif kind == "delete":
+            (self._folder / name).unlink(missing_ok=True)
+            del self._trials[name]
+        else:
+            trial = load(self._folder / name)
+            trial = replace(trial, meta={**trial.meta, "labels": _labels(action)})
+            save(self._folder / name, trial)
+            self.saved(self._folder / name, trial)
 
 
 def _decision(event: Decided) -> dict[str, Any]:
     """A decision for the page, with the nearest training trials."""
     line = event.to_dict()
-    nearest = event.decision
+    decision = event.decision
+    nearest = () if decision is None else zip(decision.neighbours, decision.distances, strict=True)
     return {
         **{key: line[key] for key in ("task", "label", "confidence", "flags", "window_s")},
-        "neighbours": []
-        if nearest is None
-        else [
-            {"row": row, "distance": round(distance, 3)}
-            for row, distance in zip(
-                nearest.neighbours.tolist(), nearest.distances.tolist(), strict=True
-            )
-        ],
+        "neighbours": [{"row": int(row), "distance": round(float(d), 3)} for row, d in nearest],
     }
 
 
@@ -215,15 +188,9 @@ def _labels(action: dict[str, Any]) -> dict[str, str]:
     labels = action.get("labels")
     if not isinstance(labels, dict) or not 1 <= len(labels) <= MOST_LABELS:
         raise InputError(f"give 1 to {MOST_LABELS} labels, each as TASK=LABEL")
-    out = {}
-    for task, label in labels.items():
-        if not isinstance(label, str):
-            raise InputError(f"the label of {task} must be text")
-        task, label = task.strip(), label.strip()
-        for text in (task, label):
-            if not (0 < len(text) <= LONGEST_LABEL and text.isprintable()):
-                raise InputError(
-                    f"a task and a label must be 1 to {LONGEST_LABEL} printable characters"
-                )
-        out[task] = label
-    return out
+    for text in (*labels, *labels.values()):
+        if not (isinstance(text, str) and text.strip().isprintable()):
+            raise InputError(f"{text!r} is no label; give printable text")
+        if not 0 < len(text.strip()) <= LONGEST_LABEL:
+            raise InputError(f"a task and a label have 1 to {LONGEST_LABEL} characters each")
+    return {task.strip(): label.strip() for task, label in labels.items()}

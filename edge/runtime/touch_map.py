@@ -11,23 +11,21 @@ from __future__ import annotations
 import errno
 import math
 import os
-import stat
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.events import json_line
-from edge.files import open_regular
+from edge.files import open_regular, refusing
 from edge.model.info import ModelInfo
-from edge.runtime.event_writer import LineWriter
+from edge.runtime.event_writer import LineWriter, Patience, impatient
 
 LARGEST_BYTES = 1 << 32
 LONGEST_LINE = 1 << 16
 """Bytes; a decision takes about 300."""
-MOST_OPEN = 1000
-"""Contacts with some tasks still to be read; beyond that the oldest is dropped."""
 NOT_A_MAP = "not a map; give a file that `run --map` wrote"
 
 
@@ -58,8 +56,10 @@ class Touch:
     flags: tuple[str, ...] = ()
 
 
-def map_writer(path: str | os.PathLike[str], info: ModelInfo) -> LineWriter:
-    """A writer that appends a run to a map.
+def map_writer(
+    path: str | os.PathLike[str], info: ModelInfo, patient: Patience = impatient
+) -> LineWriter:
+    """A writer that appends a run to a map: of the events it gets, the decisions with a place.
 
     Only the beginning of the file is read, however long it is.
 
@@ -68,28 +68,22 @@ def map_writer(path: str | os.PathLike[str], info: ModelInfo) -> LineWriter:
     """
     name = os.fspath(path)
     head = Head("skin" if info.chain is None else info.chain.base, info.layout.length_unit, ())
-    try:
-        flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK
-        file = os.open(name, flags, 0o666)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{name}: cannot be written: {reason}") from None
-    try:
-        status = os.fstat(file)
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{name}: cannot be written: it is not a regular file")
-        start = os.pread(file, LONGEST_LINE, 0)
-        for number, entry in _entries(start.split(b"\n"), name):
-            _check_frame(name, number, _head(name, number, entry), head)
-            break
-        else:
+    torn = False
+    if os.path.lexists(name):
+        with open_regular(name, LARGEST_BYTES) as former:
+            start = former.read(LONGEST_LINE)
             # A full disk may have cut the first line short.
-            if not b'{"event": "map"'.startswith(start[:15]):
+            short = b'{"event": "map"'.startswith(start[:15])
+            for number, entry in _entries(start.split(b"\n"), name):
+                _check_frame(name, number, _head(name, number, entry), head)
+                short = True
+                break
+            if not short:
                 raise InputError(f"{name}: {NOT_A_MAP}")
-        torn = status.st_size > 0 and os.pread(file, 1, status.st_size - 1) != b"\n"
-    except BaseException:
-        os.close(file)
-        raise
+            former.seek(-min(len(start), 1), os.SEEK_END)
+            torn = former.read() not in (b"", b"\n")
+    with refusing(f"{name}: cannot be written"):
+        file = os.open(name, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
 
     def write(line: bytes) -> None:
         nonlocal torn
@@ -100,35 +94,30 @@ def map_writer(path: str | os.PathLike[str], info: ModelInfo) -> LineWriter:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         torn = False
 
-    writer = LineWriter(name, write)
-    writer.put(json_line({"event": "map", **head._asdict(), "tasks": list(info.tasks)}))
+    writer = LineWriter(name, write, _line, patient)
+    writer.put({"event": "map", **head._asdict(), "tasks": list(info.tasks)})
     return writer
 
 
-def events_on_map(events: list[dict[str, Any]]) -> Iterator[str]:
-    """The lines of a map for a frame's events: the decisions that have a place."""
-    for event in events:
-        if event["event"] == "decision" and event.get("place") is not None:
-            yield json_line(event)
+def _line(event: Mapping[str, Any]) -> str | None:
+    """The line of a map's head, or of a decision that has a place; None for other events."""
+    placed = event["event"] == "decision" and event.get("place") is not None
+    return json_line(event) if placed or event["event"] == "map" else None
 
 
 def _entries(lines: Iterable[bytes], name: str) -> Iterator[tuple[int, dict[str, Any]]]:
     """Number and object of each complete line."""
     for number, line in enumerate(lines, 1):
-        try:
+        with suppress(InputError):
             entry = parse_json(line, name)
-        except InputError:
-            continue
-        if isinstance(entry, dict):
-            yield number, entry
+            if isinstance(entry, dict):
+                yield number, entry
 
 
 def _head(name: str, number: int, entry: Mapping[str, Any]) -> Head:
-    try:
+    with suppress(KeyError, TypeError):
         if entry["event"] == "map":
             return Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
-    except (KeyError, TypeError):
-        pass
     raise _no_line(name, number)
 
 
@@ -193,7 +182,5 @@ class TouchMap:
             touch = replace(touch, flags=(*touch.flags, *flags))
             if len(touch.labels) == len(tasks):
                 yield touch
-                continue
-            waiting[key] = touch
-            if len(waiting) > MOST_OPEN:
-                del waiting[next(iter(waiting))]
+            else:
+                waiting[key] = touch

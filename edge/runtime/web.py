@@ -10,27 +10,21 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
+import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from http import HTTPStatus
 from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from ipaddress import ip_address
-from socket import (
-    AF_INET,
-    AF_INET6,
-    SO_SNDBUF,
-    SOCK_DGRAM,
-    SOL_SOCKET,
-    gethostname,
-    socket,
-)
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from edge.errors import EdgeError, InputError
+from edge.files import refusing
+from edge.runtime.event_writer import parse_address
 
 FILES = {
     "/": ("page.html", "text/html; charset=utf-8"),
@@ -75,19 +69,13 @@ class WebServer:
         Raises:
             InputError: the address is not of that form, or cannot be listened at.
         """
-        host, colon, port = address.rpartition(":")
-        host = host.strip("[]")
-        if not (colon and port.isdecimal() and int(port) < 65536):
-            raise InputError(f"--web {address}: give HOST:PORT, for example 127.0.0.1:8000")
-        loopback = host == "localhost" or _is_loopback(host)
+        host, port = parse_address("--web ", address, "127.0.0.1:8000")
+        loopback = _is_loopback(host)
         self.token = "" if loopback else secrets.token_urlsafe(16)
-        try:
-            self._http = _Http((host, int(port)), self)
-        except (OSError, UnicodeError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"--web {address}: cannot be listened at: {reason}") from None
+        with refusing(f"--web {address}: cannot be listened at"):
+            self._http = _Http((host, port), self)
         self.port = self._http.server_address[1]
-        shown = _own_address() if host in ("", "0.0.0.0", "::") else host
+        shown = _own_address() if host in ("0.0.0.0", "::") else host
         shown = f"[{shown}]" if ":" in shown else shown
         self.link = f"http://{shown}:{self.port}/" + (f"?token={self.token}" if self.token else "")
         self._hosts = {f"{shown}:{self.port}"}
@@ -97,7 +85,7 @@ class WebServer:
         self.closed = False
         self._picture: Mapping[str, Any] = {}
         self._version, self._encoded, self._text = 0, -1, b""
-        self._act, self._acting = act, threading.Lock()
+        self.act, self.acting = act, threading.Lock()
         self._streams = 0
         folder = resources.files("edge") / "pages"
         self.files = {
@@ -146,25 +134,17 @@ class WebServer:
                 self._encoded, self._text = self._version, f"data: {text}\n\n".encode()
             return self._version, self._text
 
-    def act(self, action: dict[str, Any]) -> None:
-        """Carry out an action.
-
-        Raises:
-            EdgeError: it cannot be carried out.
-        """
-        with self._acting:
-            self._act(action)
-
-    @contextmanager
-    def stream(self) -> Iterator[None]:
-        """Count a browser that shows the page during the block."""
+    def stream(self, send: Callable[[bytes], object]) -> None:
+        """Send pictures until the browser goes away, reads too slowly, or the server closes."""
+        seen = 0
         with self.changed:
             self._streams += 1
-        try:
-            yield
-        finally:
-            with self.changed:
-                self._streams -= 1
+        with suppress(OSError):
+            while not self.closed:
+                seen, event = self.next_picture(seen)
+                send(event)
+        with self.changed:
+            self._streams -= 1
 
     def refusal(self, request: BaseHTTPRequestHandler) -> HTTPStatus | None:
         """Why a request is not answered, or None if it may be.
@@ -184,20 +164,17 @@ class WebServer:
 
 
 def _is_loopback(host: str) -> bool:
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return False
+    with suppress(ValueError):
+        return host == "localhost" or ip_address(host).is_loopback
+    return False
 
 
 def _own_address() -> str:
     """The address at which other machines find this one; no packet is sent to learn it."""
-    with socket(AF_INET, SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))  # reserved for documentation (RFC 5737)
-        except OSError:
-            return gethostname()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
+        probe.connect(("192.0.2.1", 9))  # reserved for documentation (RFC 5737)
         return str(probe.getsockname()[0])
+    return socket.gethostname()
 
 
 def _token(request: BaseHTTPRequestHandler) -> str:
@@ -218,7 +195,7 @@ class _Http(ThreadingHTTPServer):
         self.page = page
         self._places = threading.BoundedSemaphore(MOST_CLIENTS)
         if ":" in address[0]:
-            self.address_family = AF_INET6
+            self.address_family = socket.AF_INET6
         super().__init__(address, _Handler)
 
     def process_request(self, request: Any, client_address: Any) -> None:
@@ -233,7 +210,7 @@ class _Http(ThreadingHTTPServer):
         finally:
             self._places.release()
 
-    def handle_error(self, request: socket | tuple[bytes, socket], client_address: Any) -> None:
+    def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a browser that went away."""
 
 
@@ -249,13 +226,14 @@ class _Handler(BaseHTTPRequestHandler):
         page, path = self.server.page, urlsplit(self.path).path
         refused = page.refusal(self)
         if refused is None and path == "/pictures":
-            self._stream(page)
+            self._begin(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
+            self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFERED)
+            page.stream(self.wfile.write)
         elif refused is None and path in page.files:
             kind, contents = page.files[path]
-            more = {"Content-Type": kind}
-            if page.token:
-                more["Set-Cookie"] = f"{COOKIE}={page.token}; HttpOnly; SameSite=Strict"
-            self._answer(HTTPStatus.OK, contents, more)
+            cookie = f"{COOKIE}={page.token}; HttpOnly; SameSite=Strict"
+            more = {"Set-Cookie": cookie} if page.token else {}
+            self._answer(HTTPStatus.OK, contents, {"Content-Type": kind, **more})
         else:
             self._answer(refused or HTTPStatus.NOT_FOUND)
 
@@ -273,36 +251,23 @@ class _Handler(BaseHTTPRequestHandler):
             action = json.loads(self.rfile.read(int(length)))
             if not isinstance(action, dict):
                 raise InputError("an action is an object")
-            page.act(action)
+            with page.acting:
+                page.act(action)
         except (ValueError, RecursionError, EdgeError) as error:
             return self._answer(HTTPStatus.BAD_REQUEST, str(error).encode())
         return self._answer(HTTPStatus.NO_CONTENT)
 
     def _answer(
-        self, status: HTTPStatus, contents: bytes = b"", more: Mapping[str, str] | None = None
+        self, status: HTTPStatus, contents: bytes = b"", more: Mapping[str, str] = {}
     ) -> None:
-        self.send_response(status)
-        for name, value in {
-            **HEADERS,
-            **(more or {}),
-            "Content-Length": str(len(contents)),
-        }.items():
-            self.send_header(name, value)
-        self.end_headers()
+        self._begin(status, {**more, "Content-Length": str(len(contents))})
         self.wfile.write(contents)
 
-    def _stream(self, page: WebServer) -> None:
-        """Send pictures until the browser goes away, reads too slowly, or the server closes."""
-        self.send_response(HTTPStatus.OK)
-        for name, value in {**HEADERS, "Content-Type": "text/event-stream"}.items():
+    def _begin(self, status: HTTPStatus, more: Mapping[str, str]) -> None:
+        self.send_response(status)
+        for name, value in {**HEADERS, **more}.items():
             self.send_header(name, value)
         self.end_headers()
-        self.connection.setsockopt(SOL_SOCKET, SO_SNDBUF, BUFFERED)
-        seen = 0
-        with page.stream(), suppress(OSError):
-            while not page.closed:
-                seen, event = page.next_picture(seen)
-                self.wfile.write(event)
 
     def log_message(self, *_: object) -> None:
         """Keep stderr for what concerns the skin."""

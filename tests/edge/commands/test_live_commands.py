@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from edge import recording
-from edge.commands import record, run, view
+from edge.commands import source
 from edge.fake.touches import still
 from edge.skin import file as skinfile
 from tests.edge.commands.conftest import lines
@@ -128,7 +128,10 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         (["--fake", "no.npz"], "no.npz: cannot be read: No such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),
         (["--fake", "REC", "--joints", "tcp:5"], "--joints: give stdin or udp:[HOST:]PORT"),
-        (["--fake", "REC", "--joints", "udp:x"], "joints udp:x: give udp:PORT"),
+        (
+            ["--fake", "REC", "--joints", "udp:x"],
+            "--joints udp:x: give HOST:PORT, for example",
+        ),
         (["--fake", "REC", "--skin", "PAD"], "this skin has 8 x 12 taxels, flat, with"),
     ],
 )
@@ -157,20 +160,20 @@ def test_run_stops_cleanly_at_ctrl_c(exported, recordings):
     assert events[-1]["event"] == "end"
 
 
-@pytest.mark.parametrize("command", [record, run, view])
+@pytest.mark.parametrize("command", ["record", "run", "view"])
 def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
     edge, exported, recordings, tmp_path, monkeypatch, command
 ):
     """A silent serial port may take seconds, and there is nothing to lose yet."""
-    handled, open_skin = [], command.open_skin
+    handled, open_skin = [], source.open_skin
 
     def opened(*arguments, **options):
         handled.append(signal.getsignal(signal.SIGTERM))
         return open_skin(*arguments, **options)
 
-    monkeypatch.setattr(command, "open_skin", opened)
-    model = ["--model", exported / "model.onnx"]
-    options = {record: ["--label", "object=foam", "--out", tmp_path], run: model, view: model}
-    name = command.__name__.rpartition(".")[2]
-    assert edge(name, "--fake", recordings / "soft_1.npz", *options[command], text=True)[0] == 0
+    monkeypatch.setattr(source, "open_skin", opened)
+    options = ["--model", exported / "model.onnx"]
+    if command == "record":
+        options = ["--label", "object=foam", "--out", tmp_path]
+    assert edge(command, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
     assert handled == [signal.SIG_DFL]

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from edge.commands import terminal
 from edge.commands.record import Recorder, Trials, trial_path
 from edge.commands.source import ending_signals
 from edge.fake.clock import VirtualClock
@@ -34,9 +35,9 @@ def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp
 
 
 @contextmanager
-def recorder(folder, out=None, *, names=None, posed=False):
+def recorder(folder, out=None, *, names=None):
     with Lines(out or io.StringIO()) as lines:
-        yield Recorder(str(folder), {"object": "box"}, {}, names, lines, posed)
+        yield Recorder(str(folder), {"object": "box"}, {}, names, lines)
 
 
 def frames(*poses):
@@ -61,7 +62,7 @@ def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_pat
 
 def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(tmp_path, caplog):
     out = io.StringIO()
-    with recorder(tmp_path, out, names=("shoulder", "elbow"), posed=True) as mine:
+    with recorder(tmp_path, out, names=("shoulder", "elbow")) as mine:
         mine.save(frames(np.array([0.1, 0.2]), None), complete=True)
     trial = load(tmp_path / "box-001.npz")
     assert trial.joint_names == ("shoulder", "elbow")
@@ -230,3 +231,35 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
     assert status == 0
     saved = [event for event in events if event["event"] == "saved"]
     assert {event["labels"]["object"] for event in saved} == {"from the page"}
+
+
+def test_keys_choose_the_label_and_delete_the_last_trial(edge, parted, tmp_path, monkeypatch):
+    """The first of a task's labels holds until the number of another is pressed."""
+    trials = tmp_path / "trials"
+    script = [(1, "2"), (2, "d")]  # once there are so many files, this key
+
+    @contextmanager
+    def keys(stop):
+        def typed():
+            due = script and len(list(trials.glob("*.npz"))) == script[0][0]
+            return script.pop(0)[1] if due else ""
+
+        yield typed
+
+    monkeypatch.setattr(terminal, "is_interactive", lambda: True)
+    monkeypatch.setattr(terminal, "keys", keys)
+    labels = ("--label", "touch=soft", "--label", "touch=hard", "--label", "hand=left")
+
+    status, events, err = edge(
+        "record", "--fake", parted, "--loop", "--trials", 3, "--out", trials, *labels
+    )
+
+    assert status == 0
+    assert [(e["event"], Path(e["file"]).name) for e in events] == [
+        ("saved", "soft-left-001.npz"),
+        ("saved", "hard-left-001.npz"),
+        ("deleted", "hard-left-001.npz"),
+        ("saved", "hard-left-001.npz"),
+        ("saved", "hard-left-002.npz"),
+    ]
+    assert "next: touch=hard, hand=left" in err

@@ -12,7 +12,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.runtime import event_writer
-from edge.runtime.event_writer import Lines, LineWriter
+from edge.runtime.event_writer import Lines, LineWriter, parse_address
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_a_line_that_comes_after_the_end_is_lost_and_counted():
     written = []
     writer = LineWriter("a file", written.append)
     writer.close()
-    writer.put("late")
+    writer.put({})
     assert (written, writer.lost) == ([], 1)
 
 
@@ -138,6 +138,13 @@ def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("port", [1, 65535])
-def test_a_datagram_may_go_to_any_port_there_is(port):
-    Lines(io.StringIO(), udp=f"127.0.0.1:{port}").close()
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("localhost:65535", ("localhost", 65535)),
+        ("[::1]:1", ("::1", 1)),
+        ("47401", ("127.0.0.1", 47401)),
+    ],
+)
+def test_an_address_has_a_host_or_the_default_one_and_a_port(text, address):
+    assert parse_address("--joints udp:", text, "47401", "127.0.0.1") == address

@@ -4,12 +4,13 @@ import json
 import os
 import socket
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.runtime.joint_stream import LONGEST_LINE, Joints, from_file, from_udp
+from edge.runtime.joint_stream import LONGEST_LINE, Datagrams, Joints, from_file
 
 
 class Wire:
@@ -161,8 +162,8 @@ def test_a_pipe_is_read_without_waiting_and_its_end_is_noticed():
 
 
 def test_udp_is_bound_to_loopback_unless_told_otherwise():
-    source, listener = from_udp("0")
-    host, port = listener.getsockname()
+    source = Datagrams("0")
+    host, port = source.listener.getsockname()
     assert host == "127.0.0.1"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         assert source() == b""
@@ -173,14 +174,14 @@ def test_udp_is_bound_to_loopback_unless_told_otherwise():
             q = joints.at(1.0)
             if q is not None:
                 break
-    listener.close()
+    source.close()
     np.testing.assert_array_equal(q, [2.0])
 
 
 @pytest.mark.parametrize("address", ["", "port", "70000", "host:x", "999.1.1.1:5000"])
 def test_an_address_that_cannot_be_bound_is_one_sentence(address):
     with pytest.raises(InputError, match=f"joints udp:{address}: "):
-        from_udp(address)
+        Datagrams(address)
 
 
 @pytest.fixture
@@ -260,20 +261,19 @@ def test_a_flood_of_lines_is_bounded_in_each_frame(wire):
     assert joints.malformed >= 20_000
 
 
-def test_of_two_senders_one_is_heard_and_the_other_counted():
+def test_of_two_senders_one_is_heard_and_the_other_counted(caplog):
     now = [0.0]
-    source, listener = from_udp("0")
-    source._now = lambda: now[0]
-    with listener, udp() as first, udp() as second:
+    source = Datagrams("0", lambda: now[0])
+    with closing(source), udp() as first, udp() as second:
         for sender, text in ((first, b"a"), (second, b"b"), (first, b"c")):
-            sender.sendto(text, listener.getsockname())
+            sender.sendto(text, source.listener.getsockname())
         time.sleep(0.05)
         assert [source().strip() for _ in range(4)] == [b"a", b"", b"c", b""]
-        assert list(source.others.values()) == [1]
         now[0] = 2.0  # the first has fallen silent
-        second.sendto(b"d", listener.getsockname())
+        second.sendto(b"d", source.listener.getsockname())
         time.sleep(0.05)
         assert source().strip() == b"d"
+    assert caplog.messages == ["--joints: ignored datagrams from another sender: 1"]
 
 
 def udp():

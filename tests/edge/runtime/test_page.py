@@ -26,7 +26,8 @@ def pictures(monkeypatch):
 
 @pytest.fixture
 def page(tmp_path):
-    with Page("127.0.0.1:0", LAYOUT, title="pad", folder=tmp_path) as page:
+    page = Page("127.0.0.1:0", LAYOUT, title="pad", folder=tmp_path)
+    with page.server:
         yield page
 
 
@@ -45,7 +46,7 @@ def test_a_picture_has_the_skin_and_the_contact_since_onset(page, pictures):
         page.push(frame)
 
     picture = pictures[-1]
-    assert (picture["rows"], picture["cols"], picture["dead"]) == (4, 6, [5])
+    assert (picture["rows"], picture["cols"], picture["dead"]) == (4, 6, (5,))
     assert np.flatnonzero(picture["counts"]).tolist() == [8, 9] == picture["contact"]["taxels"]
     assert picture["invalid"] == [18]
     assert set(picture["contact"]["force"]) == {0.6}
@@ -108,10 +109,8 @@ def test_an_action_that_makes_no_sense_is_refused(page, action):
 
 
 def test_a_page_without_a_folder_changes_nothing():
-    with (
-        Page("127.0.0.1:0", LAYOUT, title="pad") as page,
-        pytest.raises(InputError, match="record --web"),
-    ):
+    page = Page("127.0.0.1:0", LAYOUT, title="pad")
+    with page.server, pytest.raises(InputError, match="record --web"):
         page._act({"do": "labels", "labels": {"object": "box"}})
 
 
@@ -120,7 +119,8 @@ def test_trials_of_the_folder_are_relabelled_and_deleted(tmp_path):
     for name in ("a.npz", "b.npz"):
         edge.save(tmp_path / name, trial)
 
-    with Page("127.0.0.1:0", trial.layout, title="pad", folder=tmp_path) as page:
+    page = Page("127.0.0.1:0", trial.layout, title="pad", folder=tmp_path)
+    with page.server:
         page._act({"do": "relabel", "file": "a.npz", "labels": {"object": "sponge"}})
         page._act({"do": "delete", "file": "b.npz"})
 
@@ -159,7 +159,8 @@ class TestInABrowser:
         assert page.recording
 
     def test_a_wrong_token_shows_nothing(self):
-        with Page("0.0.0.0:0", LAYOUT, title="pad") as page, chromium(390) as browser:
+        page = Page("0.0.0.0:0", LAYOUT, title="pad")
+        with page.server, chromium(390) as browser:
             browser.get(f"http://127.0.0.1:{page.server.port}/?token=wrong")
 
             assert browser.find_elements("id", "skin") == []
