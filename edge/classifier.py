@@ -186,8 +186,9 @@ class Classifier:
             if task.no_contact is not None:
                 latency_ms = round((time.perf_counter() - began) * 1e3, 3)
                 yield Decided(
-                    name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags, strongest=strongest
-                )
+                    name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags,
+                    strongest=strongest, model=self.model.named,
+                )  # fmt: skip
 
     def classify(self, recording: Recording) -> Iterator[Event]:
         """Decide on a recording as the board would have; this classifier's own state stays.
@@ -270,7 +271,7 @@ class Classifier:
         number = self._named(waiting.number)
         answers = [
             Decided(task, None, 0.0, window_s, contact.onset_s, 0.0, flags, contact=number,
-                    position=position)
+                    position=position, model=self.model.named)
             for task in waiting.tasks
         ]  # fmt: skip
         try:
@@ -306,6 +307,9 @@ class Classifier:
             decision: of the model.
             novel: from `_novel`.
         """
+        if self.model.info.trials:
+            names = tuple(map(self.model.info.trial, decision.neighbours.tolist()))
+            blank = replace(blank, nearest=names)
         flags = (*blank.flags, AS_TRAINED) if decision.distances[0] == 0.0 else blank.flags
         flags = (*flags, OUT_OF_RANGE) if decision.out_of_range else flags
         label, confidence = decision.label, decision.confidence

@@ -18,7 +18,7 @@ from edge import __version__
 from edge.errors import EdgeError
 
 COMMANDS = tuple(
-    "check scan calibrate record label run view replay info verify bench fake demo".split()
+    "check scan calibrate record label run view replay explain info verify bench fake demo".split()
 )
 """Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
 UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -57,8 +57,10 @@ class Decided:
         contact: as in `Onset`.
         position: (x, y, z) of the contact's last position, if several are followed and it is known
             (see `edge.touch.contact.Contact.position`).
+        model: name and version of the model, if it has a name.
         strongest: without a contact, the largest count of any taxel, as a part of the count at
             which a contact begins; else None.
+        nearest: names of the nearest training trials, which voted, if the model has them.
         decision: the model's own answer, with the votes and the nearest training trials; None
             without a label.
     """
@@ -75,6 +77,8 @@ class Decided:
     contact: int | None = None
     position: tuple[float, float, float] | None = None
     strongest: float | None = None
+    model: str | None = None
+    nearest: tuple[str, ...] = field(default=(), compare=False, repr=False)
     decision: Decision | None = field(default=None, compare=False, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -97,6 +101,8 @@ class Decided:
             line["strongest"] = self.strongest
         if self.stopped_by is not None:
             line |= {"error": self.error, "stopped_by": self.stopped_by}
+        if self.model is not None:
+            line["model"] = self.model
         return {**line, "flags": list(self.flags)}
 
 

@@ -48,6 +48,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument(
         "--out", type=Path, default=Path("build"), help="folder (default: %(default)s)"
     )
+    top.add_argument("--name", help="of the model (default: that of the folder of the recordings)")
     top.add_argument("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
     top.add_argument(
         "--features",
@@ -151,7 +152,7 @@ def run(arguments: argparse.Namespace) -> int:
         progress=True,
     )
     path = arguments.out / "model.onnx"
-    size = save(path, fitted)
+    size = save(path, fitted, arguments.name)
     print(report(fitted, measure(fitted)), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     return 0

@@ -7,6 +7,7 @@ import platform
 import statistics
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -38,20 +39,24 @@ object."""
 NAMED = 3
 """Files that a sentence names; the rest are counted."""
 CALLS = 60
+MOST_NAMES = 50_000
+"""Characters of the trials' names beyond which a model file leaves them out; the digest of the data
+then says which trials they were."""
 
 
-def save(path: str | os.PathLike[str], fitted: Fitted) -> int:
+def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) -> int:
     """Write a model, and `golden.npz` with its outputs beside it; the model's size in bytes.
 
     Args:
         path: of the model, such as `build/model.onnx`.
         fitted: the result of `train.fit`.
+        name: of the model; that of the recordings' folder where None.
 
     Raises:
         InputError: the files cannot be written.
     """
     parts = fitted.dataset, fitted.classifier, fitted.chosen, fitted.window_s, fitted.samples
-    info = describe(*parts, fitted.sequential)
+    info = describe(*parts, fitted.sequential, name)
     data = to_onnx(fitted.sequential or fitted.classifier, info)
     target = Path(path)
     with write_whole(target) as file:
@@ -67,6 +72,7 @@ def describe(
     window_s: float,
     samples: int,
     sequential: SequentialClassifier | None = None,
+    name: str | None = None,
 ) -> ModelInfo:
     """The metadata that makes the model file describe itself.
 
@@ -77,7 +83,9 @@ def describe(
         window_s: of the full decision.
         samples: values of a feature.
         sequential: of which `classifier` is the last.
+        name: of the model; that of the recordings' folder where None.
     """
+    folder, trials = names(dataset)
     return ModelInfo(
         tasks={
             task: Task(
@@ -113,7 +121,24 @@ def describe(
         decision_points_s=() if sequential is None else tuple(sequential.decision_points_s),
         stopping={} if sequential is None else sequential.stopping_,
         novelty=None if sequential is None else sequential.novelty_,
+        name=folder if name is None else name,
+        trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
     )
+
+
+def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
+    """The name of the folder of all recordings, and each trial's path in it without suffix.
+
+    Trials of one recording are numbered from 1.
+    """
+    folder = Path(os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials]))
+    paths = [t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials]
+    counts, seen = Counter(paths), Counter[Path]()
+    trials = []
+    for path in paths:
+        seen[path] += 1
+        trials.append(path.as_posix() + (f" {seen[path]}" if counts[path] > 1 else ""))
+    return folder.name, tuple(trials)
 
 
 def _labels(dataset: DataSet, task: str) -> set[str]:

@@ -9,20 +9,17 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import statistics
-import textwrap
 from typing import Any
 
 import numpy as np
 
 from edge.commands.bench import timed
-from edge.commands.output import Output
+from edge.commands.output import Output, wrapped
 from edge.model.info import ModelInfo
 from edge.model.model import Model
 
 ROUNDS = 200
-LONGEST_LINE = 80
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -55,15 +52,15 @@ def text(info: ModelInfo, about: dict[str, Any]) -> str:
     skin, chain = info.layout, info.chain
     lines = [f"{about['file']}: {about['bytes'] / 1024:.0f} kB, format {about['format']}", ""]
     for name, task in info.tasks.items():
-        lines += _wrapped(
+        lines += wrapped(
             f"{name}: {task.accuracy:.1%} accurate (nested), {task.components} "
             f"component{'s' * (task.components != 1)}, {task.k} "
             f"neighbour{'s' * (task.k != 1)}, scaling {task.scaling}"
         )
-        lines += _wrapped(", ".join(task.labels), "  ")
+        lines += wrapped(", ".join(task.labels), "  ")
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())
     lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples of each of"]
-    lines += _wrapped(units, "  ")
+    lines += wrapped(units, "  ")
     if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
@@ -78,10 +75,5 @@ def text(info: ModelInfo, about: dict[str, Any]) -> str:
         f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with {versions}.",
         f"A decision takes {about['decision_us']:g} us on this machine (median).",
     ):
-        lines += _wrapped(sentence)
+        lines += wrapped(sentence)
     return "\n".join(lines)
-
-
-def _wrapped(text: str, indent: str = "") -> list[str]:
-    columns = min(shutil.get_terminal_size().columns, LONGEST_LINE)
-    return textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=indent)

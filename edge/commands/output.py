@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +14,7 @@ from edge.events import json_line
 
 BAR = 10
 """Width in characters of a bar that shows a share."""
+LONGEST_LINE = 80
 
 
 class Output:
@@ -54,6 +57,12 @@ def bar(share: float) -> str:
     """
     full = round(min(max(share, 0.0), 1.0) * BAR)
     return "█" * full + "·" * (BAR - full)
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """The text in lines as wide as the terminal, and at most `LONGEST_LINE`."""
+    columns = min(shutil.get_terminal_size().columns, LONGEST_LINE)
+    return textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=indent)
 
 
 def event_text(line: Mapping[str, Any]) -> str:

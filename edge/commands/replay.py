@@ -33,6 +33,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
 
 
+def suited(model: Model, recording: Recording, name: str) -> Recording:
+    """The recording with the joint angles that the model needs.
+
+    Raises:
+        InputError: it lacks them; the message begins with `name`.
+    """
+    if model.info.chain is not None:
+        recording = recording.for_joints(model.info.chain.names, name)
+    joints = recording.joints
+    require_joints(model, None if joints is None else joints.shape[1], name)
+    return recording
+
+
 def decide(
     model: Model, recording: Recording, name: str, error: float | None = None
 ) -> list[dict[str, Any]]:
@@ -41,10 +54,7 @@ def decide(
     Raises:
         InputError: the recording does not suit the model; the message begins with `name`.
     """
-    if model.info.chain is not None:
-        recording = recording.for_joints(model.info.chain.names, name)
-    joints = recording.joints
-    require_joints(model, None if joints is None else joints.shape[1], name)
+    recording = suited(model, recording, name)
     try:
         classifier = Classifier(model, recording.layout, error=error)
         events = [event.to_dict() for event in classifier.classify(recording)]

@@ -80,11 +80,19 @@ class ModelInfo:
     """Number of joint angles in a frame, if a feature is made of them; else 0."""
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
     """{feature: its table} of the features that are made of kernels."""
+    name: str = ""
+    """Of the model, as its owner calls it."""
+    trials: tuple[str, ...] = ()
+    """(rows,) names of the training trials; empty where they were too many to be kept."""
 
     @property
     def widths(self) -> tuple[int, ...]:
         """Number of values of each feature in a feature vector, in their order."""
         return widths(self.features, self.samples, self.layout, self.joints)
+
+    def trial(self, row: int) -> str:
+        """The name of a training trial, or its number where the file holds no names."""
+        return self.trials[row] if self.trials else f"trial {row}"
 
     @property
     def width(self) -> int:
@@ -147,6 +155,8 @@ class ModelInfo:
                 "arm": None if self.chain is None else self.chain.to_dict(),
                 **({"joints": self.joints} if self.joints else {}),
                 **({"kernels": kernels} if self.kernels else {}),
+                **({"name": self.name} if self.name else {}),
+                **({"trials": self.trials} if self.trials else {}),
                 "rows": self.rows,
                 "data_digest": self.data_digest,
                 "versions": self.versions,
@@ -205,6 +215,8 @@ class ModelInfo:
                     for name in names
                     if name in measures.KERNELS
                 },
+                name=meta.text("name", "", empty=True),
+                trials=meta.texts("trials", ()),
             )
             tracking.done()
         except InputError as error:
@@ -237,6 +249,10 @@ class ModelInfo:
                 or self.novelty.task not in self.tasks
             ):
                 raise InputError(f"{name}: its decision points are impossible; export it again")
+        if len(self.trials) not in (0, self.rows):
+            raise InputError(
+                f"{name}: names {len(self.trials)} of {self.rows} trials; export it again"
+            )
         if (self.motion_frame == "world") != (self.chain is not None):
             raise InputError(f"{name}: its motion frame contradicts its arm; export it again")
 

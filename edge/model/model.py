@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from typing import Any, NamedTuple
 
@@ -60,6 +61,11 @@ class Model:
     >>> model.decide([0.0] * model.info.width)["mobility"].label in ("fixed", "movable")
     True
 
+    Attributes:
+        path: of the file.
+        info: its metadata.
+        version: the first eight digits of the file's SHA-256.
+
     Raises:
         InputError: the file is missing, is not an exported model, or contradicts itself.
     """
@@ -67,13 +73,14 @@ class Model:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         """Load the file."""
         name = os.fspath(path)
-        contents, stat = _contents(name)
+        contents, stat, digest = _contents(name)
         text = contents.metadata.get(METADATA_KEY)
         if text is None:
             raise InputError(
                 f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
             )
         self.path = name
+        self.version = digest[:8]
         # First the format: an older one has other operators, but is named by its number.
         self.info = ModelInfo.from_json(text, name)
         onnx_file.check(contents, name)
@@ -160,6 +167,11 @@ class Model:
             if output not in outputs or outputs[output][1:] != width:
                 wide = f" of width {width[0]}, as its metadata says" if width else ""
                 raise InputError(f"{name}: has no output {output}{wide}; export it again")
+
+    @property
+    def named(self) -> str | None:
+        """Its name and version, as events carry them; None without a name."""
+        return f"{self.info.name} {self.version}" if self.info.name else None
 
     @property
     def decision_points_s(self) -> tuple[float, ...]:
@@ -281,14 +293,15 @@ class _Answer(NamedTuple):
     label_distances: NDArray[np.float64] | None
 
 
-def _contents(name: str) -> tuple[onnx_file.Contents, os.stat_result]:
-    """The file's contents, and its identity, to see whether it changes."""
+def _contents(name: str) -> tuple[onnx_file.Contents, os.stat_result, str]:
+    """The file's contents, its identity, to see whether it changes, and its SHA-256."""
     if not os.path.lexists(name) and "\0" not in name:
         raise InputError(f"{name}: no such model; make one with `make export`")
     with open_regular(name, LARGEST_BYTES) as file:
         stat = os.fstat(file.fileno())
         with parsing(name, "a model", "; copy or export it again"):
-            return onnx_file.read(file.read(LARGEST_BYTES), name), stat
+            data = file.read(LARGEST_BYTES)
+            return onnx_file.read(data, name), stat, hashlib.sha256(data).hexdigest()
 
 
 def _is(name: str, stat: os.stat_result) -> bool:

@@ -10,6 +10,10 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 
@@ -31,6 +35,9 @@ NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 """Fields of an attribute that is a number or several: it holds no tensor and no graph."""
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
 """Fields of a TensorProto."""
+
+TYPES = {1: "<f4", 7: "<i8", 11: "<f8"}
+"""{type of a TensorProto: its numbers}."""
 
 Message = dict[int, list[int | memoryview]]
 """{field number: its values}: a number, or the bytes of a text or of a message within."""
@@ -151,3 +158,19 @@ def check(contents: Contents, name: str) -> None:
         foreign.append(f"{len(contents.operators)} nodes")
     if foreign:
         raise InputError(f"{name}: has {foreign[0]}, as no exported model has; export it again")
+
+
+def graph(data: bytes) -> tuple[dict[str, tuple[str, list[str]]], dict[str, NDArray[Any]]]:
+    """{output: (operator, inputs)} and {name: constant} of an exported model's bytes."""
+    nodes: dict[str, tuple[str, list[str]]] = {}
+    constants: dict[str, NDArray[Any]] = {}
+    for part in _messages(_message(memoryview(data)), GRAPH):
+        for node in _messages(part, NODES):
+            inputs, outputs = ([str(name, "utf-8") for name in node.get(i, ())] for i in (1, 2))  # type: ignore[arg-type]
+            nodes |= dict.fromkeys(outputs, (_text(node, OPERATOR), inputs))
+        for tensor in _messages(part, INITIALIZERS):
+            kind: Any = tensor[2][-1]
+            if kind in TYPES:
+                values: Any = np.frombuffer(tensor[9][-1], TYPES[kind])  # type: ignore[arg-type]
+                constants[_text(tensor, 8)] = values.reshape(tensor.get(1, []))
+    return nodes, constants

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -175,7 +176,10 @@ def _decision(event: Decided) -> dict[str, Any]:
     nearest = () if decision is None else zip(decision.neighbours, decision.distances, strict=True)
     return {
         **{key: line[key] for key in ("task", "label", "confidence", "flags", "window_s")},
-        "neighbours": [{"row": int(row), "distance": round(float(d), 3)} for row, d in nearest],
+        "neighbours": [
+            {"row": int(row), "distance": round(float(d), 3), "name": name}
+            for (row, d), name in zip_longest(nearest, event.nearest)
+        ],
     }
 
 

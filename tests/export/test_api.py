@@ -1,5 +1,6 @@
 """Fit and export from Python, and the sentences that go with a model."""
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,16 @@ from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load, save
-from export.api import LEAK, coarseness, measure, report, told_by_order, told_by_posture, warnings
+from export.api import (
+    LEAK,
+    coarseness,
+    measure,
+    names,
+    report,
+    told_by_order,
+    told_by_posture,
+    warnings,
+)
 from train.pipeline import ContactClassifier
 
 
@@ -28,6 +38,31 @@ def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
     assert model.info.tasks["object"].projection == "pca"
     assert model.info.tasks["object"].left_out == "trial"
     assert model.info.tasks["object"].accuracy == fitted.chosen["object"].accuracy.accuracy
+
+
+def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(fitted, recordings, tmp_path):
+    path = tmp_path / "model.onnx"
+    export.save(path, fitted, "pads")
+    model = Model(path)
+    assert model.info.trials == tuple(f"{kind}_{i}" for kind in ("hard", "soft") for i in range(8))
+    assert model.named == f"pads {hashlib.sha256(path.read_bytes()).hexdigest()[:8]}"
+    decided = list(Classifier(model).classify(load(recordings / "soft_3.npz")))[1]
+    assert decided.nearest[0] == "soft_3"
+    assert decided.to_dict()["model"] == model.named
+    export.save(path, fitted)
+    assert Model(path).info.name == recordings.name
+
+
+def test_trials_of_one_recording_are_numbered_and_too_many_names_are_left_out(
+    fitted, tmp_path, monkeypatch
+):
+    trials = fitted.dataset.trials
+    twice = replace(fitted.dataset, trials=(*trials[:2], trials[1]))
+    assert names(twice)[1] == ("hard_0", "hard_1 1", "hard_1 2")
+    monkeypatch.setattr("export.api.MOST_NAMES", 16 * len("hard_0") - 1)
+    export.save(tmp_path / "model.onnx", fitted)
+    info = Model(tmp_path / "model.onnx").info
+    assert (info.trials, info.trial(3)) == ((), "trial 3")
 
 
 def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):

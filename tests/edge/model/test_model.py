@@ -168,6 +168,7 @@ REFUSED = {
     meta(tasks=[]): "tasks must be a table",
     meta(tracking={"speed": 1}): "tracking.debounce is missing",
     meta(features=["noise"]): "was made for the features noise",
+    meta(trials=["a"]): "names 1 of 16 trials",
     without("window_s"): "window_s is missing; export it again",
     more_labels: "no output category_scores of width 3",
     another_task: "no output mobility_label",

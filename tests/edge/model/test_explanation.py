@@ -1,0 +1,72 @@
+"""Why a model answers as it does, by hand and by the graph's own distances."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.model.explanation import Change, Explanation, Near, Space, explain
+from edge.model.model import Model
+
+GOLDEN = Path(__file__).parents[2] / "golden"
+
+BY_HAND = Space(
+    columns=np.arange(3),
+    mean=np.array([10.0, 10.0, 0.0]),
+    gain=np.array([0.5, 0.5, 2.0]),
+    weights=np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
+    rows=np.array([[2.0, 0.0], [-2.0, 0.0]]),
+    labels=np.array([0, 1]),
+)
+"""Two trials, of a force with two samples and of an area, which stand on either side of a mean."""
+
+
+def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
+    why = explain(BY_HAND, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
+    # z = (0.5 + 1, 0.5); to (2, 0): 0.25 + 0.25 = |z|^2 + |b|^2 - 6 = 2.5 + 4 - 6.
+    assert why.voters == (Near(0, 0, np.sqrt(0.5), {"force": 6.0, "area": 0.0}),)
+    assert why.rival == Near(1, 1, np.sqrt(12.5), {"force": -6.0, "area": 0.0})
+    assert why.pulls == {"force": 12.0, "area": 0.0}
+    # The trials are equally near at z = 0 in force, so that each sample falls by 1.5 units; a fifth
+    # more makes the other one nearer, as of equal ones the earlier counts.
+    assert why.changes == (Change("force", 1, pytest.approx(1.8), pytest.approx(-1.8)),)
+
+
+def test_without_another_label_there_is_no_rival():
+    space = BY_HAND._replace(labels=np.array([0, 0]))
+    why = explain(space, np.array([11.0, 12.0, 0.25]), [1], 0, ["force", "area"], [2, 1])
+    assert why == Explanation((Near(1, 0, np.sqrt(12.5), {"force": -6.0, "area": 0.0}),))
+
+
+@pytest.mark.parametrize("name", ["golden", "exported"])
+def test_the_parts_add_up_to_the_graphs_distances(name, exported):
+    folder = exported if name == "exported" else GOLDEN
+    model, golden = Model(folder / "model.onnx"), np.load(folder / "golden.npz")
+    info = model.info
+    for task in info.tasks:
+        space = Space.of(model, task)
+        reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
+        for i in range(24):
+            rows, label = golden[f"{task}_neighbours"][i], int(golden[f"{task}_label"][i])
+            vector = golden["vectors"][i]
+            why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
+            z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
+            for near, distance in zip(why.voters, golden[f"{task}_distances"][i], strict=True):
+                parts = z @ z + space.rows[near.row] @ space.rows[near.row]
+                assert near.distance == pytest.approx(distance, abs=1e-5 * reach)
+                assert parts - sum(near.pulls.values()) == pytest.approx(
+                    distance**2, abs=1e-5 * reach**2
+                )
+            assert space.vote(z, info.tasks[task].k) == label
+            assert why.rival.label != label
+            assert why.rival.distance >= why.voters[0].distance
+
+
+def test_a_file_that_was_changed_meanwhile_is_one_sentence(exported, tmp_path):
+    path = tmp_path / "model.onnx"
+    path.write_bytes((exported / "model.onnx").read_bytes())
+    model = Model(path)
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="not a model that can be explained"):
+        Space.of(model, "object")
