@@ -92,7 +92,7 @@ def keep_period() -> dict:
     with _skin() as skin:
         loop = Loop(skin, lasts_s=20.0)
         frames = sum(1 for _ in loop.frames())
-        periods, missed = loop.schedule.periods, loop.schedule.missed
+        periods, missed = loop.schedule.periods, loop.schedule.missed_ticks
     out = {f"p{p:g}": 1e3 * periods.percentile(p) for p in (50, 99, 99.9)}
     return {**out, "longest": 1e3 * periods.longest, "frames": frames, "missed": missed}
 

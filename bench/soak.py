@@ -96,14 +96,14 @@ def main() -> int:
                 if before is None or frames <= arguments.minutes * 600:
                     before = now
                 print(
-                    f"| {frames / 6000:g} | {frames} | {written} | {loop.schedule.missed} "
+                    f"| {frames / 6000:g} | {frames} | {written} | {loop.schedule.missed_ticks} "
                     f"| {sum(lines.lost.values())} | {now[1]} | {now[0]} |",
                     flush=True,
                 )
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
     print(f"{placed} contacts on the map")
-    lost = sum(lines.lost.values()) + loop.schedule.missed
+    lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
     flat = before is not None and largest - before[0] <= GROWTH_KB and now[1] == before[1]
     return 0 if flat and lost == 0 and placed else 1
 

@@ -53,7 +53,7 @@ def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str
     return {
         "event": "end",
         "frames": frames,
-        "missed_ticks": schedule.missed,
+        "missed_ticks": schedule.missed_ticks,
         "period_ms": {f"p{p:g}": round(periods.percentile(p) * 1e3, 2) for p in percentiles},
         **({"lost": lost} if lost else {}),
     }

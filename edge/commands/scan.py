@@ -33,7 +33,7 @@ def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
     """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
     marks = np.full(invalid.shape, " ")
     for status in statuses:
-        for taxel in status.taxels:
+        for taxel in status.spec.taxels:
             if taxel != UNUSED:
                 marks.flat[taxel] = "." if invalid.flat[taxel] else "#"
     return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
@@ -50,12 +50,14 @@ def run(arguments: argparse.Namespace) -> int:
         statuses = skin.status()
         silent = 0
         for status in statuses:
-            own = [taxel for taxel in status.taxels if taxel != UNUSED and invalid.flat[taxel]]
-            fault = status.error or (f"{status.route}: {SILENT}: {len(own)}" if own else "")
-            silent += status.state != "running" or len(own) == len(set(status.taxels) - {UNUSED})
+            spec = status.spec
+            taxels = set(spec.taxels) - {UNUSED}
+            bad = int(invalid.flat[list(taxels)].sum())
+            fault = status.error or (f"{spec.route}: {SILENT}: {bad}" if bad else "")
+            silent += status.state != "running" or bad == len(taxels)
             if output.as_json or fault:
-                event = chip_event(status, kind=status.kind, invalid=len(own))
-                output.event(event, f"{status.kind}: {fault}")
+                event = chip_event(status, kind=spec.kind.name, invalid=bad)
+                output.event(event, f"{spec.kind.name}: {fault}")
         output.text(skin_map(statuses, invalid))
     silent_taxels = f"; {SILENT}: {invalid.sum()}" if invalid.any() else ""
     output.text(f"{len(statuses) - silent} of {len(statuses)} chips answer{silent_taxels}")

@@ -47,7 +47,7 @@ def ending_signals() -> list[int]:
 
 def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
     """The event of a chip's state, with `more` keys."""
-    event = {"event": "chip", **more, "bus": status.bus, "place": status.route}
+    event = {"event": "chip", **more, "bus": status.bus, "place": status.spec.route}
     event["state"] = status.state
     return {**event, "error": status.error} if status.error else event
 

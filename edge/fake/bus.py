@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import threading
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -71,8 +70,6 @@ class FakeBus:
         self.bits = 0
         """Bits on the wire so far."""
         self.transactions = 0
-        self.threads: set[int] = set()
-        """Threads that have used it; a bus belongs to one at a time."""
         self._held: dict[tuple[Route, int], bytes] = {}
         self._count = count
         self._open = True
@@ -115,7 +112,6 @@ class FakeBus:
         """
         messages = prepared.messages
         address = messages[0].address
-        self.threads.add(threading.get_ident())
         self._refuse(messages)
         if not self._open:
             raise bus_error(errno.ENODEV, self.name, address)

@@ -45,6 +45,10 @@ def stage_bank(stage: int) -> tuple[int, ...]:
     return (*connection, 0, *DETECTION)
 
 
+CONNECTIONS = np.array([stage_bank(stage)[:3] for stage in range(STAGES)])
+"""(12, 3) registers that say what each stage converts."""
+
+
 def system_registers(decimation: int) -> Row:
     """PWR_CONTROL, calibration of all stages, and ambient compensation and interrupts, all off."""
     return (SYSTEM, (DECIMATION[decimation], CALIBRATE_ALL, 0, 0, 0, 0, 0, 0x0400))
@@ -52,10 +56,9 @@ def system_registers(decimation: int) -> Row:
 
 def start_rows(decimation: int = 64) -> list[Row]:
     """The rows to write, in order: the stages, then the system registers."""
-    rows: list[Row] = []
-    for first in range(0, STAGES, STAGES_PER_WRITE):
-        banks = (stage_bank(s) for s in range(first, first + STAGES_PER_WRITE))
-        rows.append((STAGE_BANK + STAGE_REGISTERS * first, sum(banks, ())))
+    stages = range(0, STAGES, STAGES_PER_WRITE)
+    banks = [sum((stage_bank(s + i) for i in range(STAGES_PER_WRITE)), ()) for s in stages]
+    rows = [(STAGE_BANK + STAGE_REGISTERS * s, bank) for s, bank in zip(stages, banks, strict=True)]
     return [*rows, system_registers(decimation)]
 
 
@@ -201,50 +204,39 @@ class FakeAD7147(FakeChip):
 
     def reset(self) -> None:
         """Registers as after power-on."""
-        self.registers = [0] * 0x400
-        for register in range(STAGE_BANK, STAGE_BANK + STAGE_REGISTERS * STAGES):
-            self.registers[register] = self._power_up.randrange(1 << 16)
+        self.registers = np.zeros(0x400, dtype=np.uint16)
+        undefined = [self._power_up.randrange(1 << 16) for _ in range(STAGES * STAGE_REGISTERS)]
+        self.registers[STAGE_BANK : STAGE_BANK + len(undefined)] = undefined
         self.registers[DEVICE_ID] = 0x1472
         self._pointer = 0
-        self._connected: NDArray[np.bool_] | None = None
 
     def write(self, data: bytes, t: float) -> None:
         """Pointer, then words; writes to the read-only registers are lost."""
-        if len(data) < 2:
-            return
-        self._pointer = int.from_bytes(data[:2], "big") & 0x3FF
-        for i in range(2, len(data) - 1, 2):
+        for i in range(0, len(data) - 1, 2):
+            word = int.from_bytes(data[i : i + 2], "big")
+            if i == 0:
+                self._pointer = word & 0x3FF
+                continue
             if not STATUS <= self._pointer <= DEVICE_ID:
-                self.registers[self._pointer] = int.from_bytes(data[i : i + 2], "big")
-                self._connected = None
+                self.registers[self._pointer] = word
             self._pointer = (self._pointer + 1) & 0x3FF
 
     def read(self, n: int, t: float) -> bytes:
         """Words from the pointer on."""
-        first, count = self._pointer, (n + 1) // 2
-        self._pointer = (first + count) & 0x3FF
-        if (first, count) == (RESULTS, STAGES):
-            return self._results(t).astype(">u2").tobytes()
-        registers = list(self.registers)
-        registers[RESULTS : RESULTS + STAGES] = self._results(t).tolist()
-        return words(tuple(registers[first : first + count])).ljust(n, b"\0")[:n]
-
-    def _results(self, t: float) -> NDArray[np.uint16]:
-        if self._connected is None:
-            banks = np.array(self.registers[STAGE_BANK : STAGE_BANK + STAGE_REGISTERS * STAGES])
-            banks = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
-            expected = np.array([stage_bank(s)[:3] for s in range(STAGES)])
-            power = self.registers[SYSTEM]
-            runs = power & 0x0003 == 0 and np.arange(STAGES) <= (power >> 4 & 15)
-            self._connected = (banks == expected).all(axis=1) & runs
-            self._elsewhere = np.where(runs, banks[:, 0] | 1, 0)
-            self._all = bool(self._connected.all())
         if self._refresh > 0.0:
             t = t // self._refresh * self._refresh
-        values = self._sense(t)
-        if self._all:
-            return values
-        return np.where(self._connected, values, self._elsewhere).astype(np.uint16)
+        banks = self.registers[STAGE_BANK : STAGE_BANK + STAGES * STAGE_REGISTERS]
+        connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
+        power = int(self.registers[SYSTEM])
+        last = power >> 4 & 15 if power & 3 == 0 else -1
+        own = (connections == CONNECTIONS).all(axis=1)
+        results = np.where(own, self._sense(t), connections[:, 0] | 1)
+        results[last + 1 :] = 0
+        self.registers[RESULTS : RESULTS + STAGES] = results
+        first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF
+        return (
+            self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes().ljust(n, b"\0")[:n]
+        )
 
 
 KIND = ChipKind(

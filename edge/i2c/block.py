@@ -46,36 +46,22 @@ def data_bytes(taxels: int, bits: int) -> int:
 
 
 def pack(values: NDArray[np.uint16], bits: int) -> bytes:
-    """Taxels as bytes on the wire; the inverse of `unpack`.
+    """Taxels as bytes on the wire, highest bit first; the inverse of `unpack`.
 
     Args:
         values: (taxels,), each below 2 ** bits.
         bits: 8, 12 or 16.
     """
-    if bits == 8:
-        return values.astype(np.uint8).tobytes()
-    if bits == 16:
-        return values.astype(">u2").tobytes()
-    even = np.zeros(len(values) + len(values) % 2, dtype=np.uint16)
-    even[: len(values)] = values
-    a, b = even[0::2], even[1::2]
-    packed = np.stack([a >> 4, (a & 15) << 4 | b >> 8, b & 255], axis=1).astype(np.uint8)
-    return packed.tobytes()[: data_bytes(len(values), 12)]
+    digits = np.unpackbits(values.astype(">u2").view(np.uint8)).reshape(-1, 16)
+    return np.packbits(digits[:, 16 - bits :]).tobytes()
 
 
 def unpack(data: NDArray[np.uint8], taxels: int, bits: int) -> NDArray[np.uint16]:
     """Taxels (n, taxels) from their bytes (n, data_bytes)."""
-    if bits == 8:
-        return data.astype(np.uint16)
-    if bits == 16:
-        return np.ascontiguousarray(data).view(">u2").astype(np.uint16)
-    full = np.zeros((len(data), (taxels + 1) // 2 * 3), dtype=np.uint16)
-    full[:, : data.shape[1]] = data
-    high, mixed, low = full[:, 0::3], full[:, 1::3], full[:, 2::3]
-    out = np.empty((len(data), (taxels + 1) // 2 * 2), dtype=np.uint16)
-    out[:, 0::2] = high << 4 | mixed >> 4
-    out[:, 1::2] = (mixed & 15) << 8 | low
-    return out[:, :taxels]
+    digits = np.zeros((len(data), taxels, 16), dtype=np.uint8)
+    packed = np.unpackbits(data, axis=1, count=taxels * bits)
+    digits[:, :, 16 - bits :] = packed.reshape(len(data), taxels, bits)
+    return np.packbits(digits, axis=2).view(">u2")[:, :, 0].astype(np.uint16)
 
 
 def sealed(data: bytes) -> bytes:
@@ -163,11 +149,10 @@ class FakeBlock(FakeChip):
             bits: of one taxel.
         """
         self._sense, self._taxels, self._bits = sense, taxels, bits
-        self.reset()
+        self._pointer = 0
 
     def reset(self) -> None:
-        """Start again, which takes no time."""
-        self._pointer = 0
+        """Start again, which takes no time and loses nothing."""
 
     def write(self, data: bytes, t: float) -> None:
         """The pointer; nothing can be written."""

@@ -42,97 +42,91 @@ class BusError(EdgeError):
         errno: the kernel's error number.
         bus: the bus's name.
         address: the chip's 7-bit address, or None where the bus itself failed.
+        retries: how often the transaction is sent again within the same frame.
+        remedy: the words that end the message.
     """
 
     errno: int | None = None
     bus = ""
     address: int | None = None
+    retries = 0
+    remedy = ""
 
 
 class BusNack(BusError, ConnectionError):
     """Nothing acknowledged the address (EREMOTEIO or ENXIO, by adapter)."""
 
+    retries = 3
+    remedy = "does not answer; check its power, wiring and address"
+
 
 class BusFault(BusError, OSError):
     """The transfer broke off: clock stretched too long, short transfer, wrong channel (EIO)."""
+
+    retries = 2
+    remedy = "the transfer broke off; check cable length and pull-ups"
 
 
 class BusTimeout(BusError, TimeoutError):
     """The transfer hung until the adapter's timeout (ETIMEDOUT)."""
 
+    remedy = "the transfer hung until its timeout"
+
 
 class BusArbitration(BusError, BlockingIOError):
     """Another master won the bus (EAGAIN)."""
+
+    retries = 3
+    remedy = "another master holds the bus"
 
 
 class BusBusy(BusError, OSError):
     """A driver of the kernel owns the address, or another program the bus (EBUSY)."""
 
+    remedy = "a driver of the kernel owns the address; unbind it"
+
 
 class BusRefused(BusError, ValueError):
     """The adapter does not carry a transaction of this shape (EOPNOTSUPP, EINVAL)."""
 
+    retries = 1
+    remedy = "the adapter refuses a transaction of this shape"
+
 
 class BusMissing(BusError, FileNotFoundError):
-    """There is no such bus (ENOENT)."""
+    """There is no such bus (ENOENT), or several adapters have the name (ENOTUNIQ)."""
+
+    remedy = "no such bus; is I2C switched on, and the number right?"
 
 
 class BusDenied(BusError, PermissionError):
     """The bus may not be opened (EACCES, EPERM)."""
 
+    remedy = "may not be opened; add yourself to the group i2c, or use sudo"
+
 
 class BusGone(BusError, ConnectionAbortedError):
     """The adapter has gone, as an unplugged USB adapter has (ENODEV)."""
 
-
-@dataclass(frozen=True)
-class Response:
-    """How to react to an error.
-
-    Attributes:
-        error: the exception that stands for it.
-        retries: how often the transaction is sent again within the same frame.
-        remedy: the words that end the message.
-    """
-
-    error: type[BusError]
-    retries: int = 0
-    remedy: str = ""
+    remedy = "the adapter has gone; plug it in again"
 
 
-_NACK = Response(BusNack, 3, remedy="does not answer; check its power, wiring and address")
-_GONE = Response(BusGone, remedy="the adapter has gone; plug it in again")
-_REFUSED = Response(BusRefused, 1, remedy="the adapter refuses a transaction of this shape")
-_DENIED = Response(
-    BusDenied, remedy="may not be opened; add yourself to the group i2c, or use sudo"
-)
-RESPONSES: dict[int, Response] = {
-    errno.EREMOTEIO: _NACK,
-    errno.ENXIO: _NACK,
-    errno.EIO: Response(
-        BusFault, 2, remedy="the transfer broke off; check cable length and pull-ups"
-    ),
-    errno.ETIMEDOUT: Response(BusTimeout, remedy="the transfer hung until its timeout"),
-    errno.EAGAIN: Response(BusArbitration, 3, remedy="another master holds the bus"),
-    errno.EBUSY: Response(BusBusy, remedy="a driver of the kernel owns the address; unbind it"),
-    errno.EOPNOTSUPP: _REFUSED,
-    errno.EINVAL: _REFUSED,
-    errno.ENOENT: Response(
-        BusMissing, remedy="no such bus; is I2C switched on, and the number right?"
-    ),
-    errno.ENOTUNIQ: Response(
-        BusMissing, remedy="several adapters have names that begin so; give more of the name"
-    ),
-    errno.EACCES: _DENIED,
-    errno.EPERM: _DENIED,
-    errno.ENODEV: _GONE,
+ERRORS: dict[int | None, type[BusError]] = {
+    errno.EREMOTEIO: BusNack,
+    errno.ENXIO: BusNack,
+    errno.EIO: BusFault,
+    errno.ETIMEDOUT: BusTimeout,
+    errno.EAGAIN: BusArbitration,
+    errno.EBUSY: BusBusy,
+    errno.EOPNOTSUPP: BusRefused,
+    errno.EINVAL: BusRefused,
+    errno.ENOENT: BusMissing,
+    errno.ENOTUNIQ: BusMissing,
+    errno.EACCES: BusDenied,
+    errno.EPERM: BusDenied,
+    errno.ENODEV: BusGone,
 }
-"""Response by errno, as the kernel's adapters give it. Any other errno counts as EIO."""
-
-
-def response(code: int | None) -> Response:
-    """How to react to an errno."""
-    return RESPONSES.get(code or errno.EIO, RESPONSES[errno.EIO])
+"""Error by errno, as the kernel's adapters give it; any other errno is a `BusFault`."""
 
 
 def bus_error(
@@ -146,10 +140,9 @@ def bus_error(
     BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)')
     """
     code = code or errno.EIO
+    kind = ERRORS.get(code, BusFault)
     where = bus if address is None else f"{bus}, address {address:#04x}"
-    answer = response(code)
-    name = errno.errorcode.get(code, str(code))
-    error = answer.error(f"{where}: {remedy or answer.remedy} ({name})")
+    error = kind(f"{where}: {remedy or kind.remedy} ({errno.errorcode.get(code, code)})")
     error.errno, error.bus, error.address = code, bus, address
     return error
 
@@ -212,7 +205,7 @@ class Bus(Protocol):
         """Send it; bytes read are then in its messages' buffers.
 
         Raises:
-            BusError: it failed; see `RESPONSES`.
+            BusError: it failed; see `ERRORS`.
         """
 
     def now(self) -> float:
@@ -271,14 +264,16 @@ def find_device(name: str, adapters: Path = ADAPTERS) -> str:
         adapters: see `ADAPTERS`.
 
     Raises:
-        OSError: no adapter has the name (ENOENT), or several have (ENOTUNIQ).
+        BusMissing: no adapter has the name, or several have.
     """
     if name.startswith("/"):
         return name
     files = [file for file in adapters.glob("*/name") if file.read_text().startswith(name)]
-    if len(files) != 1:
-        code = errno.ENOTUNIQ if files else errno.ENOENT
-        raise OSError(code, os.strerror(code))
+    if not files:
+        raise bus_error(errno.ENOENT, name)
+    if len(files) > 1:
+        remedy = "several adapters have names that begin so; give more of the name"
+        raise bus_error(errno.ENOTUNIQ, name, remedy=remedy)
     return f"/dev/{files[0].parent.name}"
 
 
@@ -324,9 +319,10 @@ class LinuxBus:
         import smbus2
 
         self.close()
+        device = find_device(self.name)
         smbus: Any = smbus2.SMBus()
         try:
-            smbus.open(find_device(self.name))
+            smbus.open(device)
             if not smbus.funcs & smbus2.I2cFunc.I2C:
                 raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
             flock(smbus.fd, LOCK_EX | LOCK_NB)

@@ -11,13 +11,14 @@ from __future__ import annotations
 import errno
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from edge.errors import InputError
 from edge.i2c.block import IDENTITY, sealed
-from edge.i2c.bus import BusError, Message, Transfer, bus_error, read, write
+from edge.i2c.bus import BusError, BusFault, BusTimeout, Message, Transfer, bus_error, read, write
 
 BOOT_S = 3.0
 """Many boards restart when their port is opened; an Arduino's bootloader takes 2 s."""
@@ -28,11 +29,12 @@ REMEDIES = {
     errno.ENOENT: "no such serial port; is the microcontroller plugged in?",
     errno.EACCES: "may not be opened; add yourself to the group dialout",
     errno.EBUSY: "another program has the port open; close it",
+    errno.EIO: "the transfer broke off; check the cable",
     errno.ETIMEDOUT: "no complete answer came in time; check the firmware and the baud rate",
     errno.ENODEV: "the port has gone; plug the microcontroller in again",
     errno.EOPNOTSUPP: "a serial port carries only the frames of a microcontroller (kind block)",
 }
-"""Remedies by errno."""
+"""Remedies by errno; any other errno is treated as EIO."""
 
 
 def encode(data: bytes) -> bytes:
@@ -86,8 +88,7 @@ def serial_bits(messages: Sequence[Message]) -> int:
 
 def serial_error(code: int, port: str) -> BusError:
     """Build the named error of an errno; its message names the port."""
-    remedy = REMEDIES.get(code, "the transfer broke off; check the cable")
-    return bus_error(code, port, remedy=remedy)
+    return bus_error(code, port, remedy=REMEDIES.get(code, REMEDIES[errno.EIO]))
 
 
 class SerialBus:
@@ -122,12 +123,9 @@ class SerialBus:
         ends = self.now() + boot_s
         ping = self.prepare(write(0, IDENTITY), read(0, 10))
         while self.now() < ends:
-            try:
-                self._exchange(ping, PING_S)
+            with suppress(BusTimeout, BusFault):  # a boot loader may talk first
+                self.transfer(ping, PING_S)
                 break
-            except BusError as error:
-                if error.errno != errno.ETIMEDOUT:
-                    raise
 
     now = staticmethod(time.monotonic)
     sleep = staticmethod(time.sleep)
@@ -162,33 +160,30 @@ class SerialBus:
         """Keep the messages."""
         return Transfer(messages)
 
-    def transfer(self, prepared: Transfer) -> None:
+    def transfer(self, prepared: Transfer, timeout_s: float | None = None) -> None:
         """Ask for the register at a pointer, and read the answer into the last message.
 
         Raises:
             BusError: the port is gone, or no intact answer came in time.
         """
-        self._exchange(prepared, self.timeout_s)
-
-    def _exchange(self, prepared: Transfer, timeout_s: float) -> None:
-        messages = prepared.messages
-        if len(messages) != 2 or messages[0].read or len(messages[0].buffer) != 1:
+        request, *answers = prepared.messages
+        if request.read or len(request.buffer) != 1 or len(answers) != 1:
             raise serial_error(errno.EOPNOTSUPP, self.name)
         if self._port is None:
             raise serial_error(errno.ENODEV, self.name)
-        into = messages[-1].buffer
+        ends = self.now() + (self.timeout_s if timeout_s is None else timeout_s)
         try:
-            answer = self._ask(int(messages[0].buffer[0]), self.now() + timeout_s)
+            answer = self._ask(int(request.buffer[0]), ends)
         except OSError as error:
             # Neither a write's timeout nor pyserial's error of a lost port has an errno.
             hung = type(error).__name__ == "SerialTimeoutException"
             if not hung:
                 self.close()
             raise serial_error(errno.ETIMEDOUT if hung else errno.ENODEV, self.name) from None
-        if len(answer) != len(into):
+        if len(answer) != len(prepared.buffer):
             # Noise is a fault, and is read again at once; silence is a timeout.
             raise serial_error(errno.EIO if self._heard else errno.ETIMEDOUT, self.name)
-        into[:] = np.frombuffer(answer, dtype=np.uint8)
+        prepared.buffer[:] = np.frombuffer(answer, dtype=np.uint8)
 
     def _ask(self, pointer: int, ends: float) -> bytes:
         """The register at a pointer, or nothing if no intact answer comes by the time `ends`."""

@@ -7,22 +7,17 @@ sheet, section 8.5).
 from __future__ import annotations
 
 import errno
+from collections.abc import Collection
+from contextlib import suppress
 
-from edge.i2c.bus import (
-    Bus,
-    BusError,
-    BusNack,
-    Message,
-    Transfer,
-    bus_error,
-    read,
-    wire_bits,
-    write,
-)
+from edge.i2c.bus import Bus, BusError, BusNack, Transfer, bus_error, read, wire_bits, write
 from edge.i2c.chip import FakeChip
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = 8
+CONTROLS = [0, *(1 << n for n in range(CHANNELS))]
+"""Control bytes that connect no channel, and each one alone."""
+LEAVE_ATTEMPTS = 4
 SELECT_BITS = wire_bits([write(0x70, b"\0")])
 """Bits on the wire of selecting a channel."""
 VERIFY_BITS = wire_bits([read(0x70, 1)])
@@ -42,7 +37,7 @@ class TCA9548A:
         address: int = 0x70,
         *,
         verify: bool = True,
-        beside: tuple[TCA9548A, ...] = (),
+        beside: Collection[TCA9548A] = (),
     ) -> None:
         """Check that the mux answers, and disconnect all its channels.
 
@@ -52,50 +47,42 @@ class TCA9548A:
             verify: read the control byte back whenever a channel is selected. It catches a wrong
                 channel, whose data would look plausible. Whoever calls `kept` after its
                 transactions may switch it off meanwhile.
-            beside: other muxes on the same bus, of which at most one may have a channel open.
+            beside: all muxes on the same bus, of which at most one may have a channel open; it may
+                grow later.
 
         Raises:
             BusError: it does not answer, or does not keep its control byte.
         """
         self.bus, self.address, self.verify = bus, address, verify
-        self.selected: int | None = None
-        """The connected channel; None where unknown or none."""
-        self._select = [bus.prepare(write(address, [1 << n])) for n in range(CHANNELS)]
-        self._all_off = bus.prepare(write(address, [0]))
-        self._control = bus.prepare(read(address, 1))
+        self.control: int | None = None
+        """The control byte, a bit for each connected channel; None where it is unknown."""
+        self._writes = [bus.prepare(write(address, [n])) for n in CONTROLS]
+        self._read = bus.prepare(read(address, 1))
         self._beside = beside
-        self._open: bool | None = None
-        self._expected = 0
-        for mux in beside:
-            mux._beside = (*mux._beside, self)
-        self.disconnect()
+        self.select(None)
 
     def channel(self, n: int) -> Channel:
         """Channel `n`, 0 to 7, as a bus."""
         return Channel(self, n)
 
-    def disconnect(self) -> None:
-        """Disconnect all channels.
-
-        Raises:
-            BusError: it failed.
-        """
-        self._set(self._all_off, 0)
-        self._open = False
-
-    def select(self, n: int) -> None:
-        """Connect channel `n` alone; send nothing if it is connected already.
+    def select(self, n: int | None) -> None:
+        """Connect channel `n` alone, or none; send nothing if it is so already.
 
         Raises:
             BusError: it failed; the connected channel is then unknown.
         """
-        if self.selected == n:
+        control = 0 if n is None else 1 << n
+        if self.control == control:
             return
-        for mux in self._beside:
-            if mux._open is not False:
-                mux._leave()
-        self._set(self._select[n], 1 << n)
-        self._open, self.selected = True, n
+        for mux in self._beside if control else ():
+            if mux is not self:
+                mux.leave()
+        self.forget()
+        self._expected = control
+        self.bus.transfer(self._writes[CONTROLS.index(control)])
+        if self.verify and not self.kept():
+            raise bus_error(errno.EIO, self.bus.name, self.address)
+        self.control = control
 
     def kept(self) -> bool:
         """Whether the channel selected last, and no other, is still connected.
@@ -105,43 +92,27 @@ class TCA9548A:
         Raises:
             BusError: the mux does not answer.
         """
-        self.bus.transfer(self._control)
-        return bool(self._control.buffer[0] == self._expected)
+        self.bus.transfer(self._read)
+        return bool(self._read.buffer[0] == self._expected)
 
     def forget(self) -> None:
         """Take the connected channel as unknown, which it is after any error."""
-        self.selected = self._open = None
+        self.control = None
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
         """Disconnect for the sake of a mux beside; a mux that never answers is passed over."""
-        for _ in range(4):
-            try:
-                return self.disconnect()
-            except BusNack:
-                continue
-
-    def _set(self, control: Transfer, expected: int) -> None:
-        self.forget()
-        self._expected = expected
-        self.bus.transfer(control)
-        if self.verify and not self.kept():
-            raise bus_error(errno.EIO, self.bus.name, self.address)
+        for _ in range(LEAVE_ATTEMPTS):
+            with suppress(BusNack):
+                return self.select(None)
 
 
 class Channel:
     """One channel of a mux: a bus that selects itself before it is used."""
 
     def __init__(self, mux: TCA9548A, n: int) -> None:
-        if not 0 <= n < CHANNELS:
-            raise ValueError(f"a TCA9548A has channels 0 to 7, not {n}")
         self.mux, self.n = mux, n
         self.name = f"{mux.bus.name}, mux {mux.address:#04x} channel {n}"
-        self.now, self.sleep = mux.bus.now, mux.bus.sleep
-        self._send = mux.bus.transfer
-
-    def prepare(self, *messages: Message) -> Transfer:
-        """Build a call's structures once."""
-        return self.mux.bus.prepare(*messages)
+        self.now, self.sleep, self.prepare = mux.bus.now, mux.bus.sleep, mux.bus.prepare
 
     def transfer(self, prepared: Transfer) -> None:
         """Select the channel if necessary, then send.
@@ -149,13 +120,11 @@ class Channel:
         Raises:
             BusError: either failed; the channel is unknown from then on.
         """
-        mux = self.mux
-        if mux.selected != self.n:
-            mux.select(self.n)
         try:
-            self._send(prepared)
+            self.mux.select(self.n)
+            self.mux.bus.transfer(prepared)
         except BusError:
-            mux.forget()
+            self.mux.forget()
             raise
 
     def reopen(self) -> None:
@@ -165,9 +134,6 @@ class Channel:
 
     def close(self) -> None:
         """Do nothing: whoever opened the bus closes it."""
-
-
-_CHANNELS_OF = [[n for n in range(CHANNELS) if byte >> n & 1] for byte in range(256)]
 
 
 class FakeTCA9548A(FakeChip):
@@ -194,4 +160,4 @@ class FakeTCA9548A(FakeChip):
 
     def stop(self) -> None:
         """Connect the channels written."""
-        self.connected = _CHANNELS_OF[self._control]
+        self.connected = [n for n in range(CHANNELS) if self._control >> n & 1]

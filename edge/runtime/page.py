@@ -111,7 +111,7 @@ class Page:
             "notices": list(self._notices),
         }
         if schedule is not None:
-            picture["missed"] = schedule.missed
+            picture["missed"] = schedule.missed_ticks
             picture["rate_hz"] = round(1.0 / schedule.periods.percentile(50), 1)
         self.server.show(picture)
 

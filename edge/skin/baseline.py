@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-SCALE_BITS = 8
-"""The baseline is kept in 1/256 counts, so that a slow drift is not lost to rounding."""
+SCALE_BITS = 12
+"""The baseline is kept in 1/4096 counts, so that a slow drift is not lost to rounding."""
 FOLLOW_BITS = 2
 """A step is at most 1/4 of the distance, so that noise hardly moves the baseline."""
 
@@ -33,7 +33,7 @@ class Baseline:
             rest: (n,) raw counts with nothing touching.
             sign: (n,) or a scalar, 1 where a touch raises the raw value, -1 where it lowers it.
             dead_band: (n,) or a scalar, counts under which a taxel reads 0; at least 1.
-            step_counts: length of a step; rounded up to 1/256 count.
+            step_counts: length of a step; rounded up to 1/4096 count.
             limit: greatest distance from `rest`, in counts.
         """
         self._rest = np.array(rest, dtype=np.int32) << SCALE_BITS
@@ -65,17 +65,11 @@ class Baseline:
         np.minimum(counts, 65535, out=counts)
         return counts.astype(np.uint16)
 
-    def follow(self, raw: NDArray[np.uint16], fresh: NDArray[np.bool_]) -> None:
-        """Follow the drift of the `fresh` taxels by a step; call it while nothing touches."""
-        error = raw.astype(np.int32)
-        error <<= SCALE_BITS
-        error -= self._now
+    def follow(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
+        """Follow the drift of the `valid` taxels by a step; call it while nothing touches."""
+        error = (raw.astype(np.int32) << SCALE_BITS) - self._now
         error += 1 << (FOLLOW_BITS - 1)
         error >>= FOLLOW_BITS
-        np.minimum(error, self._step, out=error)
-        np.maximum(error, -self._step, out=error)
-        error *= fresh
-        self._now += error
-        np.minimum(self._now, self._high, out=self._now)
-        np.maximum(self._now, self._low, out=self._now)
+        self._now += np.clip(error, -self._step, self._step) * valid
+        np.clip(self._now, self._low, self._high, out=self._now)
         self._counts = self._rounded()

@@ -1,24 +1,25 @@
 """The chips of one bus: read in every frame, and brought back after a failure.
 
-A failed transaction is sent again as `edge.i2c.bus.RESPONSES` says. A chip that still fails is
-down; it is tried again at once and then every 0.1 s, or every 0.3 s if it hangs, or fails again
-within a second of its return. While a chip is being set up, the others are read in every fourth
+A failed transaction is sent again as its error's `retries` say. A chip that still fails is down; it
+is tried again at once and then every 0.1 s, or every 0.3 s if it hangs or fails again within a
+second of its return. While a chip is being set up, the others are read in every fourth
 frame, and the time saved goes to it, one transaction at a time.
 """
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.bus import Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout, response
+from edge.i2c.bus import Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout
 from edge.i2c.chip import Chip, ChipSpec
 from edge.i2c.tca9548a import TCA9548A
+from edge.skin.file import Reading
 from edge.skin.wiring import BusSpec
 
 PAUSE_S, LONG_PAUSE_S = 0.1, 0.3
@@ -29,7 +30,6 @@ FLAPS_S = 1.0
 LONGEST_PAUSE_S = 1.0
 """Time between two attempts to open a lost bus again, at most: a tenth of the time since the loss,
 and no less than `PAUSE_S`."""
-RETRIES_PER_FRAME = 12
 SET_UP_AFTER, SET_UP_EVERY = 16, 64
 """A chip that keeps its settings but serves damaged bytes is set up again after so many frames in a
 row, and then every so many; a conversion takes at most four frames at 100 Hz."""
@@ -42,14 +42,6 @@ NEVER = -1.0e9
 """Read time of a chip not read yet."""
 
 
-class ChipState(enum.Enum):
-    """The state of one chip."""
-
-    RUNNING = "running"
-    STARTING = "starting"
-    DOWN = "down"
-
-
 class Slot:
     """One chip on its bus: its state, and the bytes last read from it.
 
@@ -57,46 +49,36 @@ class Slot:
         spec: from the skin file.
         row: (frame_bytes,) buffer for its bytes.
         chip: its driver, once it has been identified.
-        state: see `ChipState`.
+        running: whether it is set up and answers.
         error: why it is down.
         at: when it was last read, on the bus's clock.
         good: whether `row` holds a complete reading of a chip with its settings.
         damaged: number of readings in a row whose bytes made no sense; the skin counts it.
-        recoveries: how often the chip has come back.
+        has_settings: the settings were written and read back, and no loss was seen since.
+        steps: the steps left until it runs, while it is being set up.
     """
 
     def __init__(self, spec: ChipSpec, row: NDArray[np.uint8]) -> None:
         self.spec, self.row = spec, row
         self.chip: Chip | None = None
-        self.state = ChipState.DOWN
         self.error: BusError | None = None
-        self.at = NEVER
-        self.good = False
-        self.damaged = 0
-        self.recoveries = 0
-        self.has_settings = False
-        """The settings were written and read back, and no loss was seen since."""
-        self.retry_at = self.back_at = -math.inf
         self.steps: Iterator[None] | None = None
-        """The steps left until it runs."""
+        self.running = self.good = self.has_settings = False
+        self.at = NEVER
+        self.damaged = 0
+        self.retry_at = self.back_at = -math.inf
 
     @property
-    def running(self) -> bool:
-        """Whether it is set up and answers."""
-        return self.state is ChipState.RUNNING
+    def state(self) -> str:
+        """`running`, `starting`, or after a failure `down` until it runs, whatever is tried."""
+        return "running" if self.running else "starting" if self.error is None else "down"
 
 
 class BusReader:
     """The chips of one bus, used by one thread at a time."""
 
     def __init__(
-        self,
-        bus: Bus,
-        spec: BusSpec,
-        rows: Sequence[NDArray[np.uint8]],
-        *,
-        verify_mux: bool = True,
-        recheck_frames: int = 4,
+        self, bus: Bus, spec: BusSpec, rows: Sequence[NDArray[np.uint8]], reading: Reading
     ) -> None:
         """Take the bus over; nothing is sent yet.
 
@@ -104,16 +86,13 @@ class BusReader:
             bus: an open bus.
             spec: its chips.
             rows: for each chip the buffer for its bytes.
-            verify_mux: see `edge.i2c.tca9548a.TCA9548A`.
-            recheck_frames: see `edge.skin.file.Reading`.
+            reading: `verify_mux` and `recheck_frames` apply.
         """
         self.bus = bus
         self.slots = [Slot(chip, row) for chip, row in zip(spec.chips, rows, strict=True)]
-        self._verify, self._recheck = verify_mux, recheck_frames
+        self._reading = reading
         self._muxes: dict[int, TCA9548A] = {}
-        self._frame = 0
-        self._turn = 0
-        self._retries = self._timeouts = 0
+        self._frame = self._turn = self._timeouts = 0
         self._rest_until = -math.inf
         """No chip is brought back before this time."""
         self._lost_at = math.inf
@@ -150,23 +129,22 @@ class BusReader:
             deadline: on the bus's clock; after it, chips are brought back by one step only.
         """
         self._frame += 1
-        self._retries, self._timeouts = RETRIES_PER_FRAME, 0
+        self._timeouts = 0
         if self._setting_up():
             share = -(-len(slots) // OLDEST_FRAMES)
             first = self._frame % OLDEST_FRAMES * share
             slots = slots[first : first + share]
         for _, channel in groupby(slots, key=lambda slot: (slot.spec.mux, slot.spec.channel)):
             self._read_channel([*channel])
-        if self._frame % self._recheck == 0:
-            running = [slot for slot in self.slots if slot.running]
-            if running:
-                self._turn += 1
-                self._check(running[self._turn % len(running)])
+        running = [slot for slot in self.slots if slot.running]
+        if running and self._frame % self._reading.recheck_frames == 0:
+            self._turn += 1
+            self._check(running[self._turn % len(running)])
         # After the reading, so that a broken chip costs the intact ones no time.
         self._bring_back(deadline)
 
     def _setting_up(self) -> bool:
-        return any(slot.state is ChipState.STARTING for slot in self.slots)
+        return any(slot.steps is not None for slot in self.slots)
 
     def _read_channel(self, slots: Sequence[Slot]) -> None:
         """Read the chips on one channel of a mux, or on the bus itself.
@@ -175,7 +153,7 @@ class BusReader:
         program selected, their bytes would look plausible. They are then read again, once.
         """
         mux = self._muxes.get(slots[0].spec.mux or 0)
-        if mux is None or not self._verify:
+        if mux is None or not self._reading.verify_mux:
             for slot in slots:
                 self._read(slot)
             return
@@ -191,12 +169,8 @@ class BusReader:
 
     def _kept(self, mux: TCA9548A) -> bool:
         for _ in range(2):
-            try:
+            with suppress(BusError):
                 return mux.kept()
-            except BusTimeout:
-                break
-            except BusError:
-                continue
         return False
 
     def _read(self, slot: Slot, mux: TCA9548A | None = None) -> bool:
@@ -205,31 +179,24 @@ class BusReader:
         Returns:
             False if a chip did not answer because the mux no longer had its channel connected.
         """
-        kept = True
-        if not slot.running:
-            return kept
-        assert slot.chip is not None
+        kept, tries = True, 0
         slot.good = False
-        if slot.damaged == 1 and not self._setting_up():
+        if slot.running and slot.damaged == 1 and not self._setting_up():
             self._check(slot)
-        elif slot.damaged == 1:
+        elif slot.running and (slot.damaged == 1 or slot.damaged % SET_UP_EVERY == SET_UP_AFTER):
             # Whatever reset another chip has probably reset this one.
             self._set_up_again(slot)
-        elif slot.damaged % SET_UP_EVERY == SET_UP_AFTER:
-            self._set_up_again(slot)
-        tries = 0
-        while slot.running:
+        while slot.running and not slot.good:
+            assert slot.chip is not None
             try:
                 slot.chip.read()
                 slot.good, slot.at = True, self.bus.now()
-                break
             except BusError as error:
                 if mux is not None and isinstance(error, BusNack):
                     kept = kept and self._kept(mux)
-                if tries >= response(error.errno).retries or self._retries == 0:
+                if tries >= error.retries:
                     self._fail(slot, error)
                 tries += 1
-                self._retries -= 1
         return kept
 
     def _check(self, slot: Slot) -> None:
@@ -242,17 +209,15 @@ class BusReader:
             self._fail(slot, error)
 
     def _set_up_again(self, slot: Slot) -> None:
-        slot.recoveries += 1
-        slot.good = slot.has_settings = False
-        slot.state, slot.steps = ChipState.STARTING, self._set_up(slot)
+        slot.running = slot.good = slot.has_settings = False
+        slot.steps = self._set_up(slot)
 
     def _fail(self, slot: Slot, error: BusError) -> None:
         """Take a chip down, or all chips where the bus is gone or hangs."""
-        now = self.bus.now()
+        now, failed = self.bus.now(), [slot]
         for mux in self._muxes.values():
             mux.forget()
-        failed, hung = [slot], isinstance(error, BusTimeout)
-        if hung:
+        if isinstance(error, BusTimeout):
             self._timeouts += 1
             self._rest_until = now + LONG_PAUSE_S
         if isinstance(error, BusGone):
@@ -261,10 +226,10 @@ class BusReader:
             failed = self.slots
         for slot in failed:
             flaps = now - slot.back_at < FLAPS_S
-            pause = LONG_PAUSE_S if hung or flaps else PAUSE_S
+            pause = LONG_PAUSE_S if flaps else PAUSE_S
             # A running chip is tried again at once.
             slot.retry_at = now if slot.running and not flaps else now + pause
-            slot.good, slot.state, slot.error, slot.steps = False, ChipState.DOWN, error, None
+            slot.running, slot.good, slot.error, slot.steps = False, False, error, None
 
     def _bring_back(self, deadline: float) -> None:
         """Bring chips back, the one that has waited longest first, until the deadline."""
@@ -272,9 +237,8 @@ class BusReader:
         waiting = [slot for slot in self.slots if not slot.running and slot.retry_at <= now()]
         if not waiting or now() < self._rest_until:
             return
-        if all(slot.state is ChipState.DOWN for slot in self.slots) and (
-            now() < self._reopen_at or not self._reopened()
-        ):
+        failed = not self._setting_up() and not any(slot.running for slot in self.slots)
+        if failed and (now() < self._reopen_at or not self._reopened()):
             return
         for slot in sorted(waiting, key=lambda slot: slot.retry_at):
             while not slot.running and slot.retry_at <= now():
@@ -292,42 +256,33 @@ class BusReader:
         now = self.bus.now()
         self._lost_at = min(self._lost_at, now)
         self._reopen_at = now + min(max(PAUSE_S, 0.1 * (now - self._lost_at)), LONGEST_PAUSE_S)
-        try:
+        with suppress(BusError):
             self.bus.reopen()
-        except BusError:
-            return False
-        return True
+            return True
+        return False
 
     def _step(self, slot: Slot) -> bool:
         """Take one step to bring a chip back; False where it failed."""
-        if slot.steps is None:
-            slot.steps, slot.state = self._revive(slot), ChipState.STARTING
+        slot.steps = slot.steps or self._set_up(slot)
         try:
             next(slot.steps)
         except StopIteration:
             if slot.error is not None:
-                slot.recoveries, slot.back_at = slot.recoveries + 1, self.bus.now()
-            slot.state, slot.error, slot.steps = ChipState.RUNNING, None, None
+                slot.back_at = self.bus.now()
+            slot.running, slot.error, slot.steps = True, None, None
             self._lost_at, self._reopen_at = math.inf, -math.inf
         except BusError as error:
             self._fail(slot, error)
             return False
         return True
 
-    def _revive(self, slot: Slot) -> Iterator[None]:
-        """Steps from down to running; a chip that kept its settings needs no set-up."""
-        kept = slot.has_settings and slot.chip is not None and slot.chip.healthy()
-        if not kept:
+    def _set_up(self, slot: Slot) -> Iterator[None]:
+        """Steps from down to running; a chip that kept its settings needs only the last one, which
+        reads a frame: a chip that cannot serve one does not run."""
+        if not (slot.has_settings and slot.chip is not None and slot.chip.healthy()):
             slot.has_settings = False
             slot.chip = self._driver(slot)
             yield
-        yield from self._set_up(slot)
-
-    def _set_up(self, slot: Slot) -> Iterator[None]:
-        """Steps from identified to running. The last one reads a frame: a chip that cannot serve
-        one does not run."""
-        assert slot.chip is not None
-        if not slot.has_settings:
             yield from slot.chip.settings()
             slot.has_settings = True
         slot.chip.read()
@@ -337,8 +292,7 @@ class BusReader:
         spec, bus = slot.spec, self.bus
         if spec.mux is not None and spec.channel is not None:
             if spec.mux not in self._muxes:
-                self._muxes[spec.mux] = TCA9548A(
-                    self.bus, spec.mux, verify=self._verify, beside=tuple(self._muxes.values())
-                )
+                verify, muxes = self._reading.verify_mux, self._muxes.values()
+                self._muxes[spec.mux] = TCA9548A(bus, spec.mux, verify=verify, beside=muxes)
             bus = self._muxes[spec.mux].channel(spec.channel)
         return spec.kind.driver(bus, spec, slot.row)

@@ -19,8 +19,6 @@ from edge.clock import Clock
 from edge.skin.skin import Skin
 from edge.touch.frame import Frame
 
-COLLECT_TICKS = 100
-COLLECT_SLACK_S = 0.001
 STOP_S = 0.05
 """A loop that waits longer than this for its tick checks in between whether to end."""
 
@@ -80,17 +78,15 @@ class Stop:
 class Schedule:
     """Ticks at start + k * period: a late tick does not move the next ones.
 
-    Ticks that have passed are left out and counted in `missed`. Garbage is collected here, while
-    there is time to the next tick.
+    Ticks that have passed are left out and counted in `missed_ticks`.
     """
 
     def __init__(self, clock: Clock, period_s: float) -> None:
         self.clock, self.period_s = clock, period_s
-        self.start = math.nan
+        self.start = self._last = math.nan
         self.tick = -1
-        self.missed = 0
+        self.missed_ticks = 0
         self.periods = Periods()
-        self._last = math.nan
 
     def wait(self, stop: Stop | None = None) -> float:
         """Wait for the next tick, or until `stop` is asked for.
@@ -98,25 +94,21 @@ class Schedule:
         Returns:
             The time for which the tick was planned, in seconds.
         """
-        now = self.clock.now()
+        now, stop = self.clock.now(), stop or Stop()
         if self.tick < 0:
-            self.start, self._last = now, math.nan
+            self.start = now
         self.tick += 1
         due = self.start + self.tick * self.period_s
         if now >= due + self.period_s:
-            gone = int((now - due) / self.period_s)
-            self.missed += gone
-            self.tick += gone
+            late = int((now - due) / self.period_s)
+            self.missed_ticks += late
+            self.tick += late
             due = self.start + self.tick * self.period_s
-        elif self.tick % COLLECT_TICKS == 0 and due - now > COLLECT_SLACK_S and not gc.isenabled():
-            gc.collect(1)
-        while stop is not None and not stop.asked and due - now > STOP_S:
-            now += STOP_S
+        while not stop.asked and now < due:
+            now = due if due - now <= STOP_S else now + STOP_S
             self.clock.sleep_until(now)
-        if stop is None or not stop.asked:
-            self.clock.sleep_until(due)
         began = self.clock.now()
-        if not math.isnan(self._last):
+        if self.tick:
             self.periods.add(began - self._last)
         self._last = began
         return due
@@ -124,20 +116,13 @@ class Schedule:
 
 @contextmanager
 def garbage_aside() -> Iterator[None]:
-    """Disable garbage collection in the block; reference counting still works.
-
-    `Schedule.wait` collects the rest between two ticks.
-    """
-    was = gc.isenabled()
+    """Leave the objects there are out of garbage collection, so that one in the block is short."""
     gc.collect()
     gc.freeze()
-    gc.disable()
     try:
         yield
     finally:
         gc.unfreeze()
-        if was:
-            gc.enable()
 
 
 @contextmanager

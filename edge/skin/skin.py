@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
 from edge.i2c.bus import Bus, LinuxBus
+from edge.i2c.chip import ChipSpec
 from edge.skin.baseline import Baseline
-from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, ChipState, Slot
+from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, Slot
 from edge.skin.calibration import dead_band
-from edge.skin.decoder import Decoder, chip_groups
+from edge.skin.decoder import Decoder
 from edge.skin.file import SkinFile, load
 from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
 from edge.skin.read_scheduler import ReadScheduler
@@ -28,29 +29,22 @@ from edge.touch.frame import Frame
 SILENT_FRAMES = 50
 """A taxel without a valid value in so many frames in a row is silent: half a second at 100 Hz,
 within which a taxel returns from any fault that has ended."""
-FOLLOW_FRAMES = 4
-"""The baseline follows drift in one frame of so many: drift is slow, and a step costs time."""
 
 
-@dataclass(frozen=True)
-class ChipStatus:
+class ChipStatus(NamedTuple):
     """The state of one chip.
 
     Attributes:
-        bus, route, kind: place and kind, for a person to read.
-        taxels: flat indices.
-        state: running, starting or down.
+        bus: name of its bus.
+        spec: its kind, place and taxels.
+        state: `running`, `starting` or `down`.
         error: why it is down.
-        recoveries: how often it has come back.
     """
 
     bus: str
-    route: str
-    kind: str
-    taxels: tuple[int, ...]
+    spec: ChipSpec
     state: str
     error: str
-    recoveries: int
 
 
 class Skin:
@@ -90,39 +84,30 @@ class Skin:
         self.touch_counts = threshold if touch_counts is None else min(threshold, touch_counts)
         self.oldest_s = self.period_s * (OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES)
         """How old a taxel's value may be."""
-        groups = chip_groups(file)
-        rows = {i: row for g in groups for i, row in zip(g.chips.tolist(), g.rows, strict=True)}
-        self.readers: list[BusReader] = []
-        for bus, spec in zip(buses, file.buses, strict=True):
-            first = sum(len(reader.slots) for reader in self.readers)
-            reader = BusReader(
-                bus,
-                spec,
-                [rows[first + i] for i in range(len(spec.chips))],
-                verify_mux=file.reading.verify_mux,
-                recheck_frames=file.reading.recheck_frames,
-            )
-            self.readers.append(reader)
+        self._decoder = Decoder(file)
+        rows = iter(self._decoder.rows)
+        self.readers = [
+            BusReader(bus, spec, [next(rows) for _ in spec.chips], file.reading)
+            for bus, spec in zip(buses, file.buses, strict=True)
+        ]
         self._slots = [slot for reader in self.readers for slot in reader.slots]
-        self._decoder = Decoder(file, groups, self._slots)
         calibration, n = file.calibration, file.layout.rows * file.layout.cols
         self.baseline = Baseline(
             np.zeros(n) if calibration is None else calibration.baseline.ravel(),
             sign=self._decoder.sign,
             dead_band=dead_band(file),
-            step_counts=file.signal.drift_counts_per_s * self.period_s * FOLLOW_FRAMES,
+            step_counts=file.signal.drift_counts_per_s * self.period_s,
             limit=file.signal.drift_limit_counts,
         )
         self._last: Frame | None = None
+        self._valid = np.zeros(n, dtype=np.bool_)
         self._invalid_for = np.zeros(n, dtype=np.int64)
         """Frames in a row without a valid value of each taxel."""
         self._silent, self._since_silent = 0, 0
-        self._touched_at = self._followed_at = -math.inf
-        self._since_follow = 0
-        self._states = [_state(slot) for slot in self._slots]
+        self._touched_at = -math.inf
+        self._states = [slot.state for slot in self._slots]
         self._lost = [False for _ in self.readers]
-        self._threads = [ThreadPoolExecutor(1) for _ in self.readers[1:]]
-        """A thread for each bus but the first, which the caller's thread reads."""
+        self._threads = ThreadPoolExecutor(len(self.readers))
 
     @classmethod
     def open(
@@ -162,35 +147,23 @@ class Skin:
             opened.pop_all()
         return skin
 
-    def start(self) -> list[ChipStatus]:
-        """Identify and set up all chips.
-
-        Returns:
-            The chips that are down.
+    def start(self) -> None:
+        """Identify and set up all chips; those that fail are down.
 
         Raises:
             EdgeError: no chip answers.
         """
         for reader in self.readers:
             reader.start()
-        self._states = [_state(slot) for slot in self._slots]
-        down = [s for s in self.status() if s.state != ChipState.RUNNING.value]
-        if len(down) == len(self._slots):
-            raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {down[0].error}")
-        return down
+        self._states = [slot.state for slot in self._slots]
+        if "running" not in self._states:
+            error = self._slots[0].error
+            raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {error}")
 
     def status(self) -> list[ChipStatus]:
         """The state of each chip, in the file's order."""
         return [
-            ChipStatus(
-                bus=reader.bus.name,
-                route=slot.spec.route,
-                kind=slot.spec.kind.name,
-                taxels=slot.spec.taxels,
-                state=_state(slot).value,
-                error="" if slot.error is None else str(slot.error),
-                recoveries=slot.recoveries,
-            )
+            ChipStatus(reader.bus.name, slot.spec, slot.state, str(slot.error or ""))
             for reader in self.readers
             for slot in reader.slots
         ]
@@ -200,24 +173,19 @@ class Skin:
 
         A bus is lost while every chip on it fails, as when its adapter is unplugged.
         """
-        lost = [reader.lost for reader in self.readers]
-        pairs = zip(self.readers, lost, self._lost, strict=True)
-        changed = [(reader.bus.name, now) for reader, now, before in pairs if now != before]
-        self._lost = lost
-        return changed
+        before, self._lost = self._lost, [reader.lost for reader in self.readers]
+        readers = zip(self.readers, before, strict=True)
+        return [(reader.bus.name, reader.lost) for reader, lost in readers if reader.lost != lost]
 
     def changes(self) -> list[ChipStatus]:
         """The chips whose state has changed since the last call, or since the start.
 
         A chip that is down stays so until it runs, whatever is tried.
         """
-        states = [_state(slot) for slot in self._slots]
-        if states == self._states:
+        before, self._states = self._states, [slot.state for slot in self._slots]
+        if before == self._states:
             return []
-        pairs = zip(self.status(), states, self._states, strict=True)
-        changed = [status for status, now, before in pairs if now != before]
-        self._states = states
-        return changed
+        return [s for s, state in zip(self.status(), before, strict=True) if s.state != state]
 
     @property
     def invalid_for(self) -> NDArray[np.int64]:
@@ -254,37 +222,30 @@ class Skin:
 
     def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
         """The last frame's raw values (rows, cols), and which of them are valid."""
-        assert self._last is not None
-        assert self._last.valid is not None
-        return self._decoder.values.reshape(self.layout.shape), self._last.valid
+        shape = self.layout.shape
+        return self._decoder.values.reshape(shape), self._valid.reshape(shape)
 
     def _transfer(self, t: float) -> None:
+        """Read the buses side by side, each in a thread."""
         jobs: list[list[Slot]] = [reader.slots for reader in self.readers]
         if self.scheduler is not None:
             chosen = self.scheduler.plan(self._last, self.touch_counts)
-            jobs = [
-                [reader.slots[i] for i in indices]
-                for reader, indices in zip(self.readers, chosen, strict=True)
-            ]
-        deadline = t + self.period_s - LONGEST_STEP_S
-        beside = [
-            thread.submit(reader.read, job, deadline)
-            for thread, reader, job in zip(self._threads, self.readers[1:], jobs[1:], strict=True)
-        ]
-        try:
-            self.readers[0].read(jobs[0], deadline)
-        finally:
-            wait(beside)
-        for reading in beside:
-            reading.result()
+            jobs = [[job[i] for i in indices] for job, indices in zip(jobs, chosen, strict=True)]
+        deadlines = [t + self.period_s - LONGEST_STEP_S] * len(jobs)
+        list(self._threads.map(BusReader.read, self.readers, jobs, deadlines))
 
     def _assemble(self, t: float) -> Frame:
-        valid = self._decoder.decode(t, t - self.oldest_s)
+        self._valid = valid = self._decoder.decode(self._slots, t, t - self.oldest_s)
         counts = self.baseline.above(self._decoder.values)
         counts *= valid
         self._invalid_for += 1
         self._invalid_for *= self._decoder.served & ~valid
-        self._follow(counts, valid, t)
+        # The baseline follows drift, except during a contact and shortly after it.
+        if int(counts.max()) > self.touch_counts:
+            self._touched_at = t
+        settled = t - self._touched_at >= self.file.signal.settle_s
+        if settled and self.file.calibration is not None:
+            self.baseline.follow(self._decoder.values, valid)
         shape = self.layout.shape
         self._last = Frame(
             t=t,
@@ -294,25 +255,9 @@ class Skin:
         )
         return self._last
 
-    def _follow(self, counts: NDArray[np.uint16], valid: NDArray[np.bool_], t: float) -> None:
-        """Let the baseline follow drift, except during a contact and shortly after it."""
-        if self.file.calibration is None:
-            return
-        if int(counts.max()) > self.touch_counts:
-            self._touched_at = t
-        self._since_follow += 1
-        if self._since_follow < FOLLOW_FRAMES:
-            return
-        self._since_follow = 0
-        if t - self._touched_at >= self.file.signal.settle_s:
-            fresh = self._decoder.times >= self._followed_at
-            self.baseline.follow(self._decoder.values, valid & fresh)
-        self._followed_at = t
-
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""
-        for thread in self._threads:
-            thread.shutdown()
+        self._threads.shutdown()
         for reader in self.readers:
             reader.bus.close()
 
@@ -321,11 +266,6 @@ class Skin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _state(slot: Slot) -> ChipState:
-    """The state of a chip for a person: it is down until it runs, whatever is being tried."""
-    return slot.state if slot.error is None else ChipState.DOWN
 
 
 def _open(spec: BusSpec, timeout_s: float) -> Bus:

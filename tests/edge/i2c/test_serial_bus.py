@@ -5,7 +5,7 @@ import pty
 import threading
 import time
 import tty
-from contextlib import suppress
+from select import select
 
 import numpy as np
 import pytest
@@ -76,16 +76,21 @@ class Board:
         tty.setraw(slave)
         self.port = os.ttyname(slave)
         self.slave = slave
-        threading.Thread(target=self._serve, args=(self.master,), daemon=True).start()
+        self.serving = threading.Thread(target=self._serve, args=(self.master,), daemon=True)
+        self.serving.start()
 
     def unplug(self):
+        master, self.master = self.master, None
+        self.serving.join()
         os.close(self.slave)
-        os.close(self.master)
+        os.close(master)
 
     def _serve(self, master):
         received = b""
         try:
-            while True:
+            while self.master == master:
+                if not select([master], [], [], 0.01)[0]:
+                    continue
                 received += os.read(master, 256)
                 while b"\0" in received:
                     packet, _, received = received.partition(b"\0")
@@ -107,7 +112,7 @@ class Board:
 def board():
     board = Board()
     yield board
-    with suppress(OSError):
+    if board.master is not None:
         board.unplug()
 
 

@@ -32,8 +32,10 @@ def test_each_channel_is_a_bus_with_its_own_chip():
 
 
 def test_two_muxes_on_one_bus_are_never_open_at_once():
-    bus, first = muxed()
-    second = TCA9548A(bus, 0x71, beside=(first,))
+    bus, muxes = muxed()[0], []
+    for address in (0x70, 0x71):
+        muxes.append(TCA9548A(bus, address, beside=muxes))
+    first, second = muxes
     chips = [AD7147(mux.channel(2), 0x2C) for mux in (first, second)]
     for chip in chips:
         list(chip.settings())
@@ -62,13 +64,13 @@ def test_after_an_error_the_channel_is_selected_again():
     bus, mux = muxed()
     channel = mux.channel(4)
     chip = AD7147(channel, 0x2C)
-    assert mux.selected == 4
+    assert mux.control == 1 << 4
     bus.inject([Fault(code=errno.EIO, at=[0])])
     with pytest.raises(BusFault):
         channel.transfer(chip.frame)
-    assert mux.selected is None
+    assert mux.control is None
     channel.transfer(chip.frame)
-    assert mux.selected == 4
+    assert mux.control == 1 << 4
 
 
 def test_a_wrong_channel_is_caught_by_reading_back_and_only_by_it():
@@ -76,7 +78,7 @@ def test_a_wrong_channel_is_caught_by_reading_back_and_only_by_it():
     bus.inject([Fault(kind="misroute", at=[0])])
     with pytest.raises(BusFault):
         mux.select(1)
-    assert mux.selected is None
+    assert mux.control is None
     bus, mux = muxed(verify=False)
     bus.inject([Fault(kind="misroute", at=[0])])
     mux.select(1)
@@ -84,9 +86,11 @@ def test_a_wrong_channel_is_caught_by_reading_back_and_only_by_it():
 
 
 def test_a_mux_beside_that_has_gone_does_not_cost_this_one():
-    bus, first = muxed()
-    second = TCA9548A(bus, 0x71, beside=(first,))
+    bus, muxes = muxed()[0], []
+    for address in (0x70, 0x71):
+        muxes.append(TCA9548A(bus, address, beside=muxes))
+    first, second = muxes
     second.select(0)
     del bus.chips[0x71]
     first.select(3)
-    assert first.selected == 3
+    assert first.control == 1 << 3

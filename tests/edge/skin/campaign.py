@@ -148,7 +148,7 @@ def run(name, file, faults, *, touched=None, end_s=END_S, seconds=2.2, overhead_
             elif math.isnan(back):
                 back = skin.clock.now() - start - end_s
         met = sum(reader.bus.script.met for reader in skin.readers)
-    return Outcome(name, met, wrong, missing, others, schedule.missed, back)
+    return Outcome(name, met, wrong, missing, others, schedule.missed_ticks, back)
 
 
 def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
@@ -216,7 +216,7 @@ def brown_out(name, file, *, at=(3,), overhead_s=0.0):
                 back = math.inf
             elif back == math.inf:
                 back = frame.t + skin.period_s
-    return Outcome(name, len(at), wrong, missing, 0, schedule.missed, back - end)
+    return Outcome(name, len(at), wrong, missing, 0, schedule.missed_ticks, back - end)
 
 
 def models(bus):

@@ -141,7 +141,11 @@ def felt(file, recording, info):
             if contact is not None and frame.t > contact.onset_s + info.window_s + 0.05:
                 break
     vector = feature_vector(contact.series(), info.window_s)
-    return vector.reshape(len(FEATURES), -1), contact.onset_s - playback.start, loop.schedule.missed
+    return (
+        vector.reshape(len(FEATURES), -1),
+        contact.onset_s - playback.start,
+        loop.schedule.missed_ticks,
+    )
 
 
 def test_features_and_decisions_agree_with_full_reading(recordings, exported):
