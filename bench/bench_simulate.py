@@ -15,7 +15,7 @@ import mujoco
 import pytest
 
 from train.simulate.run import parts, simulate_trials
-from train.simulate.scene import COLUMN_ANGLES_DEG, load
+from train.simulate.scene import CODY_SKIN, load
 
 SCENES = Path(__file__).parents[1] / "train" / "scenes"
 PEERS = {
@@ -33,7 +33,7 @@ def mujoco_trial(solref, joint):
     against a box."""
     taxels, sensors = "", ""
     for row in range(16):
-        for column, degrees in enumerate(COLUMN_ANGLES_DEG):
+        for column, degrees in enumerate(CODY_SKIN["column_angles_deg"]):
             angle = math.radians(degrees)
             x, y, z = 0.043 * math.cos(angle), 0.043 * math.sin(angle), (7.5 - row) * 0.0108
             taxels += (

@@ -19,7 +19,7 @@ from bench import mujoco_layer
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS, COLUMN_ANGLES_DEG
+from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
 
 START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
 RATE_DEG_S = 20.0
@@ -142,7 +142,7 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
     if is_layer(touch):
         contact, dimensions, loss = mujoco_layer.CONTACT, 1, 2.0 * math.sqrt(k * PAD_KG)
     for row in range(ROWS):
-        for column, angle in enumerate(COLUMN_ANGLES_DEG):
+        for column, angle in enumerate(CODY_SKIN["column_angles_deg"]):
             if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
                 continue
             out = f"{math.cos(math.radians(angle))} {math.sin(math.radians(angle))} 0"
@@ -305,7 +305,7 @@ def simulate(touch: Touch) -> Touched:
     # A soft thing is felt later, the more so the slower the arm.
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     for _ in range(round(lasts_s * RATE_HZ) + 1):
-        loads = np.zeros((ROWS, len(COLUMN_ANGLES_DEG)))
+        loads = np.zeros((ROWS, CODY_SKIN["cols"]))
         loads[row, column] = np.maximum(-pad_n_m(touch) * data.qpos[springs], 0.0)
         counts = loads * COUNTS_PER_NEWTON
         if touch.noise is not None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch.arm import Chain
+from edge.touch.arm import ZERO, Chain, Joint
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Places = NDArray[np.intp]
 
 
 class Link(NamedTuple):
@@ -62,19 +65,18 @@ class Kinematics:
             InputError: a joint slides.
         """
         self.links: list[Link] = []
-        pending = (np.zeros(3), np.eye(3))
+        fixed: list[Joint] = []
         for joint in chain.joints:
             if joint.kind == "prismatic":
                 raise InputError(
                     f"joint {joint.name!r} slides; the simulator's arms only turn: make it fixed"
                 )
-            before = _joined(pending, _fixed(joint.origin_xyz, joint.origin_rpy))
-            pending = _fixed(joint.translate, (0.0, 0.0, 0.0))
-            if joint.kind == "fixed":
-                pending = _joined(before, pending)
-                continue
-            self.links.append(_link(before, np.array(joint.axis) / math.hypot(*joint.axis)))
-        self.tail = _link(pending, np.zeros(3))
+            fixed.append(replace(joint, kind="fixed", translate=ZERO))
+            if joint.kind != "fixed":
+                self.links.append(_link(fixed, np.array(joint.axis) / math.hypot(*joint.axis)))
+                fixed = []
+            fixed.append(Joint(joint.name, joint.axis, "fixed", origin_xyz=joint.translate))
+        self.tail = _link(fixed, np.zeros(3))
         unlimited = (-math.inf, math.inf)
         self.limits = np.array([pair or unlimited for pair in chain.limits]).T[:, :, None]
 
@@ -94,30 +96,16 @@ class Kinematics:
         return Pose(origin, rotation, axes, origins)
 
 
-def _link(before: tuple[Array, Array], axis: Array) -> Link:
-    shift, turn = before
-    main = int(np.argmax(np.abs(axis)))
+def _link(fixed: list[Joint], axis: Array) -> Link:
+    """The step of fixed joints, then a joint that turns about an axis."""
+    step = Chain(fixed).pose([])
+    turn, main = step[:3, :3], int(np.argmax(np.abs(axis)))
     return Link(
-        shift,
+        step[:3, 3],
         None if np.array_equal(turn, np.eye(3)) else turn,
         axis,
         main if abs(axis[main]) == 1.0 else None,
     )
-
-
-def _fixed(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[Array, Array]:
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
-    turn = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return np.array(xyz), np.array(turn)
-
-
-def _joined(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Array]:
-    """The transform a, then b."""
-    return a[0] + a[1] @ b[0], a[1] @ b[1]
 
 
 def _combined(parts: Array, rotation: Array) -> Array:

@@ -8,10 +8,9 @@ import math
 import numpy as np
 
 from edge.errors import InputError
-from train.simulate.arm import Array, cross, dot
-from train.simulate.contact import closed_form, covered, curve_gap, share_out, spring_loads, total
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.arm import cross, dot
+from train.simulate.contact import closed_form, covered, curve_gap, share_out, spring_loads
+from train.simulate.trials import Array, Index, Trials, pick, total
 
 STILL_M_S = 1e-6
 """A forearm slower than this counts as still."""
@@ -90,7 +89,7 @@ def lay(t: Trials, i: Index) -> None:
 def lay_rows(t: Trials, i: Index) -> None:
     """Find the part of each row that the face covers, and how far the face draws back there."""
     offset, radius = t.row_z - pick(t.z, i), pick(t.values["radius_m"], i)
-    t.weight[:, i] = covered(offset, pick(t.values["width_m"], i), t.skin.row_pitch_m)
+    t.weight[:, i] = covered(offset, pick(t.values["width_m"], i), t.skin.pitch[0])
     t.line_gap[:, i] = np.where(radius < FLAT_M, curve_gap(offset, radius), 0.0)
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from train.simulate.arm import Array
 from train.simulate.contact import total
-from train.simulate.engine import PLACED, PhysicsRun, begin, run_physics
+from train.simulate.engine import begin, run_physics
 from train.simulate.plan import ALL, PACE, make_plan
-from train.simulate.scene_model import Scene, TrialSpec
+from train.simulate.scene_model import Scene, TrialSpec, Value
 
 HALVINGS = 4
 """Most halvings of a frame."""
@@ -58,36 +58,18 @@ class Convergence:
     within: bool
 
 
-def middle_values(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
-    """{name: (n,)} the values in the middle of every range, without spread."""
-    middles = [
-        {
-            **dict.fromkeys(PLACED, 0.0),
-            **{name: value.middle for name, value in spec.object.values.items()},
-            "lead_s": scene.lead.middle,
-            "taxel_n_m": scene.taxel_n_m.middle,
-        }
-        for spec in specs
-    ]
-    names = {name: None for values in middles for name in values}
-    return {name: np.array([values.get(name, math.nan) for values in middles]) for name in names}
+def at_middle(scene: Scene) -> Scene:
+    """The scene with the value in the middle of every range, without spread."""
 
+    def middle(value: Value) -> Value:
+        return Value(value.middle, value.middle)
 
-def physics(
-    scene: Scene, specs: Sequence[TrialSpec], step_s: float | None = None, *, paced: bool = True
-) -> PhysicsRun:
-    """Forces and joints of the middle trials.
-
-    Args:
-        step_s: the step of all trials; None leaves each its own.
-        paced: False keeps the steps near a jolt as long as elsewhere.
-    """
-    specs = tuple(spec if step_s is None else replace(spec, step_s=step_s) for spec in specs)
-    plan = make_plan(scene, specs)
-    if not paced:
-        plan = replace(plan, stages={**plan.stages, **{stage: [] for stage in PACE}})
-    values = middle_values(scene, specs)
-    return run_physics(scene, specs, plan=plan, values=values, images=False)
+    objects = tuple(
+        replace(item, values={key: middle(value) for key, value in item.values.items()})
+        for item in scene.objects
+    )
+    lead, taxel = middle(scene.lead), middle(scene.taxel_n_m)
+    return replace(scene, spread={}, objects=objects, lead=lead, taxel_n_m=taxel)
 
 
 @dataclass
@@ -95,8 +77,8 @@ class _Kind:
     """One trial of each object and condition of a kind, the steps tried and their forces."""
 
     specs: list[TrialSpec]
-    steps_s: list[float]
-    forces: list[Array]
+    steps_s: list[float] = field(default_factory=list)
+    forces: list[Array] = field(default_factory=list)
 
     def errors(self, count: int | None = None) -> list[float]:
         """The extrapolated error of each step but the last, from the first `count` runs."""
@@ -114,9 +96,13 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
     judged.
     """
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
-    scene = replace(scene, trials={**scene.trials, "after_s": after_s})
+    scene = at_middle(replace(scene, trials={**scene.trials, "after_s": after_s}))
     tolerance, frame_s = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
-    kinds = [_Kind(_spread_out(specs), [], []) for specs in groups]
+    objects = {item.slug: item for item in scene.objects}
+    kinds = [
+        _Kind([replace(spec, object=objects[spec.object.slug]) for spec in _spread_out(specs)])
+        for specs in groups
+    ]
     first = [(kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)]
     _run(scene, first)
     rough = [kind for kind in kinds if not kind.errors()[-2] <= tolerance]
@@ -137,11 +123,14 @@ def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
 
 
 def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:
-    """Run each kind at a further step, all side by side."""
+    """Run each kind at a further step, all side by side; `paced` shortens steps near a jolt."""
     if not work:
         return
-    specs = [replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs]
-    forces = physics(scene, specs, paced=paced).force
+    specs = tuple(replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs)
+    plan = make_plan(scene, specs)
+    if not paced:
+        plan = replace(plan, stages={**plan.stages, **{stage: [] for stage in PACE}})
+    forces = run_physics(scene, specs, plan=plan, images=False).force
     for (kind, step_s), force in zip(work, _by_kind(forces, [k for k, _ in work]), strict=True):
         kind.steps_s.append(step_s)
         kind.forces.append(force)
@@ -182,7 +171,7 @@ def _order(changes: list[float]) -> float:
 def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
     """For each kind, the step that resolves how its lightest object swings on the skin."""
     specs = tuple(spec for kind in kinds for spec in kind.specs)
-    t = begin(scene, specs, values=middle_values(scene, specs))
+    t = begin(scene, specs)
     stiffness = total(t.weight) * total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
     if "stems" in t.own:
         stems = total(t.own["stems"].stiffness)

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from edge.errors import EdgeError, InputError
 from train.simulate import streams
 from train.simulate.arm import Array
-from train.simulate.energy import check_energy
 from train.simulate.plan import ALL, FRAME, PACE, SAMPLE, SENSOR, SETUP, STEP, TUNE, Plan, make_plan
 from train.simulate.readings import FULL, Readings
 from train.simulate.scene_model import Scene, TrialSpec, Value
 from train.simulate.schema import STIFFNESSES
 from train.simulate.trials import Trials
 
+ENERGY_MADE = 0.01
+"""Tolerance as a part of the work put in, since frames only sample that work."""
 SCALED = {
     "stiffness": STIFFNESSES,
     "friction": ("friction_static", "friction_kinetic"),
@@ -84,28 +85,13 @@ def frame_count(scene: Scene) -> int:
     return round(duration * scene.trials["rate_hz"]) + 1
 
 
-def begin(
-    scene: Scene,
-    specs: tuple[TrialSpec, ...],
-    *,
-    plan: Plan | None = None,
-    values: dict[str, Array] | None = None,
-) -> Trials:
-    """Trials before their first step.
-
-    Args:
-        plan: the hooks to run; None makes them.
-        values: {name: (n,)} in place of the scene's draws.
+def begin(scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None) -> Trials:
+    """Trials before their first step, with the hooks of a plan (None makes it).
 
     Raises:
         InputError: an object touches the arm before it moves.
     """
-    t = Trials(
-        scene,
-        specs,
-        values_of(scene, specs) if values is None else values,
-        make_plan(scene, specs) if plan is None else plan,
-    )
+    t = Trials(scene, specs, values_of(scene, specs), plan or make_plan(scene, specs))
     t.plan.run((*SETUP, *TUNE), t)
     check_start(t)
     return t
@@ -157,27 +143,26 @@ def run_physics(
     specs: tuple[TrialSpec, ...],
     *,
     plan: Plan | None = None,
-    values: dict[str, Array] | None = None,
     images: bool = True,
 ) -> PhysicsRun:
     """The physics of trials run side by side, each with the same bits as it has alone.
 
     Args:
-        plan, values: as of `begin`.
+        plan: as of `begin`.
         images: False leaves out the load on the taxels.
 
     Raises:
         InputError: as of `begin`.
         EdgeError: the solver did not find a contact's loads, or a trial gained energy.
     """
-    t = begin(scene, specs, plan=plan, values=values)
+    t = begin(scene, specs, plan=plan)
     frames = frame_count(scene)
     joints, force = np.empty((t.n, frames, len(t.q))), np.zeros((t.n, frames))
     sources = {"depth_m": (t, "deepest"), **t.plan.traces(t.own)}
     traces = {name: np.zeros((t.n, frames)) for name in sources}
     window = np.zeros((t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32)
     joints[:, 0] = t.q.T
-    scale, active = scene.skin.counts_per_newton or 1.0, np.arange(t.n)
+    scale, active = scene.skin.counts_per_newton, np.arange(t.n)
     running: Any = ALL
     while active.size:
         starts = active[t.left[active] == 0]
@@ -237,6 +222,45 @@ def check_found(t: Trials) -> None:
         raise EdgeError(
             f"{t.scene.name}: the forearm's tilt was not found in {np.count_nonzero(t.lost)} "
             "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+        )
+
+
+def check_energy(t: Trials, joints: Array, times: Array) -> None:
+    """Check that no trial gains energy.
+
+    Only the motion of the equilibrium point puts energy in, W = int k (q_eq - q) dq_eq. The joints'
+    damping takes at least d (dq)^2 / dt of it in each frame. So the arm's springs store at most the
+    rest, plus the energy of the arm's motion at the start. A contact may give back what it has
+    taken, but no more. A step that makes energy breaks this bound at once.
+
+    Args:
+        joints: (n, frames, dof) radians.
+        times: (frames,) seconds.
+
+    Raises:
+        EdgeError: a trial gains energy; the sentence names the first one.
+    """
+    scene, k = t.scene, t.joint_k.T
+    moving = 0.5 * sum(i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False))
+    targets = t.start.T[:, None] + t.rate.T * np.minimum(times[:, None], t.travel_s.T[:, None])
+    torque = k * (targets - joints)
+    stored = (0.5 * torque * (targets - joints)).sum(axis=2)
+    put_in = (0.5 * (torque[:, 1:] + torque[:, :-1]) * np.diff(targets, axis=1)).sum(axis=2)
+    turned = t.damping.T * np.diff(joints, axis=1) ** 2 / np.diff(times)[:, None]
+    work, both_ways, lost = (
+        np.pad(np.add.accumulate(part, axis=1), ((0, 0), (1, 0)))
+        for part in (put_in, np.abs(put_in), turned.sum(axis=2))
+    )
+    held, brought = stored + lost, stored[:, :1] + moving + work
+    made = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)
+    if made.any():
+        i = int(np.argmax(made.any(axis=1)))
+        frame = int(np.argmax(made[i]))
+        raise EdgeError(
+            f"{scene.name}: trial {t.specs[i].number} of {t.specs[i].key} makes energy: "
+            f"at {times[frame]:g} s the arm has stored or lost {held[i, frame]:.3g} J of the "
+            f"{brought[i, frame]:.3g} J put in; give [step_s] a smaller step, or the "
+            "object less extreme values"
         )
 
 

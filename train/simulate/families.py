@@ -8,27 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from edge.touch.layout import SkinLayout
 from train.simulate import streams
 from train.simulate.contact import GRAVITY
-from train.simulate.scene_model import SceneTable
-from train.simulate.schema import (
-    CONDITIONS,
-    FAMILIES,
-    FAMILY_KEYS,
-    LABELS,
-    OBJECT,
-    Field,
-    keys_of,
-)
+from train.simulate.scene_model import Cylinder, SceneTable
+from train.simulate.schema import CONDITIONS, FAMILIES, LABELS, OBJECT, Field, keys_of
 
 PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
-COUNTED = ("stem_count",)
 DRAWS = 1000
 
 
 def draw_family(
-    table: SceneTable, seed: int, push_n: float, skin: SkinLayout
+    table: SceneTable, seed: int, push_n: float, skin: Cylinder
 ) -> Iterator[dict[str, Any]]:
     """The objects of one [[family]], as [[object]] tables.
 
@@ -42,7 +32,7 @@ def draw_family(
         InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
     """
     name = table.text("name")
-    family = table.choice("family", FAMILIES)
+    family = table.choice("family", tuple(FAMILIES))
     conditions = table.names("conditions", CONDITIONS)
     count = table.whole("count", allowed=range(1, 1001))
     part = table.value("kinetic_part", PART, [0.8, 0.95])
@@ -53,7 +43,7 @@ def draw_family(
     ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in given}
     movable = "movable" in conditions
     shared = {"family": family, "conditions": list(conditions)}
-    usual = FAMILY_KEYS[family]
+    usual = {key: default for key, default in keys_of(family).items() if default is not None}
     generator = streams.stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
@@ -70,7 +60,7 @@ def draw_family(
         else:
             wanted = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", wanted)
-        counts = {k: round(drawn[k]) for k in COUNTED if k in drawn}
+        counts = {key: round(value) for key, value in drawn.items() if OBJECT[key].whole}
         yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **counts}
 
 
@@ -79,15 +69,14 @@ PRESSED_M = 0.06
 the arm moves 0.15 m in a second, and gives way itself."""
 
 
-def passed_on(drawn: Mapping[str, float], skin: SkinLayout) -> float:
+def passed_on(drawn: Mapping[str, float], skin: Cylinder) -> float:
     """Newtons that an object passes on to its foot: the force that presses its stems or its elastic
     layer (`effects.foundation`) `PRESSED_M` deep; infinite for other objects."""
-    if "stem_n_m" in drawn and "stem_count" in drawn:
+    if "stem_n_m" in drawn:
         return round(drawn["stem_count"]) * drawn["stem_n_m"] * PRESSED_M
-    if "modulus_pa" in drawn and "depth_m" in drawn:
-        along = skin.pitch_m[0] if isinstance(skin.pitch_m, tuple) else skin.pitch_m or 0.0
-        length = min(drawn.get("width_m", math.inf), skin.rows * along)
-        half_width = math.sqrt(2.0 * (skin.radius_m or 0.0) * PRESSED_M)
+    if "modulus_pa" in drawn:
+        length = min(drawn["width_m"], skin.rows * skin.pitch[0])
+        half_width = math.sqrt(2.0 * skin.radius_m * PRESSED_M)
         per_length = 4.0 / 3.0 * drawn["modulus_pa"] / drawn["depth_m"] * PRESSED_M * half_width
         return length * per_length
     return math.inf

@@ -17,13 +17,7 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
-from train.simulate.schema import (
-    EFFECTS,
-    IMPLIED_BY_CONDITION,
-    IMPLIED_BY_FAMILY,
-    LABELLED_BY,
-    SHARED,
-)
+from train.simulate.schema import EFFECTS, FAMILIES, IMPLIED_BY_CONDITION, SHARED
 
 Index = Any
 """Some of the trials: an array of their places, or `ALL`."""
@@ -170,7 +164,7 @@ def settings(scene: Scene, effect: str) -> dict[str, float]:
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
     """{effect: the reason for it} of an object in a condition, in the order of `EFFECTS`."""
     required: dict[str, str] = {}
-    for name in IMPLIED_BY_FAMILY.get(item.family, ()):
+    for name in FAMILIES[item.family].effects:
         required[name] = f"family {item.family}"
     for name in IMPLIED_BY_CONDITION.get(condition, ()):
         required[name] = condition
@@ -207,12 +201,12 @@ def check_supported(scene: Scene, where: str) -> None:
     """
     for name in scene.leave_out:
         for item in scene.objects:
-            label = LABELLED_BY.get(name, {}).get(item.family, "")
-            moves = name == "sliding" and "movable" in item.conditions
-            if label or moves:
+            yields = name in FAMILIES[item.family].effects[:1]
+            if yields or (name == "sliding" and "movable" in item.conditions):
                 raise InputError(
                     f"{where}: effects.leave_out leaves out {name}, without which object "
-                    f"{item.name!r} would not be {label or 'movable'}, as its label says"
+                    f"{item.name!r} would not be {'soft' if yields else 'movable'}, as its label "
+                    "says"
                 )
     required_by_object = [
         required_effects(scene, o, c) for o in scene.objects for c in o.conditions

@@ -21,11 +21,12 @@ from train.simulate.convergence import Convergence, measure
 from train.simulate.engine import PhysicsRun, begin, readings
 from train.simulate.plan import required_effects
 from train.simulate.scene_model import Scene, TrialSpec
-from train.simulate.schema import SOFT_FAMILIES
+from train.simulate.schema import FAMILIES
 from train.simulate.truth import true_runs
 
-BATCH = 1024
-"""Most trials simulated side by side; each takes about 0.4 MB of memory."""
+BATCH = 400
+"""Most trials simulated side by side. Larger batches save little, as their arrays no longer fit
+into a processor's cache; each trial takes about 0.4 MB of memory."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def recordings(
         trial, kept = seen.trial, slice(None) if seen.kept is None else seen.kept
         t = seen.t if seen.times is None else seen.times
         drawn = {name: value[seen.which] for name, value in values.items()}
-        soft = "soft" if trial.object.family in SOFT_FAMILIES else "rigid"
+        soft = "soft" if FAMILIES[trial.object.family].thickness else "rigid"
         file = file_name(scene, trial)
         meta: dict[str, Any] = {
             "labels": {

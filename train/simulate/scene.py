@@ -6,18 +6,18 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
+from edge.skin.file import shipped
 from edge.touch.arm import Chain
-from edge.touch.layout import RELEASE_S, SkinLayout
 from train.simulate import schema
 from train.simulate.arm import Kinematics
 from train.simulate.families import draw_family
 from train.simulate.plan import check_supported
-from train.simulate.scene_model import Scene, SceneObject, SceneTable, Value
-from train.simulate.schema import EFFECTS
+from train.simulate.scene_model import Cylinder, Scene, SceneObject, SceneTable, Value
+from train.simulate.schema import EFFECTS, OBJECT
 from train.simulate.streams import FARTHEST
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
@@ -33,26 +33,8 @@ gains above give the lab arm's 115 N/m at mid-forearm."""
 PLACE_M = 0.103
 """The middle of Cody's 16 rows, rounded to a millimetre."""
 
-COLUMN_ANGLES_DEG = (
-    *(-82.05, -67.25, -52.44, -37.22, -22.42, -7.61, 7.61, 22.42, 37.22, 52.44, 67.25, 82.05),
-    *(97.95, 112.75, 127.56, 142.78, 157.58, 172.39),
-    *(-172.39, -157.58, -142.78, -127.56, -112.75, -97.95),
-)
-CODY_SKIN: dict[str, Any] = {
-    "rows": 16,
-    "cols": 24,
-    "wraps": True,
-    "pitch_m": [0.0108, 0.01205],
-    "radius_m": 0.04604,
-    "row0_z_m": 0.18432,
-    "column_angles_deg": list(COLUMN_ANGLES_DEG),
-}
-SCALE: dict[str, Any] = {
-    "counts_per_newton": 1000.0,
-    "threshold_counts": 100,
-    "onset_counts": 200,
-    "release_s": RELEASE_S,
-}
+CODY_SKIN: dict[str, Any] = dict(read_toml(shipped()).raw["skin"])
+del CODY_SKIN["name"]
 
 
 def load(
@@ -86,10 +68,8 @@ def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
             "scene instead, and give the differences here"
         )
     for key, value in table.items():
-        old = out.get(key)
-        out[key] = value
-        if isinstance(old, Mapping) and isinstance(value, Mapping):
-            out[key] = {**old, **value}
+        merges = isinstance(out.get(key), Mapping) and isinstance(value, Mapping)
+        out[key] = {**out[key], **value} if merges else value
     return out
 
 
@@ -104,19 +84,27 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     trials = top.table("trials", {})
     lead = trials.value("lead_s", schema.LEAD)
     each = trials.fields(schema.TRIALS)
-    chain, *gains = _arm(top.table("arm", {}))
+    arm = _arm(top.table("arm", {}))
     skin, taxel = _skin(top.table("skin", {}))
-    motion = top.table("motion", {})
-    start, rate, travel_s, place_m = _motion(motion, chain, skin)
-    stroke_s = _stroke(chain, start, rate, travel_s)
-    if lead.high >= stroke_s:
-        raise InputError(
-            f"{where}: the arm's stroke ends after {stroke_s:g} s (motion.travel_s, or a joint's "
-            f"limit), before it meets an object at {lead.high:g} s (trials.lead_s)"
-        )
-    labels = top.table("labels", {}).fields(schema.LABELS)
-    add, leave_out, settings = _effects(top.table("effects", {}))
     spread = top.table("spread", {}).fields(schema.SPREAD)
+    labels = top.table("labels", {}).fields(schema.LABELS)
+    scene = Scene(
+        name=top.text("name", Path(where).stem or "scene"),
+        seed=seed,
+        trials=each,
+        step_s=_steps(top.table("step_s", {}), each["rate_hz"]),
+        lead=lead,
+        skin=skin,
+        taxel_n_m=taxel,
+        spread=spread,
+        labels=labels,
+        **arm,
+        **_motion(top.table("motion", {}), arm["arm"], skin, lead),
+        **_effects(top.table("effects", {})),
+        objects=_objects(top, seed, labels["push_n"], skin, spread),
+    )
+    top.done()
+    place_m = scene.place_m
     room_m = min(skin.row0_z_m - place_m, place_m - _last_row_m(skin)) / FARTHEST
     if spread["place_m"] > room_m + 1e-12:
         raise InputError(
@@ -124,30 +112,6 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
             f"{spread['place_m']:g}: some objects would be met beyond the skin's rows, as "
             f"motion.place_m is {place_m:g} and draws lie up to {FARTHEST:g} times the spread away"
         )
-    scene = Scene(
-        name=top.text("name", Path(where).stem or "scene"),
-        seed=seed,
-        trials=each,
-        step_s=_steps(top.table("step_s", {}), each["rate_hz"]),
-        lead=lead,
-        arm=chain,
-        stiffness=gains[0],
-        damping=gains[1],
-        inertia=gains[2],
-        start=start,
-        rate=rate,
-        travel_s=travel_s,
-        skin=skin,
-        taxel_n_m=taxel,
-        place_m=place_m,
-        spread=spread,
-        labels=labels,
-        objects=_objects(top, seed, labels["push_n"], skin, spread),
-        add=add,
-        leave_out=leave_out,
-        settings=settings,
-    )
-    top.done()
     for key, needed in schema.SPREAD_OF_MOVABLE.items():
         if spread[key] > 0.0 and not any(key in item.given for item in scene.objects):
             raise InputError(
@@ -172,7 +136,7 @@ def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
     return out
 
 
-def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
+def _arm(table: SceneTable) -> dict[str, Any]:
     """The chain, and each joint's stiffness, damping and inertia, which may be unknown."""
     name = table.text("chain", "cody")
     path = Path(table.where).parent / name
@@ -186,23 +150,21 @@ def _arm(table: SceneTable) -> tuple[Chain, *tuple[tuple[float, ...], ...]]:
         Kinematics(chain)
     except InputError as error:
         raise InputError(f"{table.called('chain')}: {error}") from None
-    gains = []
-    for key, cody, absent in (
-        ("stiffness_nm_rad", CODY_STIFFNESS, REQUIRED),
-        ("damping_nms_rad", CODY_DAMPING, REQUIRED),
-        ("inertia_kg_m2", CODY_INERTIA, ()),
+    out: dict[str, Any] = {"arm": chain}
+    for field, key, cody, absent in (
+        ("stiffness", "stiffness_nm_rad", CODY_STIFFNESS, REQUIRED),
+        ("damping", "damping_nms_rad", CODY_DAMPING, REQUIRED),
+        ("inertia", "inertia_kg_m2", CODY_INERTIA, ()),
     ):
         default = cody if name == "cody" else absent
         count = chain.dof if table.has(key) or default else 0
-        above_0 = key == "stiffness_nm_rad"
-        gains.append(table.numbers(key, count, default, low=0.0, open_low=above_0))
+        above_0 = field == "stiffness"
+        out[field] = table.numbers(key, count, default, low=0.0, open_low=above_0)
     table.done()
-    return chain, *gains
+    return out
 
 
-def _motion(
-    table: SceneTable, chain: Chain, skin: SkinLayout
-) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
+def _motion(table: SceneTable, chain: Chain, skin: Cylinder, lead: Value) -> dict[str, Any]:
     """Start and rate of each joint in radians, seconds of travel, and the place of the contact."""
     start, rate = (
         table.numbers(key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0)
@@ -221,29 +183,29 @@ def _motion(
     usual_m = PLACE_M if last_m <= PLACE_M <= skin.row0_z_m else middle_m
     place_m = table.number("place_m", usual_m, last_m, skin.row0_z_m)
     table.done()
-    return tuple(map(math.radians, start)), tuple(map(math.radians, rate)), travel_s, place_m
+    start, rate = (tuple(map(math.radians, degrees)) for degrees in (start, rate))
+    # The stroke ends once the last moving joint's equilibrium point stops at its limit.
+    stops_s = [
+        (limits[speed > 0.0] - angle) / speed if limits is not None else math.inf
+        for limits, angle, speed in zip(chain.limits, start, rate, strict=True)
+        if speed
+    ]
+    stroke_s = min(travel_s, max(stops_s))
+    if lead.high >= stroke_s:
+        raise InputError(
+            f"{table.where}: the arm's stroke ends after {stroke_s:g} s (motion.travel_s, or a "
+            f"joint's limit), before it meets an object at {lead.high:g} s (trials.lead_s)"
+        )
+    return {"start": start, "rate": rate, "travel_s": travel_s, "place_m": place_m}
 
 
-def _last_row_m(skin: SkinLayout) -> float:
+def _last_row_m(skin: Cylinder) -> float:
     """z of the skin's last row in its link."""
     return skin.row0_z_m - skin.pitch[0] * (skin.rows - 1)
 
 
-def _stroke(
-    chain: Chain, start: tuple[float, ...], rate: tuple[float, ...], travel_s: float
-) -> float:
-    """Seconds until the last moving joint's equilibrium point stops at its limit."""
-    ends = []
-    for limits, angle, speed in zip(chain.limits, start, rate, strict=True):
-        if speed and limits is not None:
-            ends.append((limits[speed > 0.0] - angle) / speed)
-        elif speed:
-            ends.append(math.inf)
-    return min(travel_s, max(ends))
-
-
-def _skin(table: SceneTable) -> tuple[SkinLayout, Value]:
-    given = {key: table.get(key, default) for key, default in (CODY_SKIN | SCALE).items()}
+def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
+    given = {key: table.get(key, default) for key, default in CODY_SKIN.items()}
     # Fewer than three columns around the forearm may all face away from an object.
     cols = table.whole("cols", CODY_SKIN["cols"], range(3, 1001))
     if not table.has("column_angles_deg") and cols != CODY_SKIN["cols"]:
@@ -253,21 +215,17 @@ def _skin(table: SceneTable) -> tuple[SkinLayout, Value]:
         if not table.has("pitch_m"):
             radius = table.number("radius_m", CODY_SKIN["radius_m"], 0.0, 10.0, open_low=True)
             given["pitch_m"] = [CODY_SKIN["pitch_m"][0], 2.0 * math.pi * radius / cols]
-    table.number("counts_per_newton", SCALE["counts_per_newton"], 0.0, 1e6, open_low=True)
+    table.number("counts_per_newton", CODY_SKIN["counts_per_newton"], 0.0, 1e6, open_low=True)
     taxel = table.value("taxel_n_m", schema.TAXEL)
     table.done()
-    skin = SkinLayout.from_dict(given, where=table.where)
+    skin = Cylinder.from_dict(given, where=table.where)
     if not skin.wraps:
         raise table.fail("wraps", "true: the skin is a cylinder")
-    return skin, taxel
+    return cast(Cylinder, skin), taxel
 
 
 def _objects(
-    top: SceneTable,
-    seed: int,
-    push_n: float,
-    skin: SkinLayout,
-    spread: dict[str, float],
+    top: SceneTable, seed: int, push_n: float, skin: Cylinder, spread: dict[str, float]
 ) -> tuple[SceneObject, ...]:
     tables = list(_named(top, "object"))
     for family in _named(top, "family"):
@@ -294,11 +252,10 @@ def _named(top: SceneTable, key: str) -> Iterator[SceneTable]:
 
 def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
     name = table.text("name")
-    family = table.choice("family", schema.FAMILIES)
+    family = table.choice("family", tuple(schema.FAMILIES))
     conditions = table.names("conditions", schema.CONDITIONS)
     if not conditions:
         raise table.fail("conditions", "fixed, movable or both")
-    own = schema.FAMILY_KEYS[family]
     values: dict[str, Value] = {}
     # A spread around 0 also applies to an object that gives no value for it.
     differs = {
@@ -306,33 +263,29 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
         for key, needed in schema.SPREAD_OF_MOVABLE.items()
         if spread[key] > 0.0 and "movable" in conditions and table.has(needed)
     }
-    for key in schema.keys_of(family):
-        limits = schema.OBJECT[key]
-        default = own.get(key, limits.default)
-        if key in differs:
-            default = 0.0
+    for key, default in schema.keys_of(family).items():
+        default = 0.0 if key in differs else default
         if table.has(key) or default is not None:
-            values[key] = table.value(key, limits, default)
-    if "stem_count" in own and table.has("stem_count"):  # a family has drawn from its range by now
-        table.field("stem_count", schema.OBJECT["stem_count"])
+            if OBJECT[key].whole:  # a family has drawn from its range by now
+                table.field(key, OBJECT[key])
+            values[key] = table.value(key, OBJECT[key], default)
+    needed: list[str] = []
     if "movable" in conditions:
-        for key in ("mass_kg", "friction_static", "friction_kinetic"):
-            table.get(key)
+        needed += ["mass_kg", "friction_static", "friction_kinetic"]
     if table.has("base_m") or table.has("height_m"):
-        for key in ("base_m", "height_m"):
-            table.get(key)
+        needed += ["base_m", "height_m"]
+    for key in needed:
+        table.get(key)
     static, kinetic = values.get("friction_static"), values.get("friction_kinetic")
     if static is not None and kinetic is not None and kinetic.high > static.low:
         wanted = f"at most friction_static ({static.low:g})"
         raise table.fail("friction_kinetic", wanted, kinetic.high)
     table.done()
-    given = differs.union(filter(table.has, schema.OBJECT))
+    given = differs.union(filter(table.has, OBJECT))
     return SceneObject(name, family, conditions, values, frozenset(given))
 
 
-def _effects(
-    table: SceneTable,
-) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, dict[str, float]]]:
+def _effects(table: SceneTable) -> dict[str, Any]:
     add = table.names("add", tuple(EFFECTS))
     leave_out = table.names("leave_out", tuple(EFFECTS))
     settings = {
@@ -344,4 +297,4 @@ def _effects(
     add = (*add, *(name for name in settings if name not in add))
     for name in set(add) & set(leave_out):
         raise table.fail("leave_out", f"a list without {name}, which effects.add adds")
-    return add, leave_out, settings
+    return {"add": add, "leave_out": leave_out, "settings": settings}

@@ -87,23 +87,12 @@ class SceneObject:
 
 
 @dataclass(frozen=True)
-class Cylinder:
-    """The skin's shape: `rows` rings of `cols` taxels around a forearm.
+class Cylinder(SkinLayout):
+    """A skin around a forearm, whose geometry and scale are known."""
 
-    Attributes:
-        radius_m: radius of the forearm.
-        row_pitch_m, column_pitch_m: distance between taxels along and around the forearm.
-        row0_z_m: z of the first row in the skin's link; further rows have lower z.
-        column_angles_deg: directions of the columns' normals.
-    """
-
-    rows: int
-    cols: int
-    radius_m: float
-    row_pitch_m: float
-    column_pitch_m: float
-    row0_z_m: float
-    column_angles_deg: tuple[float, ...]
+    radius_m: float = 1.0
+    column_angles_deg: tuple[float, ...] = ()
+    counts_per_newton: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -145,7 +134,7 @@ class Scene:
     """(dof,) rad/s of the equilibrium point."""
     travel_s: float
     """Seconds for which the equilibrium point moves."""
-    skin: SkinLayout
+    skin: Cylinder
     taxel_n_m: Value
     place_m: float
     """z in the skin's link of the point that meets the object."""
@@ -161,18 +150,6 @@ class Scene:
     def kinematics(self) -> Kinematics:
         """The arm's kinematics."""
         return Kinematics(self.arm)
-
-    @cached_property
-    def cylinder(self) -> Cylinder:
-        """The skin's shape; `scene.load` has checked that it is a cylinder."""
-        skin = self.skin
-        radius, angles, pitch = skin.radius_m, skin.column_angles_deg, skin.pitch_m
-        along, around = pitch if isinstance(pitch, tuple) else (pitch, pitch)
-        assert radius is not None
-        assert angles is not None
-        assert along is not None
-        assert around is not None
-        return Cylinder(skin.rows, skin.cols, radius, along, around, skin.row0_z_m, tuple(angles))
 
     @property
     def count(self) -> int:

@@ -19,10 +19,9 @@ class Field:
 
 
 @dataclass(frozen=True)
-class EffectInfo:
-    """The entry of an effect; its code is loaded only where a scene calls for it."""
+class Effect:
+    """What calls for an effect; its module, loaded only then, says what it does."""
 
-    says: str
     stage: str
     """`contact` (acts in the step), `sensor` (on the frames) or `clock` (on their times)."""
     settings: dict[str, Field] = field(default_factory=dict)
@@ -34,9 +33,6 @@ class EffectInfo:
     """Object keys that it needs; an object with all of them calls for it."""
 
 
-RIGID, FOAM, PILLOW, BUBBLES, FOLIAGE = "rigid", "foam", "pillow", "bubbles", "foliage"
-SOFT_FAMILIES = (FOAM, PILLOW, BUBBLES, FOLIAGE)
-FAMILIES = (RIGID, *SOFT_FAMILIES)
 CONDITIONS = ("fixed", "movable")
 
 TRIALS = {
@@ -82,180 +78,104 @@ OBJECT = {
     "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
     "slope_deg": Field(-20.0, 20.0, None, "of what the object stands on, uphill along the push"),
     "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
-    "modulus_pa": Field(0.0, 1e18, None, "of the elastic foundation", open_low=True),
-    "depth_m": Field(0.0, 10.0, None, "of the elastic foundation", open_low=True),
-    "relax_ratio": Field(0.0, 100.0, None, "k1 / k_inf of the standard linear solid"),
-    "relax_s": Field(0.0, 1e6, None, "its time", open_low=True),
-    "stem_count": Field(1, 200, None, "stems the forearm can meet", whole=True),
-    "stem_n_m": Field(0.0, 1e12, None, "stiffness of a stem, 3 E I / L^3", open_low=True),
-    "stem_spread_m": Field(0.0, 1.0, None, "depth over which the stems stand"),
-    "stem_slip_m": Field(0.0, 10.0, None, "bend at which a stem slips off", open_low=True),
-    "stem_damping": Field(0.0, 1.0, None, "damping ratio of a stem"),
-    "stem_deviation": Field(0.0, 2.0, None, "of the logarithm of the stems' stiffnesses"),
+    "modulus_pa": Field(0.0, 1e18, 12e3, "of the elastic foundation", open_low=True),
+    "depth_m": Field(0.0, 10.0, 0.10, "of the elastic foundation", open_low=True),
+    "relax_ratio": Field(0.0, 100.0, 0.6, "k1 / k_inf of the standard linear solid"),
+    "relax_s": Field(0.0, 1e6, 0.5, "its time", open_low=True),
+    "stem_count": Field(1, 200, 12, "stems the forearm can meet", whole=True),
+    "stem_n_m": Field(0.0, 1e12, 15.0, "stiffness of a stem, 3 E I / L^3", open_low=True),
+    "stem_spread_m": Field(0.0, 1.0, 0.06, "depth over which the stems stand"),
+    "stem_slip_m": Field(0.0, 10.0, 0.12, "bend at which a stem slips off", open_low=True),
+    "stem_damping": Field(0.0, 1.0, 0.15, "damping ratio of a stem"),
+    "stem_deviation": Field(0.0, 2.0, 0.3, "of the logarithm of the stems' stiffnesses"),
     "stem_kg": Field(0.0, 10.0, 0.02, "moving mass of a stem", open_low=True),
-    "bubble_n_m": Field(0.0, 1e12, None, "stiffness of a bubble at rest", open_low=True),
+    "bubble_n_m": Field(0.0, 1e12, 2000.0, "stiffness of a bubble at rest", open_low=True),
     "bubble_m": Field(0.0, 0.1, 0.004, "height of a bubble", open_low=True),
-    "pop_n": Field(0.0, 1e6, None, "force at which a bubble bursts", open_low=True),
+    "pop_n": Field(0.0, 1e6, 10.0, "force at which a bubble bursts", open_low=True),
     "cover_n_m": Field(0.0, 1e12, None, "stiffness of a sleeve, per taxel", open_low=True),
     "cover_spread": Field(0.0, 0.2, 0.1, "part of a taxel's load each neighbour takes"),
 }
 STIFFNESSES = ("modulus_pa", "stem_n_m", "bubble_n_m")
-FAMILY_KEYS: dict[str, dict[str, float]] = {
-    RIGID: {},
-    FOAM: {"modulus_pa": 12e3, "depth_m": 0.10, "relax_ratio": 0.6, "relax_s": 0.5},
-    PILLOW: {"modulus_pa": 3e3, "depth_m": 0.15, "relax_ratio": 0.4, "relax_s": 0.8},
-    BUBBLES: {"bubble_n_m": 2000.0, "bubble_m": 0.004, "pop_n": 10.0},
-    FOLIAGE: {
-        "stem_count": 12,
-        "stem_n_m": 15.0,
-        "stem_spread_m": 0.06,
-        "stem_slip_m": 0.12,
-        "stem_damping": 0.15,
-        "stem_deviation": 0.3,
-        "stem_kg": 0.02,
-    },
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of objects.
+
+    Attributes:
+        effects: those that each of its objects calls for; that it is soft rests on the first.
+        thickness: the key of the depth to which a soft object can yield; empty for a rigid one.
+        own: keys that objects of other families do not have.
+        defaults: {key: what is typical of it}, in place of the default in `OBJECT`.
+    """
+
+    effects: tuple[str, ...] = ()
+    thickness: str = ""
+    own: tuple[str, ...] = ()
+    defaults: dict[str, float] = field(default_factory=dict)
+
+
+LAYER = ("foundation", "lateral", "bottoming", "relaxation")
+LAYER_KEYS = ("modulus_pa", "depth_m", "relax_ratio", "relax_s")
+STEM_KEYS = tuple(key for key in OBJECT if key.startswith("stem_"))
+PILLOW = dict(zip(LAYER_KEYS, (3e3, 0.15, 0.4, 0.8), strict=True))
+FAMILIES = {
+    "rigid": Family(),
+    "foam": Family(LAYER, "depth_m", LAYER_KEYS),
+    "pillow": Family(LAYER, "depth_m", LAYER_KEYS, PILLOW),
+    "bubbles": Family(("pop",), "bubble_m", ("bubble_n_m", "bubble_m", "pop_n")),
+    "foliage": Family(("stems",), "stem_slip_m", STEM_KEYS),
 }
-"""{family: {key that no other family has: its default}}, a typical object of the family."""
 
 
-def keys_of(family: str) -> tuple[str, ...]:
-    """The keys of `OBJECT` that an object of a family may have."""
-    others = {key for name, keys in FAMILY_KEYS.items() if name != family for key in keys}
-    return tuple(key for key in OBJECT if key not in others - set(FAMILY_KEYS[family]))
+def keys_of(family: str) -> dict[str, float | None]:
+    """{key of `OBJECT` that an object of a family may have: its default, or None}."""
+    known = FAMILIES[family]
+    others = {key for other in FAMILIES.values() for key in other.own} - {*known.own}
+    defaults = {key: field.default for key, field in OBJECT.items() if key not in others}
+    return {**defaults, **known.defaults}
 
 
-THICKNESS = {FOAM: "depth_m", PILLOW: "depth_m", BUBBLES: "bubble_m", FOLIAGE: "stem_slip_m"}
-"""{soft family: the key of the depth to which it can yield}."""
-ELASTIC = (FOAM, PILLOW)
-EFFECTS: dict[str, EffectInfo] = {
+ELASTIC = ("foam", "pillow")
+EFFECTS: dict[str, Effect] = {
     # Effects run in this order, in the step and on the frames.
-    "foundation": EffectInfo("elastic foundation under each taxel", "contact", families=ELASTIC),
-    "lateral": EffectInfo(
-        "foam that behaves as an elastic layer, not as separate springs",
-        "contact",
-        needs=("foundation",),
-        families=ELASTIC,
-    ),
-    "bottoming": EffectInfo(
-        "foam that stiffens as it is pressed flat",
-        "contact",
-        needs=("foundation",),
-        families=ELASTIC,
-    ),
-    "cover": EffectInfo(
-        "a sleeve over the skin, in series, that spreads the load",
-        "contact",
-        keys=("cover_n_m",),
-    ),
-    "pop": EffectInfo(
-        "bubbles: the gas law, no stiffness after the burst", "contact", families=(BUBBLES,)
-    ),
-    "stems": EffectInfo(
-        "foliage: stems that bend, damp and slip off", "contact", families=(FOLIAGE,)
-    ),
-    "tilt": EffectInfo(
-        "the forearm pivots about the contact",
-        "contact",
-        families=(RIGID, FOAM, PILLOW, BUBBLES),
-    ),
-    "relaxation": EffectInfo("standard linear solid", "contact", families=ELASTIC),
-    "inertia": EffectInfo(
-        "the arm's inertia: it hits and bounces",
-        "contact",
-        {"loss_s": Field(0.0, 1.0, 0.0015, "the skin's dashpot, as a part of its stiffness")},
-    ),
-    "friction": EffectInfo(
-        "the object's face holds the skin until it slides along it",
+    "foundation": Effect("contact", families=ELASTIC),
+    "lateral": Effect("contact", needs=("foundation",), families=ELASTIC),
+    "bottoming": Effect("contact", needs=("foundation",), families=ELASTIC),
+    "cover": Effect("contact", keys=("cover_n_m",)),
+    "pop": Effect("contact", families=("bubbles",)),
+    "stems": Effect("contact", families=("foliage",)),
+    "tilt": Effect("contact", families=("rigid", "foam", "pillow", "bubbles")),
+    "relaxation": Effect("contact", families=ELASTIC),
+    "inertia": Effect("contact", {"loss_s": Field(0.0, 1.0, 0.0015, "dashpot by stiffness")}),
+    "friction": Effect(
         "contact",
         {"shear_n_m": Field(0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True)},
         keys=("skin_friction",),
     ),
-    "sliding": EffectInfo("sticks, then slides on the floor", "contact"),
-    "slope": EffectInfo(
-        "a table that is not level", "contact", needs=("sliding",), keys=("slope_deg",)
-    ),
-    "turning": EffectInfo(
-        "a push beside the middle turns the object",
-        "contact",
-        needs=("sliding",),
-        keys=("aside_m", "foot_m"),
-    ),
-    "stribeck": EffectInfo(
-        "friction that falls with speed", "contact", needs=("sliding",), keys=("stribeck_m_s",)
-    ),
-    "tipping": EffectInfo(
-        "the object tips over its edge where that takes less force than sliding",
-        "contact",
-        needs=("sliding",),
-        keys=("base_m", "height_m"),
-    ),
-    "crosstalk": EffectInfo(
-        "each taxel feels its neighbours",
-        "sensor",
-        {"part": Field(0.0, 0.2, 0.02, "of each of the four neighbours")},
-    ),
-    "hysteresis": EffectInfo(
-        "the reading lags behind the load as it rises and falls",
-        "sensor",
-        {"counts": Field(0.0, 65535, 30.0, "half the width of the loop")},
-    ),
-    "drift": EffectInfo(
-        "a baseline that drifts, differently for each taxel",
-        "sensor",
-        {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of the taxels' slopes")},
-    ),
-    "noise": EffectInfo(
-        "normal noise on each reading",
-        "sensor",
-        {"counts": Field(0.0, 65535, 8.0, "standard deviation")},
-    ),
-    "saturation": EffectInfo(
-        "no reading above a limit",
-        "sensor",
-        {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)},
-    ),
-    "dead_band": EffectInfo(
-        "small readings are zero",
-        "sensor",
-        {"counts": Field(0.0, 65535, 50.0, "readings below it are zero")},
-    ),
-    "quantisation": EffectInfo(
-        "coarse steps of the converter",
-        "sensor",
-        {"counts": Field(1.0, 65535, 4.0, "size of a step")},
-    ),
-    "dead_taxels": EffectInfo(
-        "taxels that read nothing in a trial",
+    "sliding": Effect("contact"),
+    "slope": Effect("contact", needs=("sliding",), keys=("slope_deg",)),
+    "turning": Effect("contact", needs=("sliding",), keys=("aside_m", "foot_m")),
+    "stribeck": Effect("contact", needs=("sliding",), keys=("stribeck_m_s",)),
+    "tipping": Effect("contact", needs=("sliding",), keys=("base_m", "height_m")),
+    "crosstalk": Effect("sensor", {"part": Field(0.0, 0.2, 0.02, "of each of four neighbours")}),
+    "hysteresis": Effect("sensor", {"counts": Field(0.0, 65535, 30.0, "half the loop's width")}),
+    "drift": Effect("sensor", {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of slopes")}),
+    "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0, "standard deviation")}),
+    "saturation": Effect("sensor", {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)}),
+    "dead_band": Effect("sensor", {"counts": Field(0.0, 65535, 50.0, "readings below are zero")}),
+    "quantisation": Effect("sensor", {"counts": Field(1.0, 65535, 4.0, "size of a step")}),
+    "dead_taxels": Effect(
         "sensor",
         {
             "part": Field(0.0, 1.0, 0.01, "of all taxels"),
             "known": Field(0, 1, 1, "1: marked invalid; 0: they read zero", whole=True),
         },
     ),
-    "jitter": EffectInfo(
-        "frames come early or late",
-        "clock",
-        {"s": Field(0.0, 1.0, 0.001, "standard deviation, cut at 0.45 of a frame")},
-    ),
-    "dropped_frames": EffectInfo(
-        "frames that are lost",
-        "clock",
-        {"part": Field(0.0, 0.9, 0.02, "of all frames")},
-    ),
+    "jitter": Effect("clock", {"s": Field(0.0, 1.0, 0.001, "deviation, cut at 0.45 of a frame")}),
+    "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02, "of all frames")}),
 }
 STEP = Field(1e-6, 1.0, None, "the physics' step")
-IMPLIED_BY_FAMILY = {
-    FOAM: ("foundation", "lateral", "bottoming", "relaxation"),
-    PILLOW: ("foundation", "lateral", "bottoming", "relaxation"),
-    BUBBLES: ("pop",),
-    FOLIAGE: ("stems",),
-}
 IMPLIED_BY_CONDITION = {"movable": ("sliding",)}
 SHARED = {"viscous": ("relaxation", "inertia")}
 """{module of `effects`: the effects that share it}."""
-LABELLED_BY = {
-    "foundation": {FOAM: "soft", PILLOW: "soft"},
-    "pop": {BUBBLES: "soft"},
-    "stems": {FOLIAGE: "soft"},
-}
-"""{effect: {family: the label that rests on it}}."""

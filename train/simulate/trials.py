@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.simulate.arm import Array, Kinematics
-from train.simulate.contact import bed_law, by_depth
-from train.simulate.plan import ALL, Index, Plan
+from train.simulate.arm import Array, Kinematics, Mask, Places
+from train.simulate.contact import bed_law, by_depth, total
+from train.simulate.plan import ALL, Index, Plan, settings
 from train.simulate.scene_model import Cylinder, Scene, TrialSpec
 
+__all__ = ["ALL", "Array", "Index", "Mask", "Places", "Trials", "pick", "total"]
 WINDOW_HALF = 6
 """Columns on either side of the one that meets the object: +-90 degrees, beyond which a cylinder
 has no surface to press."""
@@ -97,7 +98,7 @@ class Trials:
         self.axes, self.origins, self.jacobian = *zeros((2, 3, dof, n)), zeros((dof, 2, n))
         self.y, self.y_frame, self.depth, self.loads = zeros((4, 2, n))
         self.compliance = zeros((3, n))
-        self.row_z = skin.row0_z_m - skin.row_pitch_m * np.arange(skin.rows, dtype=float)[:, None]
+        self.row_z = skin.row0_z_m - skin.pitch[0] * np.arange(skin.rows, dtype=float)[:, None]
         self.columns = zeros((window, n), dtype=np.intp)
         self.column_gaps, self.reach = zeros((2, window, n))
         self.gaps, self.stiffness = zeros((2, 0, n))
@@ -110,12 +111,22 @@ class Trials:
     @property
     def skin(self) -> Cylinder:
         """The skin's shape."""
-        return self.scene.cylinder
+        return self.scene.skin
 
     @property
     def kinematics(self) -> Kinematics:
         """The arm's."""
         return self.scene.kinematics
+
+    def settings(self, effect: str) -> dict[str, float]:
+        """An effect's settings."""
+        return settings(self.scene, effect)
+
+    def keep(self, effect: str, state: type[Any], **given: Any) -> Any:
+        """Keep an effect's state, a dataclass; an array that is not given is (n,) zeros."""
+        empty = {field.name: np.zeros(self.n) for field in fields(state)}
+        self.own[effect] = state(**{**empty, **given})
+        return self.own[effect]
 
     def equilibrium(self, t: Any, i: Index = ALL) -> Array:
         """(dof, n) equilibrium angles of some trials at their times (n,)."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from train.simulate.engine import PhysicsRun, run_physics
 from train.simulate.scene_model import Scene, TrialSpec
-from train.simulate.schema import THICKNESS
+from train.simulate.schema import FAMILIES
 
 REDRAWS = 40
 """Draws of one trial after which the scene is refused, if each contradicts the label."""
@@ -63,8 +63,8 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
             what = f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             remedy = "lower its mass_kg or its friction, or leave movable out of its conditions"
-        elif trial.object.family in THICKNESS:
-            thickness = trials.values[THICKNESS[trial.object.family]][i]
+        elif key := FAMILIES[trial.object.family].thickness:
+            thickness = trials.values[key][i]
             if depth[i] < labels["yields"] * thickness:
                 label = "soft"
                 what = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"

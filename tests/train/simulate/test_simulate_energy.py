@@ -18,11 +18,10 @@ from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run, specs_of
 from train.simulate import engine
 from train.simulate.effects import viscous
-from train.simulate.energy import check_energy
 from train.simulate.plan import ALL, Call, make_plan
 from train.simulate.run import kinds
 from train.simulate.scene import from_dict
-from train.simulate.schema import EFFECTS, IMPLIED_BY_FAMILY, LABELLED_BY
+from train.simulate.schema import EFFECTS, FAMILIES
 
 RANGES = {
     "mass_kg": [0.02, 1.0],
@@ -143,7 +142,7 @@ def pair_scene(first, second):
     keys = {key: RANGES[key] for key in ("width_m", *MOVES, *called)}
     family, condition = common[0], "movable" if "sliding" in pair else "fixed"
     thing = {"name": "thing", "family": family, "conditions": [condition], **keys}
-    own = set(IMPLIED_BY_FAMILY.get(family, ())) - {*LABELLED_BY}
+    own = set(FAMILIES[family].effects[1:])
     one = from_dict(
         {
             "trials": {"count": 6, "lead_s": 0.1, "after_s": 0.7},
@@ -231,12 +230,12 @@ def test_a_run_that_makes_energy_is_refused():
     one = make(one_object(), lead_s=0.1)
     batch = run(one)
     joints = batch.joints.copy()
-    check_energy(batch.trials, joints, batch.t)
+    engine.check_energy(batch.trials, joints, batch.t)
     joints[1, 100:, 0] -= 1.0
     with pytest.raises(EdgeError, match=r"trial 1 of thing-fixed makes energy: at 1 s"):
-        check_energy(batch.trials, joints, batch.t)
+        engine.check_energy(batch.trials, joints, batch.t)
     # Nor can it shake: its damping takes more than is put in.
     joints = batch.joints.copy()
     joints[1, 100::2, 0] += 0.02
     with pytest.raises(EdgeError, match=r"trial 1 of thing-fixed makes energy"):
-        check_energy(batch.trials, joints, batch.t)
+        engine.check_energy(batch.trials, joints, batch.t)

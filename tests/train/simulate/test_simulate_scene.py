@@ -17,7 +17,6 @@ from edge.touch.arm import Chain
 from train.simulate import scene as scenes
 from train.simulate.run import simulate
 from train.simulate.scene import CODY_DAMPING, CODY_STIFFNESS, from_dict
-from train.simulate.schema import EFFECTS
 
 SCENES = Path(__file__).parents[3] / "train" / "scenes"
 GOOD = {
@@ -273,17 +272,11 @@ def test_any_value_anywhere_is_taken_or_refused_in_one_sentence(path, value):
     assert "\n" not in sentence
 
 
-def test_every_effect_says_what_it_is():
-    assert all(
-        info.says and info.stage in ("contact", "sensor", "clock") for info in EFFECTS.values()
-    )
-
-
 def test_a_skin_of_other_columns_has_them_evenly_around():
     one = from_dict({**GOOD, "skin": {"cols": 12, "release_s": 0.7}})
-    assert one.cylinder.column_angles_deg[:2] == (15.0, 45.0)
-    assert one.cylinder.column_angles_deg[-1] == -15.0
-    assert one.cylinder.column_pitch_m == pytest.approx(2.0 * math.pi * 0.04604 / 12)
+    assert one.skin.column_angles_deg[:2] == (15.0, 45.0)
+    assert one.skin.column_angles_deg[-1] == -15.0
+    assert one.skin.pitch[1] == pytest.approx(2.0 * math.pi * 0.04604 / 12)
     _, trial = next(simulate(replace(one, trials={**one.trials, "count": 1.0})))
     assert trial.frames.shape[1:] == (16, 12)
     assert trial.frames.max() > 0

@@ -182,7 +182,7 @@ class TestLateral:
         widths = np.array([layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)])
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
-        length = batch.trials.skin.row_pitch_m * batch.trials.weight[:, 0].sum()
+        length = batch.trials.skin.pitch[0] * batch.trials.weight[:, 0].sum()
         assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
 
 
@@ -221,7 +221,7 @@ class TestAskew:
     def test_rows_bear_what_an_elastic_block_gives_them(self, degrees, force, depth_mm, peak, rows):
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
-        slope, pitch = np.tan(np.radians(degrees)), t.skin.row_pitch_m
+        slope, pitch = np.tan(np.radians(degrees)), t.skin.pitch[0]
         # The face covers the skin's rows but the first and the last.
         depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
         t.weight[:], t.line_depth[:] = np.pad(np.ones(14), 1)[:, None], depth[:, None]

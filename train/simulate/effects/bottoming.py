@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Index, Trials, pick
 
 CLOSING, CLOSED = 0.65, 0.93
 """Compression, as a part of the thickness, at which the cells begin to close and are closed."""

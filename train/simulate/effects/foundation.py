@@ -6,12 +6,11 @@ On such independent columns a cylinder of radius R at depth d bears F/L = (4/3) 
 
 from __future__ import annotations
 
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Index, Trials, pick
 
 
 def soften(t: Trials, i: Index) -> None:
     """Put a column of foam in series with each taxel."""
-    area = t.skin.row_pitch_m * t.skin.column_pitch_m
+    area = t.skin.pitch[0] * t.skin.pitch[1]
     column = pick(t.values["modulus_pa"], i) * area / pick(t.values["depth_m"], i)
     t.taxel_k[i] = 1.0 / (1.0 / pick(t.taxel_k, i) + 1.0 / column)

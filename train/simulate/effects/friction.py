@@ -14,12 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from train.simulate.arm import Array, cross, dot
-from train.simulate.contact import GRAVITY, total
-from train.simulate.plan import ALL, Index, settings
-from train.simulate.trials import Trials, pick
+from train.simulate.arm import cross, dot
+from train.simulate.contact import GRAVITY
+from train.simulate.trials import ALL, Array, Index, Mask, Trials, pick, total
 
 
 @dataclass
@@ -37,7 +35,7 @@ class Shear:
     """
 
     stiffness: float
-    fits: NDArray[np.bool_]
+    fits: Mask
     stretch: Array
     pull: Array
     jacobian: Array
@@ -48,15 +46,13 @@ class Shear:
 
 def stand(t: Trials, i: Index) -> None:
     """Begin with an unstretched skin."""
-    n = t.n
-    t.own["friction"] = Shear(
-        stiffness=settings(t.scene, "friction")["shear_n_m"],
+    t.keep(
+        "friction",
+        Shear,
+        stiffness=t.settings("friction")["shear_n_m"],
         fits=t.plan.also("tilt", ALL) & t.plan.also("foundation", ALL),
-        stretch=np.zeros(n),
-        pull=np.zeros(n),
         jacobian=np.zeros_like(t.q),
-        coupled=np.zeros((2, n)),
-        give=np.zeros(n),
+        coupled=np.zeros((2, t.n)),
         before=np.zeros_like(t.q),
     )
 

@@ -17,12 +17,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from train.simulate.arm import Array
-from train.simulate.contact import total
-from train.simulate.plan import Index, settings
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Array, Index, Trials, pick, total
 
 FINER = 8
 """Steps of a frame near a jolt, as a multiple of the usual number."""
@@ -51,7 +47,7 @@ class Momentum:
     speed: Array
     before: Array
     weight: Array
-    left: NDArray[np.int64]
+    left: Array
     depth: Array
     force: Array
     change: Array
@@ -60,19 +56,14 @@ class Momentum:
 
 def swing(t: Trials, i: Index) -> None:
     """Begin with the joints at the speed of the equilibrium point."""
-    t.own["inertia"] = Momentum(
-        inertia=np.array(t.scene.inertia)[:, None],
-        speed=np.repeat(t.rate, t.n, axis=1),
-        before=np.zeros_like(t.q),
-        weight=np.zeros_like(t.q),
-        left=np.zeros(t.n, dtype=np.int64),
-        **dict(zip(("depth", "force", "change", "peak"), np.zeros((4, t.n)), strict=True)),
-    )
+    inertia, speed = np.array(t.scene.inertia)[:, None], np.repeat(t.rate, t.n, axis=1)
+    before, weight = np.zeros((2, *t.q.shape))
+    t.keep("inertia", Momentum, inertia=inertia, speed=speed, before=before, weight=weight)
 
 
 def stand(t: Trials, i: Index) -> None:
     """Add the dashpot beside the skin's springs."""
-    t.own["viscous"].loss_s[i] = settings(t.scene, "inertia")["loss_s"]
+    t.own["viscous"].loss_s[i] = t.settings("inertia")["loss_s"]
 
 
 def pace(t: Trials, i: Index) -> None:

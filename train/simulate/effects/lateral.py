@@ -22,10 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate.arm import Array
-from train.simulate.contact import share_out, total
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.contact import share_out
+from train.simulate.trials import Array, Index, Trials, pick, total
 
 MARGIN = 0.19
 """Load of the flat strip beyond the foundation under it, as a width over H."""
@@ -58,14 +56,12 @@ def widen(t: Trials, i: Index) -> None:
     """Columns are touched at a larger depth."""
     gaps = touched_at(pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i))
     t.column_gaps[:, i] = gaps
-    if "lateral" not in t.own:
-        t.own["lateral"] = Lateral(np.zeros(t.n))
-    t.own["lateral"].nearest[i] = gaps.min(axis=0)
+    t.keep("lateral", Lateral).nearest[i] = gaps.min(axis=0)
 
 
 def fill(t: Trials, i: Index) -> None:
     """Add one spring to each row, touched first, for the foam beside the contact."""
-    width = 2.0 * MARGIN * pick(t.values["depth_m"], i) / t.skin.column_pitch_m
+    width = 2.0 * MARGIN * pick(t.values["depth_m"], i) / t.skin.pitch[1]
     more = pick(t.taxel_k, i) * width * pick(t.reach, i).any(axis=0)
     t.add_springs(i, np.zeros((1, len(more))), more[None])
 
@@ -100,11 +96,11 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
     inside = np.maximum(depth - gaps[touched][:, None], 0.0)
     pressed = total(inside * stiffness[touched][:, None]) if touched.any() else 0.0
     borne = np.where(depth > 0.0, pressed, 0.0) * weight
-    margin, ends = MARGIN * pick(t.values["depth_m"], i), askew(depth, weight, t.skin.row_pitch_m)
+    margin, ends = MARGIN * pick(t.values["depth_m"], i), askew(depth, weight, t.skin.pitch[0])
     slight = margin * total(ends)
     dips = slight > 0.0
     if dips.any():
-        edge = pick(t.taxel_k, i) * margin * margin / t.skin.row_pitch_m
+        edge = pick(t.taxel_k, i) * margin * margin / t.skin.pitch[0]
         part = np.clip(depth / np.where(dips, slight, 1.0) - 0.5, 0.0, 1.0)
         borne = np.where(dips, borne * part + edge * ends * wide, borne)
     return np.asarray(borne)

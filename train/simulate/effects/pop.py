@@ -10,13 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate import base
-from train.simulate.arm import Array
-from train.simulate.contact import share_out, spring_loads, total
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.contact import share_out, spring_loads
+from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
 SLOPES = (1.0, 4.0, 16.0)
 """Slopes of the tangents, as multiples of k0."""
@@ -75,7 +72,7 @@ def stand(t: Trials, i: Index) -> None:
     change(t, np.arange(t.n)[i])
 
 
-def change(t: Trials, trials: NDArray[np.intp]) -> None:
+def change(t: Trials, trials: Places) -> None:
     """Give the solver the springs that are left."""
     own, tilted = t.own["pop"], t.plan.also("tilt", trials)
     if tilted.any():

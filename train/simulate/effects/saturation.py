@@ -9,6 +9,6 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """Cut the counts at the limit."""
-    scale = readings.scene.skin.counts_per_newton or 1.0
+    scale = readings.scene.skin.counts_per_newton
     limit = np.float32(readings.settings("saturation")["newton"] * scale)
     np.minimum(readings.counts, limit, out=readings.counts)

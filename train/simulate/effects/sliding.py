@@ -9,12 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from train.simulate.arm import Array
 from train.simulate.contact import GRAVITY
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Array, Index, Mask, Trials, pick
 
 
 @dataclass
@@ -38,7 +35,7 @@ class Mover:
     weight: Array
     hold: Array
     resist: Array
-    leans: NDArray[np.bool_]
+    leans: Mask
     lies: Array
     speed: Array
     slide: Array
@@ -51,20 +48,15 @@ TRACES = {"slide_m": "slide"}
 
 def stand(t: Trials, i: Index) -> None:
     """Begin at rest, with the friction of the scene."""
-    values, zeros = t.values, np.zeros((6, t.n))
-    t.own["sliding"] = Mover(
-        inertia=values["mass_kg"].copy(),
-        static=values["friction_static"].copy(),
-        kinetic=values["friction_kinetic"].copy(),
-        weight=values["mass_kg"] * GRAVITY,
-        hold=zeros[0],
-        resist=zeros[1],
+    t.keep(
+        "sliding",
+        Mover,
+        inertia=t.values["mass_kg"].copy(),
+        static=t.values["friction_static"].copy(),
+        kinetic=t.values["friction_kinetic"].copy(),
+        weight=t.values["mass_kg"] * GRAVITY,
         leans=np.zeros(t.n, dtype=bool),
         lies=np.full(t.n, np.inf),
-        speed=zeros[2],
-        slide=zeros[3],
-        rest=zeros[4],
-        shifted=zeros[5],
     )
 
 

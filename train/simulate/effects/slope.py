@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Index, Trials, pick
 
 
 def stand(t: Trials, i: Index) -> None:

@@ -6,14 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate import streams
-from train.simulate.arm import Array
 from train.simulate.base import FAR_M
-from train.simulate.contact import bed_law, total
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.contact import bed_law
+from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
 
 @dataclass
@@ -34,9 +31,9 @@ class Stems:
     depth: Array
     stiffness: Array
     damping: Array
-    taxel: NDArray[np.intp]
+    taxel: Places
     part: Array
-    order: NDArray[np.intp]
+    order: Places
     slopes: Array
     intercepts: Array
     drag: Array
@@ -58,8 +55,8 @@ def lay(t: Trials, i: Index) -> None:
         stiffness[:count, trial] = np.exp(deviation * generator.standard_normal(count))
     depth -= depth.min(axis=0)
     stiffness = np.where(stiffness > 0.0, stiffness * values["stem_n_m"], 0.0)
-    row = t.row_z[0] - t.z, 0.5 * np.minimum(values["width_m"], t.rows * t.skin.row_pitch_m)
-    middle, reach = row[0] / t.skin.row_pitch_m, row[1] / t.skin.row_pitch_m
+    row = t.row_z[0] - t.z, 0.5 * np.minimum(values["width_m"], t.rows * t.skin.pitch[0])
+    middle, reach = row[0] / t.skin.pitch[0], row[1] / t.skin.pitch[0]
     place = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(t.rows - 1.001, 0.0))
     low, window = np.floor(place), len(t.columns)
     damping = 2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])

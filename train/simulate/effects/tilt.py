@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate import base
-from train.simulate.arm import Array, cross, dot
-from train.simulate.contact import by_depth, covered, curve_gap, total
+from train.simulate.arm import cross, dot
+from train.simulate.contact import by_depth, covered, curve_gap
 from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, determinant, search
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
 
 @dataclass
@@ -39,11 +37,11 @@ class Tilt:
     settled: Array
     gaps: Array
     stiffness: Array
-    order: NDArray[np.intp]
+    order: Places
     intact: Array
     nearest: Array
 
-    def keep_alive(self, trials: NDArray[np.intp], first: int, alive: Array) -> None:
+    def keep_alive(self, trials: Places, first: int, alive: Array) -> None:
         """Keep only the springs that are left.
 
         Args:
@@ -63,15 +61,17 @@ def law(t: Trials, i: Index) -> None:
     order, gaps, stiffness = by_depth(t.gaps, t.stiffness)
     deep = int(np.isfinite(pick(gaps, i)).sum(axis=0).max())
     order, gaps, stiffness = order[:deep], gaps[:deep], stiffness[:deep]
-    t.own["tilt"] = Tilt(
-        np.zeros((t.rows, t.n)),
-        np.zeros((2, t.n)),
-        np.zeros((2, t.n)),
-        gaps[:, None],
-        stiffness[:, None],
-        order,
-        stiffness,
-        pick(gaps, i).min(axis=1),
+    t.keep(
+        "tilt",
+        Tilt,
+        lever=np.zeros((t.rows, t.n)),
+        guess=np.zeros((2, t.n)),
+        settled=np.zeros((2, t.n)),
+        gaps=gaps[:, None],
+        stiffness=stiffness[:, None],
+        order=order,
+        intact=stiffness,
+        nearest=pick(gaps, i).min(axis=1),
     )
 
 
@@ -85,7 +85,7 @@ def locate(t: Trials, i: Index) -> None:
     tilt = dot(normal, along)
     z = np.clip(-dot(away, along), t.row_z[-1], t.row_z[0])
     on_face = dot(away, along_face) + t.row_z * dot(along, along_face)
-    t.weight[:, i] = covered(on_face, pick(t.values["width_m"], i), t.skin.row_pitch_m)
+    t.weight[:, i] = covered(on_face, pick(t.values["width_m"], i), t.skin.pitch[0])
     t.line_gap[:, i] = curve_gap(on_face, pick(t.values["radius_m"], i))
     t.own["tilt"].lever[:, i] = t.row_z - z
     point, upright = pose.origin + along * z, np.sqrt(1.0 - tilt * tilt)

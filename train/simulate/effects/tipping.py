@@ -13,12 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from train.simulate.arm import Array
 from train.simulate.contact import GRAVITY
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Array, Index, Mask, Trials, pick
 
 
 @dataclass
@@ -31,7 +28,7 @@ class Tipping:
         travel: (n,) metres until it falls.
     """
 
-    tips: NDArray[np.bool_]
+    tips: Mask
     force: Array
     travel: Array
 
@@ -44,7 +41,9 @@ def stand(t: Trials, i: Index) -> None:
     """
     mover, mass = t.own["sliding"], t.values["mass_kg"]
     foot, height = t.values["base_m"], t.values["height_m"]
-    own = t.own["tipping"] = Tipping(
+    own = t.keep(
+        "tipping",
+        Tipping,
         tips=t.plan.calls["tipping"] & (mover.static > foot / (2.0 * height)),
         force=mass * GRAVITY * foot / (2.0 * height),
         travel=height * np.arctan2(foot, 2.0 * height),

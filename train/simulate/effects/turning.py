@@ -15,9 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate.arm import Array
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Array, Index, Trials, pick
 
 LEVER = 2.0 / 3.0
 """Moment of a disc's friction for each newton of it, as a part of its radius."""
@@ -42,8 +40,7 @@ def stand(t: Trials, i: Index) -> None:
     # A disc's own moment of inertia is m R^2 / 2.
     heavier = 1.0 + 2.0 * aside * aside / (radius * radius)
     mover.inertia[i] = pick(mover.inertia, i) / heavier
-    own = t.own["turning"] = Turning(*np.zeros((2, t.n)))
-    own.per_metre[i] = aside / (lever * lever + aside * aside)
+    t.keep("turning", Turning).per_metre[i] = aside / (lever * lever + aside * aside)
 
 
 def pass_on(t: Trials, i: Index) -> None:

@@ -20,9 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate.arm import Array
-from train.simulate.plan import Index
-from train.simulate.trials import Trials, pick
+from train.simulate.trials import Array, Index, Trials, pick
 
 
 @dataclass
