@@ -26,17 +26,24 @@ ZERO_FRAMES = 3
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    parser.add_argument("format", choices=names(), help="the format of the file")
-    parser.add_argument("file", type=Path, help="the file")
-    parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
-    add_arm(parser, "to select and order a log's joint angles by name")
-    parser.add_argument(
-        "--zero",
-        action="store_true",
-        help="subtract each taxel's value in the first three frames, for a sensor whose offset "
-        "drifts between trials; nothing may touch the skin in them",
-    )
+    """Add a command for each format, and its options."""
+    formats = parser.add_subparsers(title="formats", metavar="FORMAT", required=True)
+    for name in names():
+        module = import_module(f"train.importers.{name}")
+        headline, _, more = (module.__doc__ or name).partition("\n\n")
+        command = formats.add_parser(name, help=headline, description=f"{headline}\n\n{more}")
+        command.add_argument("file", type=Path, help="the file or folder")
+        command.add_argument("--out", required=True, type=Path, help="folder for the recordings")
+        add_arm(command, "to select and order a log's joint angles by name")
+        command.add_argument(
+            "--zero",
+            action="store_true",
+            help="subtract each taxel's value in the first three frames, for a sensor whose offset "
+            "drifts between trials; nothing may touch the skin in them",
+        )
+        if hasattr(module, "add_options"):
+            module.add_options(command)
+        command.set_defaults(importer=module)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -44,7 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
     arm = open_arm(arguments)
     if not arguments.file.exists():
         raise InputError(f"{arguments.file}: no such file or folder")
-    trials = import_module(f"train.importers.{arguments.format}").trials(arguments.file, arm)
+    importer = arguments.importer
+    own = (arguments,) if hasattr(importer, "add_options") else ()
+    trials = importer.trials(arguments.file, arm, *own)
     count, without_threshold = 0, []
     for name, recording in bar(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:

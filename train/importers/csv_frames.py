@@ -37,7 +37,7 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
     table = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
     rate = table.number("rate_hz", 0.0, 0.0, FASTEST_HZ, open_low=table.has("rate_hz"))
     skin = {key: value for key, value in table.raw.items() if key != "rate_hz"}
-    labels = _labels(path / "labels.csv")
+    labels = labels_beside(path / "labels.csv")
     for number, folder in enumerate(folders):
         t, frames = _frames(folder, rate)
         yield (
@@ -55,7 +55,8 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
         )
 
 
-def _labels(path: Path) -> dict[str, dict[str, str]]:
+def labels_beside(path: Path) -> dict[str, dict[str, str]]:
+    """{trial: its labels} of a labels.csv; empty without one."""
     if not path.is_file():
         return {}
     with parsing(str(path), "a table of labels"):
