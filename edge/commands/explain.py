@@ -58,7 +58,10 @@ def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict
     for task, decision in model.decide(vector).items():
         labels = info.tasks[task].labels
         answer, rows = labels.index(decision.label), decision.neighbours.tolist()
-        why = explain(Space.of(model, task), vector, rows, answer, info.features, info.widths)
+        given = recording.labels.get(task)
+        truth = labels.index(given) if given in labels else None
+        form = info.features, info.widths, truth
+        why = explain(Space.of(model, task), vector, rows, answer, *form)
 
         def trial(near: Near, labels: tuple[str, ...] = labels) -> dict[str, Any]:
             return {**near._asdict(), "label": labels[near.label], "trial": info.trial(near.row)}

@@ -108,7 +108,8 @@ class Explanation(NamedTuple):
 
     Attributes:
         voters: the nearest training trials, nearest first.
-        rival: the nearest one of another label than the answer; None if there is none.
+        rival: the nearest one of another label than the answer, or of the right one; None if there
+            is none.
         pulls: {feature: how much more it pulls towards the nearest trial with the answer than
             towards the rival}, the strongest first.
         changes: one for each feature that can change the answer, the smallest of them, in
@@ -128,6 +129,7 @@ def explain(
     label: int,
     features: Sequence[str],
     widths: Sequence[int],
+    truth: int | None = None,
 ) -> Explanation:
     """Explain an answer.
 
@@ -138,6 +140,7 @@ def explain(
         label: index of the answer.
         features: names of the features in the vector.
         widths: columns of each.
+        truth: index of the label that is right, if it is known: the rival then has it.
     """
     feature_of = np.repeat(features, widths)[space.columns]
     members = {name: feature_of == name for name in features if name in feature_of}
@@ -157,7 +160,8 @@ def explain(
     nearest, own = tuple(map(near, voters)), space.labels == label
     if own.all():
         return Explanation(nearest)
-    a, b = (int(np.where(those, squares, np.inf).argmin()) for those in (own, ~own))
+    others = ~own if truth in (None, label) else space.labels == truth
+    a, b = (int(np.where(those, squares, np.inf).argmin()) for those in (own, others))
     apart = space.rows[a] - space.rows[b]
     changes = []
     for name, columns in members.items():

@@ -1,9 +1,9 @@
 """Draw a recording or a map of touch.
 
 Draws a recording: frames over time with the region found, and the three features; with --scene,
-what happens, seen from the side. Draws several recordings side by side, with the decisions of
---model. Draws a map that `edge-classify run --map` wrote: where things were touched, and what they
-were.
+what happens, seen from the side; with --model, its curves over those of the nearest training
+trials. Draws several recordings side by side, with the decisions of --model. Draws a map that
+`edge-classify run --map` wrote: where things were touched, and what they were.
 """
 
 from __future__ import annotations
@@ -23,8 +23,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         metavar="model.onnx",
-        help="show its decisions on several recordings, or its skin or arm behind a map",
+        help="show why it decides so on a recording, its decisions on several, or its skin or arm "
+        "behind a map",
     )
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR",
+        help="with --model, the folder of the training trials (default: that of the recording)",
+    )  # fmt: skip
     parser.add_argument(
         "--out", metavar="PNG", help="the picture to write (default: beside the recording)"
     )
@@ -50,8 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     first = arguments.recording[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
     single = len(arguments.recording) == 1 and Path(first).suffix == ".npz"
-    if arguments.model is not None and single:
-        raise InputError("--model is for several recordings or a map, not for one recording")
+    if arguments.model is not None and single and (arguments.scene or arguments.threshold):
+        raise InputError(
+            "--model draws other curves than --scene and --threshold; give one of them"
+        )
     if arguments.dark and len(arguments.recording) == 1:
         raise InputError("--dark is for several recordings")
     if len(arguments.recording) > 1:
@@ -68,6 +75,11 @@ def run(arguments: argparse.Namespace) -> int:
 
         info = None if arguments.model is None else Model(arguments.model).info
         picture.draw(TouchMap(first), out, first, arguments.task, info)
+    elif arguments.model is not None:
+        from train.draw import explanation
+
+        folder = arguments.data or Path(first).parent
+        explanation.draw(load(first), out, Model(arguments.model), folder, first)
     else:
         from train.draw.recording import draw
 

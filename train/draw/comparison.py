@@ -16,8 +16,8 @@ from edge.model.model import Model
 from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
-from edge.touch.track import ContactTracker, first_contact
-from train.dataset import arm_of
+from edge.touch.track import ContactTracker
+from train.dataset import arm_of, contacts
 from train.draw.recording import curves
 
 MOST = 6
@@ -57,7 +57,7 @@ def draw(
 
     if len(recordings) > MOST:
         raise InputError(f"{len(recordings)} recordings are too many side by side; give {MOST}")
-    contacts = [_contact(name, recording) for name, recording in recordings]
+    contacts = [contact_of(name, recording) for name, recording in recordings]
     horizon = WINDOW_S if model is None else model.info.window_s
     style: dict[Any, Any] = {"font.size": 12, "axes.prop_cycle": cycler(color=[INK, DECISION])}
     if dark:
@@ -112,14 +112,19 @@ def _draw(
         figure.savefig(file, format="png", dpi=100, bbox_inches="tight")
 
 
-def _contact(name: str, recording: Recording) -> tuple[float, FeatureSeries]:
+def contact_of(name: str, recording: Recording, number: int = 1) -> tuple[float, FeatureSeries]:
+    """Onset and series of a recording's first contact, or of a later one.
+
+    Raises:
+        InputError: there is no such contact; the message begins with `name`.
+    """
     chain = arm_of(recording, name)
     if chain is not None:
         recording = recording.for_joints(chain.names, name)
-    contact = first_contact(recording, ContactTracker(recording.layout, chain=chain))
-    if contact is None:
-        raise InputError(f"{name}: holds no contact")
-    return contact
+    touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
+    if len(touches) < number:
+        raise InputError(f"{name}: holds no contact" + (f" {number}" if number > 1 else ""))
+    return touches[number - 1]
 
 
 def _decided(name: str, recording: Recording, model: Model) -> Decided | None:

@@ -54,7 +54,11 @@ def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
 
 @pytest.mark.parametrize(
     "words",
-    [[*TOUCHES, "--scene"], [TOUCHES[0], "--model", str(demo.MODEL)], [TOUCHES[0], "--dark"]],
+    [
+        [*TOUCHES, "--scene"],
+        [TOUCHES[0], "--scene", "--model", str(demo.MODEL)],
+        [TOUCHES[0], "--dark"],
+    ],
 )
 def test_options_that_do_not_go_together_are_one_sentence(words, capsys, tmp_path):
     assert main(["show", *words, "--out", str(tmp_path / "a.png")]) == 2

@@ -1,0 +1,130 @@
+"""Draw why touches were answered as they were: their curves over those of the nearest trials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from edge.commands.explain import explanations
+from edge.errors import InputError
+from edge.files import write_whole
+from edge.model.model import Model
+from edge.recording import Recording, load
+from edge.touch.contact import FeatureSeries
+from edge.touch.layout import SkinLayout
+from train.draw.comparison import contact_of
+from train.draw.recording import curves
+from train.report.figures import STROKES, STYLE
+
+TOUCH, ALIKE, OTHER = STROKES[0], STROKES[2], STROKES[1]
+"""Colour, marker and dashes of the touch, of trials with its answer, and of those with another."""
+MOST_NEAR, MOST_PULLS = 4, 5
+
+
+@dataclass(frozen=True)
+class Case:
+    """An answer that is to be drawn.
+
+    Attributes:
+        title: what was answered.
+        touch: the contact.
+        near: text of the legend, contact (None if it is not at hand), and whether the label is
+            that of the answer, for each of the nearest trials.
+        pulls: {feature: how much more it pulls towards the answer}.
+        rival: the label that it does not pull to.
+    """
+
+    title: str
+    touch: FeatureSeries
+    near: Sequence[tuple[str, FeatureSeries | None, bool]]
+    pulls: Mapping[str, float]
+    rival: str
+
+
+def figure(cases: Sequence[Case], layout: SkinLayout, window_s: float) -> Figure:
+    """The three features of each case beside those of its nearest trials, and the pulls."""
+    with mpl.rc_context(STYLE):
+        drawn = Figure(figsize=(5.8, 5.0 * len(cases)), layout="constrained")
+        for part, case in zip(
+            drawn.subfigures(len(cases), squeeze=False)[:, 0], cases, strict=True
+        ):
+            _draw(part, case, layout, window_s)
+    return drawn
+
+
+def _draw(part: Any, case: Case, layout: SkinLayout, window_s: float) -> None:
+    part.suptitle(case.title, fontsize=10, weight="bold")
+    axes = part.subplots(2, 2).ravel()
+    units = (layout.force_unit, "taxels", layout.length_unit)
+    legend = {}
+    for axis, unit, name in zip(axes, units, curves(case.touch), strict=False):
+        own = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
+        legend["this touch"] = axis.plot(*_within(case.touch, name, window_s), **own)[0]
+        for place, (text, series, alike) in enumerate(case.near, start=1):
+            colour, _, dashes = ALIKE if alike else OTHER
+            curve = ([], []) if series is None else _within(series, name, window_s)
+            style = {"color": colour, "ls": dashes, "lw": 1.0, "ms": 4}
+            marks = {"marker": STROKES[place][1], "markevery": (0.04 * place, 0.25)}
+            legend[text] = axis.plot(*curve, **style, **marks)[0]
+        axis.set(title=name, xlabel="seconds from onset", ylabel=unit, xlim=(0.0, window_s))
+        axis.set_ylim(bottom=0.0)
+    strongest = list(case.pulls.items())[:MOST_PULLS]
+    signs = [ALIKE[0] if pull > 0.0 else OTHER[0] for _, pull in strongest]
+    axes[3].barh(range(len(strongest)), [pull for _, pull in strongest], color=signs)
+    axes[3].set_yticks(range(len(strongest)), [name for name, _ in strongest], fontsize=8)
+    axes[3].invert_yaxis()
+    axes[3].axvline(0.0, color="0.3", lw=0.8)
+    axes[3].set(title="pulls to the answer", xlabel=f"squared distance,\nagainst {case.rival}")
+    part.legend(legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False)
+
+
+def _within(series: FeatureSeries, name: str, window_s: float) -> tuple[Any, Any]:
+    inside = series.t <= window_s
+    return series.t[inside], curves(series)[name][inside]
+
+
+def draw(recording: Recording, out: Path, model: Model, folder: Path, where: str) -> None:
+    """Draw a recording over the trials of a folder that a model finds nearest, into a PNG.
+
+    Raises:
+        InputError: the recording does not suit the model or holds no contact, or the folder holds
+            none of the trials.
+    """
+    info = model.info
+    lines = list(explanations(model, recording, where))
+    touch = contact_of(where, recording)[1]
+    known: dict[str, FeatureSeries | None] = {}
+    cases = []
+    for line in lines:
+        rival = line["rival"] or {"label": "others"}
+        nearest = [*line["nearest"][:MOST_NEAR], *([line["rival"]] if line["rival"] else [])]
+        near = []
+        for trial in nearest:
+            name = trial["trial"]
+            if name not in known:
+                known[name] = _trial(folder, name)
+            text = f"{name}: {trial['label']}, {trial['distance']:.3g} away"
+            missing = "" if known[name] is not None else " (recording not found)"
+            near.append((text + missing, known[name], trial["label"] == line["label"]))
+        title = f"{line['task']}: {line['label']}"
+        cases.append(Case(title, touch, near, line["pulls"], rival["label"]))
+    if not any(known.values()):
+        raise InputError(
+            f"{folder}: holds none of the nearest trials, such as {next(iter(known))}; name their "
+            "folder by --data"
+        )
+    with write_whole(out) as file:
+        figure(cases, recording.layout, info.window_s).savefig(file, format="png", dpi=110)
+
+
+def _trial(folder: Path, name: str) -> FeatureSeries | None:
+    """A trial's contact by its name, if its recording is in the folder."""
+    path, number = folder / f"{name}.npz", 1
+    if not path.is_file() and name.rpartition(" ")[2].isdecimal():
+        path, number = folder / f"{name.rpartition(' ')[0]}.npz", int(name.rpartition(" ")[2])
+    return contact_of(str(path), load(path), number)[1] if path.is_file() else None
