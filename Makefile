@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constrain
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test kernel-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk \
+  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk \
   stopping soak soak-day constraints clean
 
 help:
@@ -28,6 +28,7 @@ help:
 	@echo "  make wheel-test    test the wheel in an empty environment outside the checkout"
 	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
+	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
 	@echo "Measurements"
 	@echo "  make bench         speed beside the alternatives"
@@ -209,6 +210,9 @@ wheel-test: wheel
 
 kernel-test: $(READY)
 	$(BIN)/python -m pytest board/test_kernel.py -rs --capture=tee-sys
+
+service-test: $(READY)
+	$(BIN)/python -m pytest board/test_service.py -rs
 
 board-test: wheel
 	$(BIN)/python -m pytest board/test_aarch64.py -rs --capture=tee-sys

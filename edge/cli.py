@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 
 from edge import __version__
-from edge.errors import EdgeError
+from edge.errors import EdgeError, InputError
 
 COMMANDS = tuple(
     "check scan calibrate record label run view replay explain info verify bench fake demo".split()
@@ -73,7 +73,7 @@ def add_commands(
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse the arguments and run the command; returns the exit status.
 
-    An expected error becomes one sentence on stderr and exit status 2. A shell that asks for
+    An expected error becomes one sentence on stderr and exit status 2 or 3. A shell that asks for
     completions gets them, if argcomplete is installed.
     """
     if "_ARGCOMPLETE" in os.environ:
@@ -116,7 +116,7 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
         return status
     except EdgeError as error:
         print(f"{top.prog}: {error}", file=sys.stderr)
-        return 2
+        return 2 if isinstance(error, InputError) else 3  # a device may be there a moment later
     except BrokenPipeError:
         _discard_output()  # the reader of the output has closed the pipe
         return 0
@@ -156,7 +156,11 @@ def _discard_output() -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; returns 0 for success, 1 if a check failed, 2 for bad usage or input."""
+    """Run the command.
+
+    Returns:
+        0 for success, 1 if a check failed, 2 for bad usage or input, 3 for a device that fails.
+    """
     _open_missing_streams()
     words = list(sys.argv[1:] if argv is None else argv)
     wanted = [word for word in words[:1] if word in COMMANDS]

@@ -13,6 +13,7 @@ import pytest
 from edge import __version__, cli
 from edge.__main__ import main as start
 from edge.errors import InputError
+from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
 
 ROOT = Path(__file__).parents[2]
@@ -102,9 +103,10 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
     assert done.stdout.split() == ["record"]
 
 
-def test_bad_input_is_one_sentence_and_exit_2(capsys):
-    assert cli.dispatch(top(raising(InputError("a.npz: no such file"))), []) == 2
-    assert capsys.readouterr().err == "edge-classify: a.npz: no such file\n"
+@pytest.mark.parametrize(("error", "status"), [(InputError, 2), (BusMissing, 3)])
+def test_bad_input_is_one_sentence_and_exit_2_and_a_device_exit_3(capsys, error, status):
+    assert cli.dispatch(top(raising(error("a: not there"))), []) == status
+    assert capsys.readouterr().err == "edge-classify: a: not there\n"
 
 
 def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(capsys, monkeypatch):
