@@ -20,7 +20,7 @@ WIDER_THAN_THE_PAGE = """
 const width = document.documentElement.clientWidth;
 return [...document.querySelectorAll('body *')].filter(element => {
   const box = element.getBoundingClientRect();
-  return box.width > 0 && box.right > width + 1;
+  return box.width > 0 && box.right > width + 1 && !element.closest('.table table');
 }).filter((element, i, all) => !all.includes(element.parentElement))
   .map(element => element.tagName + ': ' + element.textContent.slice(0, 60));
 """

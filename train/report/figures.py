@@ -1,67 +1,92 @@
-"""The reports' plots, as PNG."""
+"""The reports' pictures, as PNG: each is drawn for a page, and again for a phone."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from train.evaluate import Result
+from train.report.section import Figure
 
-STROKES: tuple[tuple[str, str, Any], ...] = (
-    ("#1f5fa8", "o", "-"),
-    ("#c8553d", "s", "--"),
-    ("#3a7d44", "^", "-."),
-    ("#7a5195", "D", ":"),
-    ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1))),
-    ("#444444", "P", (0, (3, 1, 1, 3))),
+STROKES: tuple[tuple[str, str, Any, str], ...] = (
+    ("#1f5fa8", "o", "-", ""),
+    ("#d9822b", "s", "--", "///"),
+    ("#2f7d5b", "^", "-.", "..."),
+    ("#7a5195", "D", ":", "xxx"),
+    ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1)), "|||"),
+    ("#444444", "P", (0, (3, 1, 1, 3)), "---"),
 )
-"""Colour, marker and dashes of each line, so that no line differs from another by hue alone."""
-COLOURS = tuple(colour for colour, _, _ in STROKES)
+"""Colour, marker, dashes and hatch of each series, so that none differs by hue alone."""
 STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
     "grid.alpha": 0.25,
     "axes.axisbelow": True,
+    "hatch.linewidth": 0.6,
 }
+WIDE, PHONE = 7.6, 3.6
+"""Inches across."""
 MATRIX_TEXT = 20
 """Classes up to which a confusion matrix shows its numbers."""
-BESIDE: dict[str, Any] = {"fontsize": 8, "loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
-"""A legend outside the axes, where it hides nothing."""
 
 
-def canvas(width: float, height: float) -> Figure:
-    """An empty figure of that size in inches."""
-    return Figure(figsize=(width, height), layout="constrained")
+def picture(
+    name: str,
+    title: str,
+    draw: Callable[[Any, bool], None],
+    heights: tuple[float, float],
+    width: float = WIDE,
+    style: Mapping[Any, Any] | None = None,
+) -> Figure:
+    """A picture by `draw(canvas, phone)`; the same numbers give the same bytes.
+
+    Args:
+        name: of its file.
+        title: its caption.
+        draw: draws on an empty canvas, which is a phone's where `phone` is true.
+        heights: inches on a page and on a phone.
+        width: inches on a page.
+        style: of matplotlib.
+    """
+    pngs = []
+    for phone in (False, True):
+        # A phone's pixels are finer.
+        size, text, dpi = (PHONE, 8.0, 200) if phone else (width, 9.0, 110)
+        with mpl.rc_context({**STYLE, "font.size": text, **(style or {})}):
+            canvas = Canvas(figsize=(size, heights[phone]), layout="constrained")
+            draw(canvas, phone)
+            buffer = io.BytesIO()
+            canvas.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
+        pngs.append(buffer.getvalue())
+    return Figure(name, title, *pngs)
 
 
-def png(figure: Figure) -> bytes:
-    """The figure's bytes; the same figure gives the same bytes."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
-    return buffer.getvalue()
+def legend(canvas: Any, axes: Any, columns: int) -> None:
+    """A legend above the axes, where it hides nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    if len(handles) > 1:
+        place = {"loc": "outside upper center", "ncols": columns, "frameon": False}
+        canvas.legend(handles, labels, **place)
 
 
-def curve(
-    axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result], **more: Any
-) -> None:
+def curve(axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result]) -> None:
     """Draw accuracies in percent with their 95 % intervals, in the `order`-th of `STROKES`."""
-    colour, marker, dashes = STROKES[order % len(STROKES)]
+    colour, marker, dashes, _ = STROKES[order % len(STROKES)]
     low, high = np.array([result.interval for result in results]).T * 100
     axes.fill_between(x, low, high, color=colour, alpha=0.12, lw=0)
     y = [100 * result.accuracy for result in results]
-    style = {"color": colour, "marker": marker, "ls": dashes, "ms": 4, "label": label, **more}
-    axes.plot(x, y, **style)
+    axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
 
 
-def confusion(truth: NDArray[np.str_], said: NDArray[np.str_], title: str) -> bytes:
+def confusion(name: str, title: str, truth: NDArray[np.str_], said: NDArray[np.str_]) -> Figure:
     """A row for each thing touched, a column for each answer; shares of the row's trials."""
     classes = sorted(set(truth) | set(said))
     n = len(classes)
@@ -69,108 +94,115 @@ def confusion(truth: NDArray[np.str_], said: NDArray[np.str_], title: str) -> by
     for touched, answer in zip(truth, said, strict=True):
         counts[classes.index(touched), classes.index(answer)] += 1
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    with mpl.rc_context({**STYLE, "axes.grid": False}):
-        size = 2.6 + 0.36 * n if n > 6 else 3.4 + 0.45 * n
-        figure = canvas(size + 0.6, size)
-        axes: Any = figure.subplots()
-        image = axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
-        turned = {"rotation": 90} if n > 4 else {"rotation": 30, "ha": "right"}
-        axes.set_xticks(range(n), classes, **turned)
-        axes.set_yticks(range(n), classes)
-        axes.set(xlabel="answer", ylabel="touched", title=title)
+    numbered = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
+
+    def draw(canvas: Any, phone: bool) -> None:
+        axes = canvas.subplots()
+        axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
+        small = {"fontsize": 6} if phone and n > 6 else {}
+        axes.set_xticks(range(n), range(1, n + 1), **small)
+        axes.set_yticks(range(n), numbered, **small)
         for i, j in zip(*np.nonzero(counts), strict=True) if n <= MATRIX_TEXT else ():
-            text = f"{counts[i, j]:.0f}" + (f"\n{shares[i, j]:.0%}" if n <= 6 else "")
+            text = f"{counts[i, j]:.0f}" + (f"\n{shares[i, j]:.0%}" if n <= 4 else "")
             colour = "white" if shares[i, j] > 0.55 else "black"
-            axes.text(j, i, text, ha="center", va="center", color=colour, fontsize=8)
-        figure.colorbar(image, ax=axes, shrink=0.7, label="share of the trials touched")
-        return png(figure)
+            axes.text(j, i, text, ha="center", va="center", color=colour, **small)
+
+    height = 1.2 + 0.3 * n if n > 6 else 2.0 + 0.45 * n
+    heights = height, 0.9 + 0.13 * n if n > 6 else 2.8
+    return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
 
 
 def lines(
+    name: str,
+    title: str,
     x: Sequence[float],
     results: Mapping[str, Sequence[Result]],
     *,
     label: str,
-    title: str,
     paper: Mapping[str, Mapping[float, float]] | None = None,
-    names: Sequence[str] = (),
-    marks: Mapping[str, float] | None = None,
-) -> bytes:
+    ticks: Sequence[str] = (),
+) -> Figure:
     """Accuracy against x, a line a task, with binomial intervals; the paper's points hollow.
 
     Args:
+        name: of the picture's file.
+        title: its caption.
         x: (m,).
         results: {task: m results}.
         label: label of the x axis.
-        title: title of the plot.
         paper: {task: {x: percent}}.
-        names: texts at x, which then lie on a logarithmic axis.
-        marks: {text: x} of vertical lines.
+        ticks: texts at x, which then lie on a logarithmic axis.
     """
-    with mpl.rc_context(STYLE):
-        figure = canvas(7.6, 3.8)
-        axes: Any = figure.subplots()
+
+    def draw(canvas: Any, phone: bool) -> None:
+        axes = canvas.subplots()
         for order, (task, row) in enumerate(results.items()):
             curve(axes, order, task, x, row)
             points = sorted((paper or {}).get(task, {}).items())
             if points:
-                colour, marker, _ = STROKES[order % len(STROKES)]
+                colour, marker, *_ = STROKES[order % len(STROKES)]
                 style = {"color": colour, "marker": marker, "mfc": "white", "lw": 0.6}
                 axes.plot(*zip(*points, strict=True), **style, label=f"{task}, paper")
-        for text, at in (marks or {}).items():
-            axes.axvline(at, color="0.4", lw=1, ls=":", label=text)
-        if names:
+        if ticks:
             axes.set_xscale("log")
-            axes.set_xticks(x, names)
+            axes.set_xticks(x, ticks)
             axes.minorticks_off()
-        axes.set(xlabel=label, ylabel="leave-one-out accuracy, %", title=title, ylim=(0, 102))
-        axes.legend(**BESIDE)
-        return png(figure)
+        axes.set(xlabel=label, ylabel="decisions that are right, %", ylim=(0, 103))
+        legend(canvas, axes, 2 if phone else 4)
+
+    return picture(name, title, draw, (3.8, 3.6))
 
 
 def bars(
+    name: str,
+    title: str,
     names: Sequence[str],
     groups: Mapping[str, Sequence[Result | None]],
     *,
-    title: str,
-    paper: Mapping[str, Mapping[str, float]] | None = None,
+    marks: Mapping[str, Mapping[str, float]] | None = None,
+    mark: str = "paper",
     reference: Mapping[str, float] | None = None,
-) -> bytes:
+) -> Figure:
     """Accuracy of each name, the bars of its groups side by side, with intervals.
 
     Args:
+        name: of the picture's file.
+        title: its caption.
         names: along the axis.
         groups: {group: results of the names, None where there is none}.
-        title: title of the plot.
-        paper: {group: {name: percent}}, drawn as diamonds.
+        marks: {group: {name: percent}}, drawn as diamonds.
+        mark: the diamonds' name.
         reference: {text: percent} of vertical lines.
     """
     m, g = len(names), len(groups)
-    with mpl.rc_context({**STYLE, "axes.grid.axis": "x"}):
-        figure = canvas(7.4, 1.3 + m * (0.14 + 0.16 * g))
-        axes: Any = figure.subplots()
-        height = 0.8 / g
-        mark = "paper"
-        for i, (colour, (group, row)) in enumerate(zip(COLOURS, groups.items(), strict=False)):
+    height = 0.8 / g
+
+    def draw(canvas: Any, phone: bool) -> None:
+        axes = canvas.subplots()
+        diamonds = mark
+        for i, (stroke, (group, row)) in enumerate(zip(STROKES, groups.items(), strict=False)):
+            colour, _, _, hatch = stroke
             y = np.arange(m) + (i - (g - 1) / 2) * height
             shown = [(at, result) for at, result in zip(y, row, strict=True) if result]
             values = np.array([100 * result.accuracy for _, result in shown])
             ends = np.array([result.interval for _, result in shown]).T * 100
-            spread = np.maximum([values - ends[0], ends[1] - values], 0.0)
             axes.barh(
                 [at for at, _ in shown], values, height * 0.92, color=colour, alpha=0.85,
-                label=group, xerr=spread, error_kw={"ecolor": "0.25", "elinewidth": 0.8},
+                hatch=hatch, ec="white", lw=0, label=group,
+                xerr=np.maximum([values - ends[0], ends[1] - values], 0.0),
+                error_kw={"ecolor": "0.25", "elinewidth": 0.8},
             )  # fmt: skip
-            theirs = [(p, y[names.index(n)]) for n, p in (paper or {}).get(group, {}).items()]
-            if theirs:
-                diamonds = {"color": "black", "mfc": "gold", "ms": 5, "label": mark}
-                axes.plot(*zip(*theirs, strict=True), "D", **diamonds)
-                mark = "_nolegend_"
+            beside = [(p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()]
+            if beside:
+                style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": diamonds}
+                axes.plot(*zip(*beside, strict=True), marker="D", **style)
+                diamonds = "_nolegend_"
         for text, at in (reference or {}).items():
             axes.axvline(at, color="0.35", lw=1, ls=":", label=text)
-        axes.set_yticks(range(m), names)
+        axes.set_yticks(range(m), [textwrap.fill(n, 18 if phone else 40) for n in names])
         axes.invert_yaxis()
-        axes.set(xlim=(0, 100), xlabel="accuracy, %", title=title)
-        if g > 1 or paper or reference:
-            axes.legend(**BESIDE)
-        return png(figure)
+        axes.set(xlim=(0, 103), xlabel="decisions that are right, %")
+        legend(canvas, axes, 2 if phone else 5)
+
+    tall = 1.2 + m * (0.14 + 0.16 * g)
+    return picture(name, title, draw, (tall, tall + 0.4), style={"axes.grid.axis": "x"})

@@ -31,7 +31,8 @@ h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
 p, dl { max-width: 46rem; } dt { font-weight: 600; }
 dd { margin: 0 0 .6rem 1.2rem; } code { font-size: .93em; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
+figcaption { font-weight: 600; margin-bottom: .3rem; }
+.table { overflow-x: auto; } table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
   max-width: 100%; }
 th { background: var(--soft); text-align: left; vertical-align: bottom; }
 th, td { padding: .18rem .55rem; border-bottom: 1px solid var(--line); }
@@ -40,7 +41,7 @@ td.number { text-align: right; white-space: nowrap; } tr.no td { background: var
   th, td { padding: .18rem .35rem; } }
 """
 
-LONGEST = 16
+LONGEST = 32
 """Rows that a table may have before it is folded."""
 CODE = re.compile(r"`([^`]+)`")
 KEYS = 4
@@ -89,21 +90,17 @@ def _cell(value: Any, more: bool, decimals: int) -> str:
 def _table(table: Table) -> str:
     head = "".join(
         f"<th{' class=more' if i >= table.narrow else ''}>{_text(column)}</th>"
-        for i, column in enumerate(table.columns[: table.wide])
+        for i, column in enumerate(table.columns)
     )
     decimals = [_decimals(column) for column in zip(*table.cells, strict=True)]
     rows = "\n".join(
         f"<tr{' class=no' if row[-1] == 'no' else ''}>"
-        + "".join(
-            _cell(value, i >= table.narrow, decimals[i])
-            for i, value in enumerate(row[: table.wide])
-        )
+        + "".join(_cell(value, i >= table.narrow, decimals[i]) for i, value in enumerate(row))
         + "</tr>"
         for row in table.cells
     )
-    files = "All columns: " if len(table.columns) > table.wide else ""
-    files += ", ".join(f'<a href="{name}">{name}</a>' for name in table_csv(table))
-    body = f"<table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
+    files = ", ".join(f'<a href="{name}">{name}</a>' for name in table_csv(table))
+    body = f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
     if len(table.rows) > LONGEST:
         body = f"<details><summary>{len(table.rows)} rows</summary>\n{body}</details>"
     return f"<h3>{_text(table.title)}</h3>\n{body}<p><small>{files}</small></p>"
@@ -117,7 +114,7 @@ def _figure(figure: Figure) -> str:
     if figure.narrow is not None:
         media = f'<source media="(max-width: 700px)" srcset="{source(figure.narrow)}">'
         image = f"<picture>{media}{image}</picture>"
-    return f"<figure>{image}</figure>"
+    return f"<figure><figcaption>{_text(figure.title)}</figcaption>{image}</figure>"
 
 
 def _section(section: Section, folded: bool) -> str:

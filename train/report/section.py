@@ -24,7 +24,6 @@ class Table:
         timed: columns that a clock measured, so that they differ from run to run; they go to a
             CSV file of their own.
         narrow: number of columns, from the first, that a phone shows; the CSV has them all.
-        wide: number of columns that a screen shows.
     """
 
     name: str
@@ -32,7 +31,6 @@ class Table:
     rows: Sequence[Row]
     timed: tuple[str, ...] = ()
     narrow: int = 4
-    wide: int = 10
 
     @property
     def columns(self) -> list[str]:
@@ -51,7 +49,7 @@ class Figure:
 
     Attributes:
         name: name of its file.
-        title: description for readers who cannot see it.
+        title: caption, and description for readers who cannot see it.
         png: its bytes.
         narrow: the bytes of a version drawn for a phone, if there is one.
     """

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.recording import Recording
-from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.dataset import DataSet
 from train.evaluate import Labels
-from train.report import skins
 from train.report.work import Workers
 from train.simulate.scene_model import Scene
 
@@ -24,7 +22,7 @@ class Context:
     """A data set and the processes to work with.
 
     Attributes:
-        dataset: contacts followed for the paper's three features, up to 2 s.
+        dataset: contacts followed for up to 2 s.
         scene: the scene that the recordings were simulated from, if any.
         workers: the processes.
     """
@@ -55,21 +53,3 @@ class Context:
     ) -> list[Any]:
         """function(*case) of each case, in their order, by all processes."""
         return self.workers.map(what, function, cases)
-
-    def follow_again(
-        self, what: str, views: Sequence[skins.View]
-    ) -> list[list[FeatureSeries | None]]:
-        """For each view, the trials' contacts in their order."""
-        data, recordings = self.dataset, self.recordings
-        # A recording travels to another process once, however many views it is seen in.
-        chunks = np.array_split(np.arange(len(recordings)), 8 * self.workers.jobs)
-        cases = [
-            ({i: recordings[i] for i in chunk.tolist()}, views, data.tracking, data.chain)
-            for chunk in chunks
-            if chunk.size
-        ]
-        merged: list[dict[int, FeatureSeries | None]] = [{} for _ in views]
-        for answer in self.map(what, skins.follow_views, cases):
-            for all_seen, seen in zip(merged, answer, strict=True):
-                all_seen |= seen
-        return [[seen[i] for i in sorted(seen)] for seen in merged]

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from scipy.stats import rankdata, spearmanr
 
 from train.evaluate import Result
-from train.report.figures import BESIDE, COLOURS, STYLE, canvas, png
-from train.report.section import Figure, Numbers, Section, Table, counted
-from train.study.context import Context
+from train.report.figures import STROKES, legend, picture
+from train.report.section import Figure, Numbers, Row, Section, Table, counted
 
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140
@@ -60,12 +58,6 @@ class Entry:
         """
         form = {"I": "384", "II": "none", "III": "max_force contact_area"}
         return self.setting == form[self.table]
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % binomial interval of 140 trials, in percent."""
-        low, high = _interval(self.percent, TRIALS)
-        return round(low, 2), round(high, 2)
 
 
 def _interval(share: float, trials: int) -> tuple[float, float]:
@@ -158,13 +150,6 @@ def rank_correlation(theirs: Sequence[float], ours: Sequence[float]) -> float | 
     return float(spearmanr(theirs, ours).statistic)
 
 
-def section(context: Context, every: Sequence[Numbers]) -> Section | None:
-    """The comparison with the paper; None for recordings that are not of a scene of ours."""
-    if context.scene is None:
-        return None
-    return comparison(every, len(every) * len(context.dataset.trials))
-
-
 def comparison(every: Sequence[Numbers], tested: int) -> Section:
     """Each of the paper's numbers beside ours, and the rank correlations.
 
@@ -174,11 +159,10 @@ def comparison(every: Sequence[Numbers], tested: int) -> Section:
     """
     mean = mean_of(every)
     known = [entry for entry in entries() if entry.key in mean]
-    side, reach = [], []
+    side: list[Row] = []
     for entry in known:
         ours = mean[entry.key]
         low, high = difference(entry.percent, ours, tested)
-        reach.append((entry.percent + low, entry.percent + high))
         side.append(
             {
                 "place": entry.place,
@@ -192,35 +176,16 @@ def comparison(every: Sequence[Numbers], tested: int) -> Section:
                 "within": "yes" if low <= 0.0 <= high else "no",
             }
         )
-    tables: dict[tuple[str, str], list[int]] = {}
-    for i, entry in enumerate(known):
-        tables.setdefault((entry.table, entry.task), []).append(i)
-    ranks = []
-    for (table, task), rows in tables.items():
-        theirs = [known[i].percent for i in rows]
-        rank = rank_correlation(theirs, [mean[known[i].key] for i in rows])
-        alone = [rank_correlation(theirs, [n[known[i].key] for i in rows]) for n in every]
-        within = sum(side[i]["within"] == "yes" for i in rows)
-        ranks.append(
-            {
-                "table": table,
-                "task": task,
-                "rank correlation": "none: all equal" if rank is None else round(rank, 2),
-                "positive in data sets": f"{sum((r or 0.0) > 0.0 for r in alone)} of {len(every)}",
-                "perfect copies below zero %": negative_by_chance(theirs, tested),
-                "settings": len(rows),
-                "mean difference": round(float(np.mean([side[i]["difference"] for i in rows])), 2),
-                "within interval": f"{within} of {len(rows)}",
-            }
-        )
-    inside = sum(row["within"] == "yes" for row in side)
+    pairs = dict.fromkeys((entry.table, entry.task) for entry in known)
+    ranks = [_ranks(*pair, known, side, mean, every, tested) for pair in pairs]
+    inside = [row for row in side if row["within"] == "yes"]
     free = [row for row in side if not row["headline"]]
-    free_inside = sum(row["within"] == "yes" for row in free)
-    title = f"{inside} of the paper's {len(known)} numbers lie within the interval"
+    free_inside = sum(not row["headline"] for row in inside)
+    title = f"{len(inside)} of the paper's {len(known)} numbers lie within the interval"
     return Section(
         "Ours beside the paper's",
         [
-            f"{inside} of {len(side)} numbers lie within the 95 % interval of the difference "
+            f"{len(inside)} of {len(side)} numbers lie within the 95 % interval of the difference "
             f"between {tested} trials here ({counted(len(every), 'simulated data set')}) and the "
             f"paper's {TRIALS}. {len(side) - len(free)} of them repeat the three headline "
             "accuracies of section IV-A, which the free values of the scene were chosen to meet, "
@@ -240,8 +205,33 @@ def comparison(every: Sequence[Numbers], tested: int) -> Section:
                 narrow=5,
             ),
         ],
-        [Figure("paper", title, _against(known, mean, reach, title))],
+        [_against(known, side, title)],
     )
+
+
+def _ranks(
+    table: str,
+    task: str,
+    known: Sequence[Entry],
+    side: Sequence[Row],
+    mean: Numbers,
+    every: Sequence[Numbers],
+    tested: int,
+) -> Row:
+    """The row of one task in one of the paper's tables."""
+    own = [entry for entry in known if (entry.table, entry.task) == (table, task)]
+    theirs = [entry.percent for entry in own]
+    rank = rank_correlation(theirs, [mean[entry.key] for entry in own])
+    alone = [rank_correlation(theirs, [n[entry.key] for entry in own]) for n in every]
+    within = [row["within"] for entry, row in zip(known, side, strict=True) if entry in own]
+    return {
+        "table": table,
+        "task": task,
+        "rank correlation": "all equal" if rank is None else round(rank, 2),
+        "positive in data sets": f"{sum((r or 0.0) > 0.0 for r in alone)} of {len(every)}",
+        "perfect copies below zero %": negative_by_chance(theirs, tested),
+        "within interval": f"{within.count('yes')} of {len(own)}",
+    }
 
 
 def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
@@ -257,32 +247,22 @@ def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
     ]
 
 
-def _disagreements(side: Sequence[dict[str, Any]], ranks: Sequence[dict[str, Any]]) -> list[str]:
+def _disagreements(side: Sequence[Row], ranks: Sequence[Row]) -> list[str]:
     """Paragraphs on the numbers outside their interval and on orders against the paper's."""
     outside = sorted(
         (row for row in side if row["within"] == "no"), key=lambda row: -abs(row["difference"])
     )
     if not outside:
         return ["No number lies outside."]
-    listed = (f"{r['place']} ({r['task']}) {r['difference']:+.2f} points" for r in outside[:SHOWN])
-    more = "; and more in the table." if len(outside) > SHOWN else "."
-    text = ["Outside, the largest first: " + "; ".join(listed) + more]
-    scaled = [row for row in outside if row["place"].startswith("Table II,")]
-    skin = [row for row in outside if row not in scaled]
-    if skin:
-        higher = sum(row["difference"] > 0 for row in skin)
-        text.append(
-            f"Of the {len(skin)} outside in Tables I and III, {higher} are higher here and "
-            f"{len(skin) - higher} lower. A higher number means that the simulation gives "
-            "information that the real skin did not (it repeats too well, or its noise, covers and "
-            "drift are too mild). A lower number means that it lacks information of real contacts."
-        )
-    if scaled:
-        text.append(
-            f"The {len(scaled)} outside in Table II say more about the paper's scaling than about "
-            "the simulation: by Eqs. 1 to 5 some of its methods are one classifier, and yet the "
-            "paper gives them different accuracies (see the section on scaling)."
-        )
+    listed = [f"{r['place']} ({r['task']}) {r['difference']:+.1f} points" for r in outside[:SHOWN]]
+    listed += ["and more in the table"] * (len(outside) > SHOWN)
+    higher = sum(row["difference"] > 0 for row in outside)
+    text = [
+        f"{len(outside)} lie outside, {higher} of them higher here than in the paper. The largest "
+        f"differences: {'; '.join(listed)}. A higher number means that the simulation gives "
+        "information that the real skin did not; a lower one, that it lacks some. In Table II some "
+        "of the paper's methods are one classifier, see the section on scaling."
+    ]
     backwards = [
         f"Table {r['table']}, {r['task']} ({r['rank correlation']:+.2f}; positive in "
         f"{r['positive in data sets']} data sets; {r['perfect copies below zero %']:g} % of "
@@ -298,29 +278,28 @@ def _disagreements(side: Sequence[dict[str, Any]], ranks: Sequence[dict[str, Any
     return text
 
 
-def _against(
-    known: Sequence[Entry], mean: Numbers, reach: Sequence[tuple[float, float]], title: str
-) -> bytes:
+def _against(known: Sequence[Entry], side: Sequence[Row], title: str) -> Figure:
     """Ours against the paper's, a point a number; hollow where its bar misses the diagonal."""
     marks = dict(zip(dict.fromkeys(e.table for e in known), "os^", strict=False))
-    colours = dict(zip(sorted({e.task for e in known}), COLOURS, strict=False))
-    with mpl.rc_context(STYLE):
-        figure = canvas(7.4, 5.6)
-        axes: Any = figure.subplots()
-        ends = min(min(e.percent, mean[e.key]) for e in known) - 4.0, 102.0
+    strokes = dict(zip(sorted({e.task for e in known}), STROKES, strict=False))
+    ends = min(min(row["paper %"], row["ours %"]) for row in side) - 4.0, 102.0
+
+    def draw(canvas: Any, phone: bool) -> None:
+        axes = canvas.subplots()
         axes.plot(ends, ends, color="0.4", lw=1, label="equal")
-        for entry, (low, high) in zip(known, reach, strict=True):
-            colour = colours[entry.task]
-            axes.plot([entry.percent] * 2, [low, high], color=colour, lw=1, alpha=0.45)
-            face = colour if low <= entry.percent <= high else "white"
+        for entry, row in zip(known, side, strict=True):
+            colour, _, dashes, _ = strokes[entry.task]
+            face = colour if row["within"] == "yes" else "white"
+            bar = [entry.percent + row["from"], entry.percent + row["to"]]
+            axes.plot([entry.percent] * 2, bar, color=colour, lw=1, alpha=0.6, ls=dashes)
             style = {"color": colour, "mfc": face, "ms": 6}
-            axes.plot(entry.percent, mean[entry.key], marks[entry.table], **style)
-        for task, colour in colours.items():
-            axes.plot([], [], "-", color=colour, lw=4, label=task)
+            axes.plot(entry.percent, row["ours %"], marks[entry.table], **style)
+        for task, (colour, _, dashes, _) in strokes.items():
+            axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
         for table, mark in marks.items():
             axes.plot([], [], mark, color="0.3", label=f"Table {table}")
-        axes.plot([], [], "o", color="0.3", mfc="white", label="outside the interval")
+        axes.plot([], [], "o", color="0.3", mfc="white", label="outside")
         axes.set(xlim=ends, ylim=ends, xlabel="the paper's accuracy, %", ylabel="ours, %")
-        axes.set_title(title)
-        axes.legend(**BESIDE)
-        return png(figure)
+        legend(canvas, axes, 3 if phone else 4)
+
+    return picture("paper", title, draw, (5.6, 4.4))

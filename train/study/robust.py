@@ -14,7 +14,7 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 from train.report import figures
 from train.report.score import grid_search, score, transfer
-from train.report.section import Figure, Section, Table
+from train.report.section import Section, Table
 from train.report.skins import follow, vectors
 from train.simulate.engine import run_physics
 from train.simulate.run import file_name, parts, recordings
@@ -142,18 +142,19 @@ def section(context: Context) -> Section | None:
         for how, results in zip(HOW, sets, strict=True)
         for task, result in results.items()
     ]
-    pictures = []
-    for task in y:
-        png = figures.bars(
+    pictures = [
+        figures.bars(
+            f"robustness_{task}",
+            f"{task}: accuracy after a change",
             list(series),
             {
                 how: [result[task] for result in results]
                 for how, results in zip(HOW, (own, to), strict=True)
             },
-            title=f"{task}: the cost of a change",
             reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
         )
-        pictures.append(Figure(f"robustness_{task}", f"Robustness, {task}", png))
+        for task in y
+    ]
     title = "Another speed, arm or sensor; trained with it or without it"
     return Section(
         "Another speed, another arm, each effect of the sensor",

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from edge.errors import InputError
+from edge.touch.feature_sets import expand
 from train.cluster import on_cluster
 from train.dataset import load_trials
 from train.progress import bar
@@ -20,28 +21,21 @@ from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
 from train.simulate.scene_model import Scene
-from train.study import beyond, classify, findings, honest, paper, resolution, robust
+from train.study import methods, paper, robust, sweeps
 from train.study.context import Context
 
-COMPARED = (resolution.section, classify.scaling, classify.features)
+COMPARED = (sweeps.resolution, sweeps.scaling, sweeps.features)
 """The analyses of which the paper has numbers."""
 ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
-    honest.section,
-    beyond.section,
-    classify.confusion,
-    resolution.section,
-    classify.window,
-    classify.scaling,
-    classify.features,
+    methods.section,
+    sweeps.confusion,
+    sweeps.resolution,
+    sweeps.window,
+    sweeps.scaling,
+    sweeps.features,
     robust.section,
 )
 """Each analyses the data set; None where it has nothing to say of it."""
-CONCLUSIONS: tuple[Callable[[Context, Sequence[Numbers]], Section | None], ...] = (
-    findings.section,
-    paper.section,
-)
-"""Each draws conclusions from the analyses' numbers, a dictionary for each data set; they come
-first in the report."""
 LONGEST_S = 2.0
 FEWEST = 20
 """Trials below which a grid of 20 components makes no sense."""
@@ -76,7 +70,8 @@ def study(
         if value < 1:
             raise InputError(f"{option} must be at least 1, not {value}")
     source = None if scene is None else scenes.load(scene)
-    dataset = load_trials(data, horizon_s=LONGEST_S, progress=True)
+    names = expand([name for name, _ in methods.OURS])
+    dataset = load_trials(data, horizon_s=LONGEST_S, features=names, progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(
             f"{counted(len(dataset.trials), 'trial')} are too few to study; give {FEWEST} or more"
@@ -94,11 +89,13 @@ def study(
         every = [_numbers(sections)]
         if source is not None:
             every += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
-    shown = [conclude(context, every) for conclude in CONCLUSIONS] + sections
+    findings, *others = sections
+    comparison = None
+    if source is not None:
+        comparison = paper.comparison(every, len(every) * len(dataset.trials))
+    shown = [section for section in (findings, comparison, *others) if section]
     name = source.name if source is not None else Path(data[0]).name
-    written = write(
-        out, f"What a touch reveals: {name}", _lead(context, constant), [s for s in shown if s]
-    )
+    written = write(out, f"What a touch reveals: {name}", _lead(context, constant), shown)
     took = time.perf_counter() - began
     print(f"study: {len(shown)} sections in {took:.0f} s", file=sys.stderr)
     return written
@@ -117,8 +114,8 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     lead = [
         f"{counted(len(dataset.trials), 'trial')}, {layout.rows} x {layout.cols} taxels, tasks "
         f"{tasks}; force in {layout.force_unit}s, motion in {layout.length_unit}s in the {frame}'s "
-        f"frame. {source} Accuracies are of leave-one-out cross-validation unless a section says "
-        "otherwise, with 95 % binomial (Wilson) intervals."
+        f"frame. {source} Accuracies below the findings are of leave-one-out cross-validation, "
+        "with 95 % binomial (Wilson) intervals."
     ]
     if constant:
         lead.append(f"Left out, as every trial has the same label: {', '.join(constant)}.")
