@@ -77,12 +77,18 @@ def legend(canvas: Any, axes: Any, columns: int) -> None:
         canvas.legend(handles, labels, **place)
 
 
+def spread(results: Sequence[Result]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n,) accuracies in percent, and (2, n) the lengths of their intervals' arms."""
+    values = np.array([100 * result.accuracy for result in results])
+    low, high = 100 * np.array([result.interval for result in results]).T
+    return values, np.maximum([values - low, high - values], 0.0)
+
+
 def curve(axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result]) -> None:
     """Draw accuracies in percent with their 95 % intervals, in the `order`-th of `STROKES`."""
     colour, marker, dashes, _ = STROKES[order % len(STROKES)]
-    low, high = np.array([result.interval for result in results]).T * 100
-    axes.fill_between(x, low, high, color=colour, alpha=0.12, lw=0)
-    y = [100 * result.accuracy for result in results]
+    y, (below, above) = spread(results)
+    axes.fill_between(x, y - below, y + above, color=colour, alpha=0.12, lw=0)
     axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
 
 
@@ -184,12 +190,11 @@ def bars(
             colour, _, _, hatch = stroke
             y = np.arange(m) + (i - (g - 1) / 2) * height
             shown = [(at, result) for at, result in zip(y, row, strict=True) if result]
-            values = np.array([100 * result.accuracy for _, result in shown])
-            ends = np.array([result.interval for _, result in shown]).T * 100
+            values, arms = spread([result for _, result in shown])
             axes.barh(
                 [at for at, _ in shown], values, height * 0.92, color=colour, alpha=0.85,
                 hatch=hatch, ec="white", lw=0, label=group,
-                xerr=np.maximum([values - ends[0], ends[1] - values], 0.0),
+                xerr=arms,
                 error_kw={"ecolor": "0.25", "elinewidth": 0.8},
             )  # fmt: skip
             beside = [(p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()]

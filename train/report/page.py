@@ -32,7 +32,8 @@ p, dl { max-width: 46rem; } dt { font-weight: 600; }
 dd { margin: 0 0 .6rem 1.2rem; } code { font-size: .93em; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
 figcaption { font-weight: 600; margin-bottom: .3rem; }
-.table { overflow-x: auto; } table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
+.table { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
   max-width: 100%; }
 th { background: var(--soft); text-align: left; vertical-align: bottom; }
 th, td { padding: .18rem .55rem; border-bottom: 1px solid var(--line); }
@@ -100,7 +101,8 @@ def _table(table: Table) -> str:
         for row in table.cells
     )
     files = ", ".join(f'<a href="{name}">{name}</a>' for name in table_csv(table))
-    body = f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
+    body = f"<table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
+    body = f'<div class="table">{body}</div>'
     if len(table.rows) > LONGEST:
         body = f"<details><summary>{len(table.rows)} rows</summary>\n{body}</details>"
     return f"<h3>{_text(table.title)}</h3>\n{body}<p><small>{files}</small></p>"

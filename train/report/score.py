@@ -158,3 +158,8 @@ def paired(before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[float, 
     gap = (gained - lost) / total
     reach = 1.96 * np.sqrt(((gained + lost + 1.0) / total - gap**2) / total)
     return tuple(100.0 * x for x in ((gained - lost) / len(before), gap - reach, gap + reach))  # type: ignore[return-value]
+
+
+def points(gain: tuple[float, float, float]) -> str:
+    """A paired difference in words, as in `+3 (-1 to +7)`."""
+    return "{:+.0f} ({:+.0f} to {:+.0f})".format(*gain)

@@ -10,6 +10,10 @@ from edge.errors import InputError
 from train.report.section import Section, Table
 
 STAGES = ("track", "features", "decision")
+INSTRUCTIONS = {"a frame in contact": 192_922, "the frame that decides": 1_343_468}
+"""What aarch64 executes for the model of `edge-classify demo`, as `make board-test` counts it."""
+ESTIMATED = {"Raspberry Pi Zero 2 W": 1.0, "Raspberry Pi 4": 1.5, "Raspberry Pi 5": 2.4}
+"""Boards by the clock of one core in GHz."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,11 @@ def read(path: str | os.PathLike[str]) -> Board:
     return board
 
 
+def estimated_s(board: str, step: str = "the frame that decides") -> float:
+    """Estimate of a step's seconds on one of `ESTIMATED`, at one instruction a cycle."""
+    return INSTRUCTIONS[step] / (1e9 * ESTIMATED[board])
+
+
 FORMAT = ("format", "decision us", "size kB", "other labels %")
 
 
@@ -82,20 +91,33 @@ def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
 
 
 def section(board: Board) -> Section:
-    """The figures of the board file."""
+    """The figures of the board file, and estimates for boards that were not measured."""
     rows = [
         {"stage": name, "median us": median, "99th percentile us": p99}
         for name, (median, p99) in board.stages_us.items()
     ]
+    estimates = [
+        {"step": step, "instructions": count}
+        | {f"{name} ms": round(1e3 * estimated_s(name, step), 2) for name in ESTIMATED}
+        for step, count in INSTRUCTIONS.items()
+    ]
+    clocks = ", ".join(f"{name} {clock:g} GHz" for name, clock in ESTIMATED.items())
     return Section(
         "The board",
         [
-            f"{board.name}, by edge-classify bench with the model {board.model[:12]}: "
-            f"{board.memory_mb:.0f} MB of memory, {board.cold_start_ms:.0f} ms from starting "
-            "Python to a model that is ready. The arithmetic of a decision is the sum of the "
-            "medians of track, features and decision."
+            f"These times are of {board.name}, by `edge-classify bench` with the model "
+            f"{board.model[:12]}. It takes {board.memory_mb:.0f} MB of memory, and "
+            f"{board.cold_start_ms:.0f} ms from starting Python to a model that is ready. The "
+            "arithmetic of a decision is the sum of the medians of track, features and decision.",
+            "No Raspberry Pi was measured. Their times are estimates: aarch64 instructions that "
+            "`make board-test` counts under an emulator, for the model of `edge-classify demo` "
+            f"with three features, at one instruction a cycle ({clocks}). `edge-classify bench` on "
+            "your board replaces them.",
         ],
-        [Table("board", "Stages", rows)],
+        [
+            Table("board", "Stages", rows, timed=("median us", "99th percentile us")),
+            Table("boards", "Estimates for other boards", estimates, narrow=5),
+        ],
     )
 
 

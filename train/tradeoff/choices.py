@@ -22,11 +22,13 @@ Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
 
 
-def followed(raw: Recordings, features: Sequence[str] = (), *, progress: bool = False) -> DataSet:
+def followed(
+    raw: Recordings, features: Sequence[str] = (), *, quick: bool = True, progress: bool = False
+) -> DataSet:
     """The trials of some recordings, with the features of every candidate and those named."""
     drawn = kinds_of(raw.recordings) is not None
-    quick = candidates({}, joints=raw.joints, drawn=drawn, quick=True)
-    sets = [name for candidate in quick for name in candidate.sets]
+    tried = candidates({}, joints=raw.joints, drawn=drawn, quick=quick)
+    sets = [name for candidate in tried for name in candidate.sets]
     return load_trials(
         raw, horizon_s=WINDOWS_S[-1], features=expand([*sets, *features]), progress=progress
     )
@@ -39,8 +41,8 @@ def some(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
 
 def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:
     """Each task's choice, as `python -m export --quick --window` makes it; `given` is fixed."""
-    form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1}
-    return fit(dataset, **form, **given).chosen  # type: ignore[arg-type]
+    form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1, **given}
+    return fit(dataset, **form).chosen
 
 
 def unseen(choice: Chosen) -> Result | None:

@@ -1,11 +1,11 @@
-"""What each way to save time or work costs in accuracy, in one table of the same shape."""
+"""What each thing that an owner can pay costs and gives, in one table."""
 
 from __future__ import annotations
 
+import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,12 @@ from edge.touch.features import WINDOW_S
 from train.choose import Chosen
 from train.dataset import DataSet, Recordings
 from train.evaluate import Result, stratified_folds
-from train.report.score import paired
+from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
-from train.report.skins import pooled_down, pooled_layout
+from train.report.skins import coarser
 from train.report.work import Workers
 from train.stopping import finest
+from train.tradeoff.board import ESTIMATED, estimated_s
 from train.tradeoff.choices import Points, chosen, followed, some
 from train.tradeoff.measured import Measured, Saving
 from train.tradeoff.wires import Wire, wires
@@ -32,6 +33,7 @@ PARTS = (2, 4)
 """Parts of the trials of which one is kept."""
 FEWEST = 20
 """Trials below which no choice is made."""
+TIME = "time on this machine"
 Hits = Mapping[tuple[Path, int], bool]
 """{(recording, number of its contact): whether the answer is right}."""
 
@@ -71,41 +73,38 @@ def every_nth(recording: Recording, n: int) -> Recording:
     )
 
 
-def _changed(raw: Recordings, change: Callable[[Recording], Recording]) -> Recordings:
-    return replace(raw, recordings=tuple(map(change, raw.recordings)))
-
-
 def changes(raw: Recordings, dataset: DataSet) -> list[Change]:
-    """Every change that the table shows, but for the windows, which are measured anyway."""
+    """Every change that is trained anew; windows are measured anyway."""
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
-    cases = []
+    # The longest first: it runs beside the others.
+    cases = [
+        Change("all candidates (`make export`)", "longer training", raw, given={"quick": False})
+    ]
     for n in EVERY:
         carried = [w.name for w in wires(dataset.layout) if w.every(rate) == n]
-        cost = f"enough: {carried[0]}" if carried else f"1/{n} of the bits on the wire"
-        source = _changed(raw, partial(every_nth, n=n))
+        cost = f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
+        source = replace(raw, recordings=tuple(every_nth(r, n) for r in raw.recordings))
         cases.append(Change(f"{rate / n:.0f} frames a second", cost, source))
-    coarse, steps, full = dataset.layout, [], _last(wires(dataset.layout))
-    while coarse.rows * coarse.cols > 1:
-        coarse = pooled_layout(coarse)
-        steps.append(coarse)
-        taxels = coarse.rows * coarse.cols
-        if 1 < taxels < 4:
-            continue
-        source = _changed(raw, partial(pooled_down, layouts=tuple(steps), by=np.add))
-        saved = 1e3 * (full.frame_s - _last(wires(coarse)).frame_s)
-        cost = f"a frame {saved:.1f} ms shorter on 1 bus of AD7147"
-        cases.append(Change(counted(taxels, "taxel"), cost, source))
-    cases.append(Change("the paper's features", "", dataset, given={"features": ["paper"]}))
+    full = _slowest(wires(dataset.layout))
+    for skin, recordings in coarser(dataset.layout, raw.recordings):
+        saved = 1e3 * (full.frame_s - _slowest(wires(skin)).frame_s)
+        cost = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
+        what = counted(skin.rows * skin.cols, "taxel")
+        cases.append(Change(what, cost, replace(raw, recordings=tuple(recordings))))
+    cases.append(
+        Change("the paper's features", "only 3 features", dataset, given={"features": ["paper"]})
+    )
     y = {task: dataset.labels(task) for task in dataset.tasks}
     for part in PARTS:
         rows = np.flatnonzero(stratified_folds(y[finest(y)], part) == 0)
         if len(rows) >= FEWEST:
             what = f"{len(rows)} of {len(dataset.trials)} trials"
-            cases.append(Change(what, "less to record", some(dataset, rows), fewer=True))
+            cost = f"{counted(len(dataset.trials) - len(rows), 'recording')} fewer"
+            cases.append(Change(what, cost, some(dataset, rows), fewer=True))
     return cases
 
 
-def _last(choices: Sequence[Wire]) -> Wire:
+def _slowest(choices: Sequence[Wire]) -> Wire:
     """The slowest wiring, of fewest buses."""
     return max((w for w in choices if w.name.startswith("AD7147")), key=lambda w: w.frame_s)
 
@@ -121,12 +120,14 @@ def hits(dataset: DataSet, result: Result) -> Hits:
     return answered
 
 
-def answered(change: Change) -> dict[str, Hits]:
-    """{task: the answers of the choice with a change}."""
-    source = change.source
-    dataset = source if isinstance(source, DataSet) else followed(source)
+def answered(change: Change) -> tuple[dict[str, Hits], float]:
+    """{task: the answers of the choice with a change}, and the seconds of one core it took."""
+    began = time.process_time()
+    source, quick = change.source, change.given.get("quick", True)
+    dataset = source if isinstance(source, DataSet) else followed(source, quick=quick)
     made = chosen(dataset, change.window_s, **change.given)
-    return {task: hits(dataset, choice.by_trial) for task, choice in made.items()}
+    answers = {task: hits(dataset, choice.by_trial) for task, choice in made.items()}
+    return answers, time.process_time() - began
 
 
 def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:
@@ -138,16 +139,16 @@ def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float,
     )
 
 
-def measure(raw: Recordings, dataset: DataSet, points: Points, workers: Workers) -> list[Saving]:
+def measure(raw: Recordings, dataset: DataSet, windows: Points, workers: Workers) -> list[Saving]:
     """Every change beside the choice at `WINDOW_S` on the recordings as they are."""
 
     def of(tasks: Mapping[str, Chosen]) -> dict[str, Hits]:
         return {task: hits(dataset, choice.by_trial) for task, choice in tasks.items()}
 
-    base = of(points[WINDOW_S])
+    base = of(windows[WINDOW_S])
     waits = [Change(f"waiting {w:g} s", f"{w - WINDOW_S:+.1f} s", dataset, w) for w in WAITS_S]
     cases = changes(raw, dataset)
-    afters = [of(points[wait.window_s]) for wait in waits]
+    afters = [(of(windows[wait.window_s]), 0.0) for wait in waits]
     afters += workers.map("costs", answered, [(case,) for case in cases])
     return [
         Saving(
@@ -158,49 +159,51 @@ def measure(raw: Recordings, dataset: DataSet, points: Points, workers: Workers)
                 for task in base
                 if task in after
             },
+            seconds,
         )
-        for case, after in zip([*waits, *cases], afters, strict=True)
+        for case, (after, seconds) in zip([*waits, *cases], afters, strict=True)
     ]
 
 
 def section(measured: Measured) -> Section:
-    """A row for each change."""
-    rows: list[Row] = []
-    for row in measured.costs:
-        cells: Row = {"what": row.what}
-        for task in measured.y:
-            gain = row.tasks.get(task)
-            cells[f"{task}, points"] = (
-                "" if gain is None else "{:+.0f} ({:+.0f} to {:+.0f})".format(*gain)
-            )
-        rows.append(cells | {"what it saves": row.cost})
-    text = (
-        f"Every row changes one thing of the quick choice at {WINDOW_S:g} s and chooses again. "
-        "Points are percents of the decisions that become right, less those that become wrong, on "
-        "the same trials left out; in brackets the 95 % interval of this difference. A larger "
-        "taxel carries the sum of the forces on its area."
-    )
-    title = "What each saving costs, in points of accuracy"
-    return Section("What each saving costs", [text], [Table("costs", title, rows, narrow=3)])
-
-
-def formats(measured: Measured) -> Section | None:
-    """The number formats of the graph that ships, side by side."""
-    if not measured.formats:
-        return None
+    """A row for each change, number format and board."""
+    rows = [
+        _row(measured, own.what, own.cost, f"{own.choice_s:.1f} s to train" * bool(own.choice_s))
+        | {f"{task}, points": points(gain) for task, gain in own.tasks.items()}
+        for own in measured.costs
+    ]
+    rows += [
+        _row(
+            measured,
+            str(row["format"]),
+            f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the labels differ",
+            f"{row['decision us']:.0f} us to decide",
+        )
+        for row in measured.formats
+    ]
+    rows += [
+        _row(measured, f"deciding on a {board}", f"about {1e3 * estimated_s(board):.1f} ms")
+        | dict.fromkeys((f"{task}, points" for task in measured.y), "the same bits")
+        for board in ESTIMATED
+    ]
     return Section(
-        "The number format",
+        "What each thing costs and gives",
         [
-            "The same graph in other number formats, by python -m export.arithmetic on this "
-            "machine. The last column counts decisions on the model's golden vectors that name "
-            "another label than the shipped graph. Only that graph gives the same bits everywhere."
+            f"Every row changes one thing of the quick choice at {WINDOW_S:g} s and chooses again, "
+            "with the features that it then takes. Points are percents of the decisions that "
+            "become right, less those that become wrong, on the same trials left out; in brackets "
+            "stands the 95 % interval of this difference. A larger taxel carries the sum of the "
+            "forces on its area.",
+            "Number formats are those of the graph that ships, by `python -m export.arithmetic` on "
+            "this machine: the labels that differ are counted on the model's golden vectors. Only "
+            "the shipped format gives the same bits everywhere. A board's time is an estimate, see "
+            "the section on the board.",
         ],
-        [
-            Table(
-                "formats",
-                "Number formats",
-                [dict(row) for row in measured.formats],
-                timed=("decision us",),
-            )
-        ],
+        [Table("costs", "Points of accuracy, and the price", rows, timed=(TIME,), narrow=3)],
     )
+
+
+def _row(measured: Measured, what: str, price: str, time: str = "") -> Row:
+    tasks = [f"{task}, points" for task in measured.y]
+    cells: Row = {"what": what, tasks[0]: "", "price": price}
+    return cells | dict.fromkeys(tasks[1:], "") | {TIME: time}

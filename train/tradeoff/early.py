@@ -16,6 +16,7 @@ from train.evaluate import Result, stratified_folds
 from train.fitting import fit
 from train.pipeline import Choice, ContactClassifier
 from train.progress import bar
+from train.report.score import paired
 from train.stopping import NEVER, THRESHOLDS, answers, confidences, finest, stops, withheld
 from train.tradeoff.choices import some
 
@@ -32,18 +33,36 @@ class Certified:
     Attributes:
         asked: the error rate.
         folds: number of the `FOLDS` folds that certified it.
-        wrong: share of wrong decisions, `unknown` among them; NaN where no fold certified it.
-        unknown: share of decisions that name nothing, as the contact is unlike all trained ones.
+        right: (m,) whether each contact of these folds is decided right; one that names nothing,
+            as it is unlike all trained ones, is not.
+        waited: (m,) whether the same contact is decided right at the full window.
+        unknown: share of decisions that name nothing; NaN where no fold certified the error.
         early: share of trials decided before the full window.
         mean_s: mean time to decision.
     """
 
     asked: float
     folds: int
-    wrong: float
+    right: NDArray[np.bool_]
+    waited: NDArray[np.bool_]
     unknown: float
     early: float
     mean_s: float
+
+    @property
+    def result(self) -> Result:
+        """The accuracy on the contacts of the folds that certified it."""
+        return Result(int(self.right.sum()), len(self.right))
+
+    @property
+    def wrong(self) -> float:
+        """Share of wrong decisions; NaN where no fold certified the error."""
+        return 1.0 - self.result.accuracy if self.folds else np.nan
+
+    @property
+    def gain(self) -> tuple[float, float, float]:
+        """The points gained beside waiting for the full window, and their 95 % interval."""
+        return paired(self.waited, self.right)
 
 
 @dataclass(frozen=True)
@@ -73,17 +92,6 @@ class StoppingComparison:
     def fixed(self) -> NDArray[np.float64]:
         """(decision points,) share wrong at each fixed window."""
         return 1.0 - np.asarray(self.right.mean(axis=1))
-
-    @property
-    def results(self) -> dict[float, Result]:
-        """{window: its result}."""
-        counts = self.right.sum(axis=1).tolist()
-        pairs = zip(self.decision_points_s, counts, strict=True)
-        return {window: Result(count, self.trials) for window, count in pairs}
-
-    def result(self, wrong: float) -> Result:
-        """The result of deciding all trials with that share wrong."""
-        return Result(round((1 - wrong) * self.trials), self.trials)
 
     def when_sure(self) -> list[tuple[float, float, float]]:
         """(confidence asked for, mean seconds, share wrong) of stopping at each threshold."""
@@ -192,13 +200,16 @@ def _certified(
         rule = fold.rules[task][error]
         if rule is None:
             continue
-        at = stops(fold.confidence[task], rule)
-        every = np.arange(len(fold.test))
-        unknown = fold.unknown[task][at, every]
-        wrong = ~right[:, fold.test][at, every] | unknown
-        rows.append(np.stack([wrong, unknown, at < len(seconds) - 1, seconds[at]]))
-    means = np.hstack(rows).mean(axis=1) if rows else np.full(4, np.nan)
-    return Certified(error, len(rows), *means.tolist())
+        at, every = stops(fold.confidence[task], rule), np.arange(len(fold.test))
+        unknown = fold.unknown[task]
+        named = right[:, fold.test] & ~unknown
+        rows.append([named[at, every], named[-1], unknown[at, every],
+                     at < len(seconds) - 1, seconds[at]])  # fmt: skip
+    decided, waited, *shares = (
+        map(np.concatenate, zip(*rows, strict=True)) if rows else np.empty((5, 0))
+    )
+    means = [float(share.mean()) for share in shares] if rows else [np.nan] * 3
+    return Certified(error, len(rows), decided.astype(bool), waited.astype(bool), *means)
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,13 @@ class Saving:
         what: the change.
         cost: what it saves or costs, other than accuracy.
         tasks: {task: points gained, and the ends of their 95 % interval, on the same trials}.
+        choice_s: seconds that one core took to choose and train; 0 where nothing was trained.
     """
 
     what: str
     cost: str
     tasks: Mapping[str, tuple[float, float, float]]
+    choice_s: float = 0.0
 
 
 @dataclass(frozen=True)

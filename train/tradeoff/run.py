@@ -23,18 +23,17 @@ from train.tradeoff.choices import WINDOWS_S, chosen, followed, front
 from train.tradeoff.measured import Measured
 from train.tradeoff.wires import waited_s
 
-SECTIONS: tuple[Callable[[Measured], Section | None], ...] = (
+SECTIONS: tuple[Callable[[Measured], Section], ...] = (
     answer.section,
-    answer.reasons,
     costs.section,
     answer.prices,
+    answer.reasons,
     stopping.section,
     stopping.unknown,
     lambda measured: boards.section(measured.board),
-    costs.formats,
     answer.glossary,
 )
-"""The report's sections in their order; None where there is nothing to show."""
+"""The report's sections in their order."""
 FEWEST = 40
 
 
@@ -103,7 +102,7 @@ def tradeoff(
         "How long must a robot wait before it knows what its arm has touched, and what does each "
         f"answer cost? Measured on {counted(len(dataset.trials), 'contact')}{simulated}."
     ]
-    sections = [section for make in SECTIONS if (section := make(measured)) is not None]
+    sections = [make(measured) for make in SECTIONS]
     report = write(out, "What accuracy costs in time", lead, sections)
     best = front(points, main, measured.after_s, dataset.digest)
     with write_whole(out / "front.json") as file:

@@ -10,16 +10,21 @@ from train.tradeoff import board, costs
 ROW = {"format": "float32", "decision us": 20.0, "size kB": 10.0, "other labels %": 0.5}
 
 
-def test_number_formats_are_a_table():
-    (table,) = costs.formats(SimpleNamespace(formats=[ROW])).tables
+def test_number_formats_are_rows_beside_the_other_costs():
+    table = costs.section(SimpleNamespace(y={"t": None}, costs=[], formats=[ROW])).tables[0]
 
-    assert table.columns == list(board.FORMAT)
-    assert table.cells == [["float32", 20.0, 10.0, 0.5]]
-    assert table.timed == ("decision us",)
+    first, *boards = table.rows
+    assert first["what"] == "float32"
+    assert first["price"] == "10 kB; 0.5 % of the labels differ"
+    assert first[costs.TIME] == "20 us to decide"
+    assert [row["t, points"] for row in boards] == ["the same bits"] * 3
+    assert table.timed == (costs.TIME,)
 
 
-def test_without_number_formats_there_is_no_section():
-    assert costs.formats(SimpleNamespace(formats=[])) is None
+def test_a_board_that_was_not_measured_is_estimated_by_instructions_and_clock():
+    four, five = map(board.estimated_s, ("Raspberry Pi 4", "Raspberry Pi 5"))
+    assert four == pytest.approx(board.INSTRUCTIONS["the frame that decides"] / 1.5e9)
+    assert four / five == pytest.approx(2.4 / 1.5)
 
 
 @pytest.mark.parametrize("text", ["", "{}x", '[{"format": "int8"}]', "[3]"])

@@ -12,6 +12,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.model.model import Model
+from edge.model.stopping import StoppingRule
 from edge.recording import save
 from edge.skin import file as skinfile
 from edge.touch.layout import SkinLayout
@@ -146,11 +147,11 @@ class TestCosts:
         raw = read([recordings])
         cases = {case.what: case for case in costs.changes(raw, followed(raw))}
         assert list(cases) == [
-            "50 frames a second", "25 frames a second",
+            "all candidates (`make export`)", "50 frames a second", "25 frames a second",
             "96 taxels", "24 taxels", "6 taxels", "1 taxel", "the paper's features",
         ]  # fmt: skip
         assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
-        assert cases["50 frames a second"].cost == "enough: AD7147, 2 buses at 400 kHz"
+        assert cases["50 frames a second"].cost == "AD7147, 2 buses at 400 kHz are enough"
 
 
 @pytest.mark.parametrize(
@@ -216,11 +217,29 @@ class TestEarly:
 
     def test_a_rule_that_serves_two_error_rates_is_listed_once(self):
         found = comparison(share_right(0.5, 0.7, 0.9))
-        rule = early.Certified(0.1, early.FOLDS, 0.1, 0.0, 1.0, 0.6)
-        bolder = early.Certified(0.3, early.FOLDS, 0.3, 0.0, 1.0, 0.4)
+        right = np.arange(100) < 90
+        rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
+        bolder = replace(rule, asked=0.3, right=np.arange(100) < 70, mean_s=0.4)
         found.certified.extend([rule, replace(rule, asked=0.2), bolder])
         listed = [rule.asked for rule in answer.distinct(found)]
         assert listed == [0.1, 0.3]
+
+    def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(self):
+        rule = StoppingRule(0.1, 0.0, 0.5, 1)
+        folds = [
+            early._Fold(
+                np.arange(4) + 4 * k, {}, {"t": np.full((2, 4), 0.5)},
+                {"t": np.array([[False] * 4, [True, False, False, False]])},
+                {"t": {0.1: rule if k else None}},
+            )
+            for k in range(2)
+        ]  # fmt: skip
+        right = np.array([[False] * 5 + [True] * 3, [True] * 8])
+        found = early._certified(0.1, "t", folds, right, (0.6, 1.2))
+        assert (found.folds, found.result.right, found.result.total) == (1, 3, 4)
+        # At the full window one more is right and one names nothing.
+        assert found.gain[0] == 0.0
+        assert (found.mean_s, found.early, found.unknown) == (0.6, 1.0, 0.0)
 
     def test_what_is_plain_at_the_first_decision_point_is_decided_then(self, make_touch, tmp_path):
         for kind in ("hard", "soft"):
@@ -320,15 +339,14 @@ def test_report_pictures_tables_and_front_are_written(make_touch, tmp_path, monk
     report = tradeoff([str(tmp_path / "data")], out, str(path), scene_path=str(SCENE))
     text = report.read_text()
     assert "http" not in text.replace("http-equiv", "")
-    assert "62 MB of memory, 812 ms from starting Python" in text
+    assert "62 MB of memory, and 812 ms from starting Python" in text
     assert not browser.available() or browser.faults(report) == []
-    for name in ("tradeoff.png", "breakaway.png", "reliability.png"):
-        assert (out / name).read_bytes().startswith(b"\x89PNG")
+    assert (out / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
     saved = {
         row["what"]: row for row in csv.DictReader((out / "costs.csv").read_text().splitlines())
     }
     assert saved["waiting 0.4 s"]["category, points"].startswith("+0 (-")
-    assert saved["28 of 28 trials"]["what it saves"] == "less to record"
+    assert saved["28 of 28 trials"]["price"] == "0 recordings fewer"
     best = ParetoFront.read(out / "front.json", digest)
     assert best.task == "category"
     assert best.points[-1].accuracy > 0.9
