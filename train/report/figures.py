@@ -15,16 +15,19 @@ from numpy.typing import NDArray
 from train.evaluate import Result
 from train.report.section import Figure
 
-STROKES: tuple[tuple[str, str, Any, str], ...] = (
-    ("#1f5fa8", "o", "-", ""),
-    ("#d9822b", "s", "--", "///"),
-    ("#2f7d5b", "^", "-.", "..."),
-    ("#7a5195", "D", ":", "xxx"),
-    ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1)), "|||"),
-    ("#444444", "P", (0, (3, 1, 1, 3)), "---"),
+STROKES: tuple[tuple[str, str, Any], ...] = (
+    ("#1f5fa8", "o", "-"),
+    ("#d9822b", "s", "--"),
+    ("#2f7d5b", "^", "-."),
+    ("#7a5195", "D", ":"),
+    ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1))),
+    ("#444444", "P", (0, (3, 1, 1, 3))),
 )
-"""Colour, marker, dashes and hatch of each series, so that none differs by hue alone."""
+"""Colour, marker and dashes of each series, so that none differs by hue alone."""
+HATCHES = ("", "///", "...", "xxx", "|||", "---")
+"""Likewise, of bars."""
 STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -86,7 +89,7 @@ def spread(results: Sequence[Result]) -> tuple[NDArray[np.float64], NDArray[np.f
 
 def curve(axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result]) -> None:
     """Draw accuracies in percent with their 95 % intervals, in the `order`-th of `STROKES`."""
-    colour, marker, dashes, _ = STROKES[order % len(STROKES)]
+    colour, marker, dashes = STROKES[order % len(STROKES)]
     y, (below, above) = spread(results)
     axes.fill_between(x, y - below, y + above, color=colour, alpha=0.12, lw=0)
     axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
@@ -146,7 +149,7 @@ def lines(
             curve(axes, order, task, x, row)
             points = sorted((paper or {}).get(task, {}).items())
             if points:
-                colour, marker, *_ = STROKES[order % len(STROKES)]
+                colour, marker, _ = STROKES[order % len(STROKES)]
                 style = {"color": colour, "marker": marker, "mfc": "white", "lw": 0.6}
                 axes.plot(*zip(*points, strict=True), **style, label=f"{task}, paper")
         if ticks:
@@ -187,13 +190,12 @@ def bars(
         axes = canvas.subplots()
         diamonds = mark
         for i, (stroke, (group, row)) in enumerate(zip(STROKES, groups.items(), strict=False)):
-            colour, _, _, hatch = stroke
             y = np.arange(m) + (i - (g - 1) / 2) * height
             shown = [(at, result) for at, result in zip(y, row, strict=True) if result]
             values, arms = spread([result for _, result in shown])
             axes.barh(
-                [at for at, _ in shown], values, height * 0.92, color=colour, alpha=0.85,
-                hatch=hatch, ec="white", lw=0, label=group,
+                [at for at, _ in shown], values, height * 0.92, color=stroke[0], alpha=0.85,
+                hatch=HATCHES[i], ec="white", lw=0, label=group,
                 xerr=arms,
                 error_kw={"ecolor": "0.25", "elinewidth": 0.8},
             )  # fmt: skip

@@ -288,13 +288,13 @@ def _against(known: Sequence[Entry], side: Sequence[Row], title: str) -> Figure:
         axes = canvas.subplots()
         axes.plot(ends, ends, color="0.4", lw=1, label="equal")
         for entry, row in zip(known, side, strict=True):
-            colour, _, dashes, _ = strokes[entry.task]
+            colour, _, dashes = strokes[entry.task]
             face = colour if row["within"] == "yes" else "white"
             bar = [entry.percent + row["from"], entry.percent + row["to"]]
             axes.plot([entry.percent] * 2, bar, color=colour, lw=1, alpha=0.6, ls=dashes)
             style = {"color": colour, "mfc": face, "ms": 6}
             axes.plot(entry.percent, row["ours %"], marks[entry.table], **style)
-        for task, (colour, _, dashes, _) in strokes.items():
+        for task, (colour, _, dashes) in strokes.items():
             axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
         for table, mark in marks.items():
             axes.plot([], [], mark, color="0.3", label=f"Table {table}")

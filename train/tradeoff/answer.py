@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from train.evaluate import Result
-from train.report.figures import PHONE, STROKES, curve, legend, picture, spread
+from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, score
 from train.report.section import Figure, Row, Section, Table
 from train.tradeoff.choices import WINDOWS_S, unseen
@@ -172,7 +172,7 @@ def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measure
     chance = 100 * majority(measured.y[task]).accuracy
     axes.axhline(chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label")
     curve(axes, 0, "after a fixed time", [w + after_s for w in results], list(results.values()))
-    colour, marker, dashes, _ = STROKES[1]
+    colour, marker, dashes = STROKES[1]
     rules = distinct(compared)
     if rules:
         share, arms = spread([rule.result for rule in rules])
@@ -202,7 +202,7 @@ def _split(figure: Any, measured: Measured) -> None:
     ends = (0.0, 1e3 * window + after_ms), (start, 1e3 * window + 1.02 * after_ms)
     for axes, limits in zip(rows, ends, strict=True):
         left = 0.0
-        for (name, length), (colour, _, _, hatch) in zip(stages, STROKES, strict=False):
+        for (name, length), (colour, *_), hatch in zip(stages, STROKES, HATCHES, strict=False):
             axes.barh(0, length, left=left, color=colour, hatch=hatch, ec="white", lw=0, label=name)
             left += length
         axes.set(xlim=limits, yticks=[])
