@@ -79,6 +79,11 @@ $(SIMULATED)/.made: $(READY) $(SCENE) $(wildcard train/scenes/*.toml train/simul
 
 ifdef DATA
 RECORDINGS := $(DATA)
+# With a SCENE beside DATA, its touches are weighed beside the recordings.
+ifneq ($(origin SCENE),file)
+BESIDE := $(SIMULATED)
+export: $(SIMULATED)/.made
+endif
 else
 RECORDINGS := $(SIMULATED)
 export: $(SIMULATED)/.made
@@ -90,7 +95,7 @@ FRONTED := --front $(FRONT) --fronts $(OUT)/tradeoff/front.json
 endif
 
 export: $(READY)
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT) $(FRONTED) $(addprefix --name ,$(NAME)) $(EXPORT)
+	$(BIN)/python -m export --data $(RECORDINGS) $(BESIDE) --out $(OUT) $(FRONTED) $(addprefix --name ,$(NAME)) $(EXPORT)
 
 DEMO := $(OUT)/demo
 

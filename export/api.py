@@ -231,7 +231,11 @@ def warnings(fitted: Fitted) -> list[str]:
         if share > MISSING_SHARE:
             lines[-1] += "; `python -m train thresholds` proposes thresholds"
     for what, paths in dataset.left_out.items():
-        lines.append(f"warning: left out for lack of {what}: {_files(paths)}")
+        total = len({trial.path for trial in dataset.trials} | set(paths))
+        lines.append(
+            f"warning: {len(paths)} of {total} recordings are left out for lack of {what}: "
+            f"{_files(paths)}"
+        )
     if dataset.unused:
         lines.append(
             "warning: only the first of several contacts is used of "
@@ -268,7 +272,8 @@ def warnings(fitted: Fitted) -> list[str]:
                 "label; the earlier trial counts as nearer, so their order decides the label"
             )
         projection = classifier.projections_[classifier.spaces_[task]]
-        steps, farthest = coarseness(rows, projection.grid_.unit)
+        steps, place = coarseness(rows, projection.grid_.unit)
+        farthest = classifier.members_[classifier.spaces_[task]][place]
         if steps < FEWEST_UNITS:
             lines.append(
                 f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps "
@@ -318,7 +323,8 @@ def told_by_posture(dataset: DataSet, task: str) -> float:
         assert joints is not None
         known = joints[np.isfinite(joints).all(axis=1)]
         at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
-    angles, labels = np.array(at_onset), dataset.labels(task)
+    labels = dataset.labels(task)
+    angles, labels = np.array(at_onset)[labels != ""], labels[labels != ""]
     squares = ((angles[:, None] - angles) ** 2).sum(axis=2)
     np.fill_diagonal(squares, np.inf)
     return float((labels[squares.argmin(axis=1)] == labels).mean())

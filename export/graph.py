@@ -118,7 +118,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     off_most = off[0] if len(off) == 1 else build.node("Max", off)
     build.node("Squeeze", [off_most, build.ints(1)], names["out_of_range"])
     for task, choice in model.choices.items():
-        space = choice.space(task)
+        space = last.spaces_[task]
         grids = [point.projections_[space].grid_ for point in points]
         units = [grid.unit for grid in grids]
         rows = [point.rows_[space] / unit for point, unit in zip(points, units, strict=True)]
@@ -127,8 +127,13 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         squares, length = _squares(build, projected[space][0], widened(rows), components)
         output = names[f"{task}_label"].removesuffix("_label")
         k = build.ints(choice.k)
-        near = ["", names[f"{task}_neighbours"]]
+        # Where only some of the trials have a label, the places among them are not the trials.
+        members, named = last.members_[space], names[f"{task}_neighbours"]
+        whole = len(members) == members[-1] + 1
+        near = ["", named if whole else ""]
         values, places = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
+        if not whole:
+            build.node("Gather", [build.constant(members, np.int64), places], named)
         labels, classes = last.labels_[task], len(last.classes_[task])
         nearest = values, places, length
         _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])

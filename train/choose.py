@@ -189,7 +189,8 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
 
 def _determines(a: NDArray[np.str_], b: NDArray[np.str_]) -> bool:
     """Whether the labels b follow from the labels a."""
-    return len(set(zip(a.tolist(), b.tolist(), strict=True))) == len(set(a.tolist()))
+    pairs = {(x, z) for x, z in zip(a.tolist(), b.tolist(), strict=True) if x and z}
+    return len(pairs) == len({x for x, _ in pairs})
 
 
 def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:
@@ -282,7 +283,7 @@ class Choosing:
         jobs: int = 1,
         progress: bool = False,
     ) -> None:
-        self._dataset, self._y, self._tried, self._samples = dataset, y, tried, samples
+        self._dataset, self._y, self.tried, self._samples = dataset, y, tried, samples
         self._jobs, self._progress, self._leave_out = jobs, progress, leave_out
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
         finest = max(y, key=lambda task: len(set(y[task].tolist())))
@@ -303,7 +304,7 @@ class Choosing:
         Without groups, both are the answers to left-out trials.
         """
         X = self._dataset.with_kernels(window_s).features(window_s, self._samples)
-        grids = [grid for candidate in self._tried for grid in candidate.grids]
+        grids = [grid for candidate in self.tried for grid in candidate.grids]
         answers = partial(
             evaluate,
             X,
@@ -332,11 +333,12 @@ class Choosing:
             return trials, answers(y, self._group_folds, unseen, progress=progress.update)
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
-        """{task: (n,) answers of the candidate that is best in plain cross-validation}."""
+        """{task: answers of the candidate that is best in plain cross-validation}."""
         trials, groups = self._tables(window_s, False, f"{window_s:g} s")
         right: dict[str, NDArray[np.bool_]] = {}
         for task in self._y:
-            answers = (groups if task in self._grouped else trials).held_out(task)
+            table = groups if task in self._grouped else trials
+            answers = table.held_out(task)[:, table.tested[task]]
             right[task] = answers[choose(answers)]
         return right
 
@@ -391,7 +393,7 @@ class Choosing:
             grouped = task in self._grouped
             table, margin = (groups, UNSEEN_MARGIN) if grouped else (trials, 0.0)
             choices, prices = table.choices[task], costs(table.choices[task], self._widths)
-            own = [_places_of(candidate, choices) for candidate in self._tried]
+            own = [_places_of(candidate, choices) for candidate in self.tried]
             chosen_without = without_folds(task, trials, table, prices, margin)
             for by_task, choice in zip(without, chosen_without, strict=True):
                 by_task[task] = choice

@@ -49,10 +49,19 @@ class Recordings:
     digest: str
 
     @property
+    def own(self) -> tuple[Recording, ...]:
+        """Those that are not simulated; all where all are."""
+        return tuple(r for r in self.recordings if "simulation" not in r.meta) or self.recordings
+
+    @property
+    def mixed(self) -> bool:
+        """Whether some are simulated, and some are not."""
+        return len(self.own) < len(self.recordings)
+
+    @property
     def joints(self) -> bool:
-        """Whether most of them have joint angles."""
-        have = sum(recording.joints is not None for recording in self.recordings)
-        return 2 * have > len(self.recordings)
+        """Whether most of the owner's have joint angles."""
+        return 2 * sum(recording.joints is not None for recording in self.own) > len(self.own)
 
 
 @dataclass(frozen=True)
@@ -99,6 +108,17 @@ class DataSet:
     left_out: dict[str, tuple[Path, ...]]
     unused: tuple[Path, ...]
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
+
+    @property
+    def own(self) -> NDArray[np.bool_] | None:
+        """(n,) whether a trial is the owner's; None where all, or none, are simulated."""
+        own = np.array(["simulation" not in trial.recording.meta for trial in self.trials])
+        return own if own.any() and not own.all() else None
+
+    def part(self, trials: NDArray[np.bool_]) -> DataSet:
+        """Some of the trials (n,)."""
+        kept = (trial for trial, taken in zip(self.trials, trials, strict=True) if taken)
+        return replace(self, trials=tuple(kept))
 
     def untouched_labels(self, task: str) -> list[str]:
         """The labels for a task of the recordings in which no contact was found."""
@@ -249,7 +269,8 @@ def load_trials(
 
     Args:
         data: recordings, or `.npz` files and folders of them.
-        threshold: counts above which a taxel is in contact; the first recording's where None.
+        threshold: counts above which a taxel is in contact; those of the first recording that is
+            not simulated where None.
             All share it, as the board does not know which object it touches.
         onset: counts above which a contact begins; scaled with the threshold where None.
         horizon_s: seconds from onset that are kept of each contact.
@@ -263,7 +284,7 @@ def load_trials(
     """
     types = measures.features(tuple(features))
     raw = data if isinstance(data, Recordings) else read(data, progress=progress)
-    reference = with_thresholds(raw.recordings[0].layout, threshold, onset)
+    reference = with_thresholds(raw.own[0].layout, threshold, onset)
     reference = replace(reference, dead=_dead(raw.recordings))
     needed = any(feature.of_joints for feature in types)
     wanting = raw.joints and (needed or any(feature.moves for feature in types))

@@ -88,6 +88,7 @@ class SearchGrid:
         neighbours: values of k, rising.
         targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
         tasks: the tasks it is a candidate for; all where empty.
+        weights: of simulated trials and the owner's, see `train.pipeline.Choice`.
     """
 
     scaling: str = "none"
@@ -99,6 +100,7 @@ class SearchGrid:
     neighbours: tuple[int, ...] = NEIGHBOURS
     targets: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()
+    weights: tuple[int, int] = (1, 1)
 
     def choices(self, directions: int) -> list[Choice]:
         """Every candidate, in the order of `_answers`.
@@ -112,7 +114,9 @@ class SearchGrid:
             taken = min(directions, self.most_directions or directions)
             cells = [(taken, shrinkage) for shrinkage in self.shrinkages]
         return [
-            Choice(self.scaling, c, k, self.projection, s, self.features, self.targets)
+            Choice(
+                self.scaling, c, k, self.projection, s, self.features, self.targets, self.weights
+            )
             for c, s in cells
             for k in self.neighbours
         ]
@@ -172,6 +176,7 @@ def _neighbours(
     new: NDArray[np.float64],
     labels: NDArray[np.int64] | None,
     grid: SearchGrid,
+    first: NDArray[np.int64],
 ) -> NDArray[np.int64]:
     """(projections, test, k) places among the trials of a spectrum, for each of the grid's.
 
@@ -179,22 +184,23 @@ def _neighbours(
 
     Args:
         new: (test, p) rows.
-        labels: (targets, n) of the trials of the spectrum; None for principal components.
+        labels: (targets, n) of the rows of the spectrum; None for principal components.
+        first: a row of the spectrum for each trial, which may count several times.
     """
-    k = min(grid.neighbours[-1], len(spectrum.scores))
+    k = min(grid.neighbours[-1], len(first))
     if labels is not None:
         scores, places = spectrum.scores_of(new), []
         for shrinkage in grid.shrinkages:
             directions = np.hstack([spectrum.directions(target, shrinkage) for target in labels])
             directions = directions[:, : grid.most_directions]
-            known, tested = _rounded(spectrum.scores @ directions, scores @ directions)
+            known, tested = _rounded(spectrum.scores[first] @ directions, scores @ directions)
             places.append(_nearest(_squares(tested, known), k))
         return np.stack(places)
     axes = spectrum.leading(grid.components[-1]).T
-    known, tested = _rounded(spectrum.rows @ axes, new @ axes)
+    known, tested = _rounded(spectrum.rows[first] @ axes, new @ axes)
     squares, places = np.zeros((len(tested), len(known))), []
-    for first, last in pairwise((0, *grid.components)):
-        squares += _squares(tested[:, first:last], known[:, first:last])
+    for low, high in pairwise((0, *grid.components)):
+        squares += _squares(tested[:, low:high], known[:, low:high])
         places.append(_nearest(squares, k))
     return np.stack(places)
 
@@ -207,31 +213,52 @@ def _answers(
     grids: Sequence[SearchGrid],
     features: Sequence[str],
     widths: Sequence[int],
+    own: NDArray[np.bool_] | None,
 ) -> dict[str, NDArray[np.bool_]]:
     """{task: (candidates, test)} whether each candidate, fitted on `train`, is right."""
     answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
     fitted_for = None
     with threadpool_limits(1):
         for grid in grids:
-            if fitted_for != (grid.scaling, grid.features):
-                fitted_for = grid.scaling, grid.features
-                part = X[:, columns_of(grid.features, features, widths)]
-                types = types_of(grid.features, features, widths)
-                mean, gain, known = centred_and_scaled(part[train], grid.scaling, *types)
-                spectrum, new = Spectrum(known), (part[test] - mean) * gain
-            shared = _neighbours(spectrum, new, None, grid) if grid.projection == "pca" else None
-            for task, labels in classes.items():
-                if grid.tasks and task not in grid.tasks:
-                    continue
-                near = shared
-                if near is None:
-                    targets = np.stack([classes[t][train] for t in grid.targets or (task,)])
-                    near = _neighbours(spectrum, new, targets, grid)
-                right = votes_right(near, labels[train], labels[test])
-                places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
-                # One row for each candidate: for each projection, each k.
-                answers[task].append(right[..., places].transpose(0, 2, 1).reshape(-1, len(test)))
+            for tasks, counts in _counted(grid, classes, own, train):
+                rows, members = np.repeat(train, counts), train[counts > 0]
+                if fitted_for != (grid.scaling, grid.features, counts.tobytes()):
+                    fitted_for = grid.scaling, grid.features, counts.tobytes()
+                    part = X[:, columns_of(grid.features, features, widths)]
+                    types = types_of(grid.features, features, widths)
+                    mean, gain, known = centred_and_scaled(part[rows], grid.scaling, *types)
+                    spectrum, new = Spectrum(known), (part[test] - mean) * gain
+                    first = (np.cumsum(counts) - counts)[counts > 0]
+                pca = grid.projection == "pca"
+                shared = _neighbours(spectrum, new, None, grid, first) if pca else None
+                for task in tasks:
+                    labels, near = classes[task], shared
+                    if near is None:
+                        targets = np.stack([classes[t][rows] for t in grid.targets or (task,)])
+                        near = _neighbours(spectrum, new, targets, grid, first)
+                    right = votes_right(near, labels[members], labels[test])
+                    places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
+                    # One row for each candidate: for each projection, each k.
+                    answers[task].append(
+                        right[..., places].transpose(0, 2, 1).reshape(-1, len(test))
+                    )
     return {task: np.concatenate(right) for task, right in answers.items()}
+
+
+def _counted(
+    grid: SearchGrid,
+    classes: Mapping[str, NDArray[np.int64]],
+    own: NDArray[np.bool_] | None,
+    train: NDArray[np.int64],
+) -> list[tuple[list[str], NDArray[np.int64]]]:
+    """A grid's tasks, by how often each of the `train` trials counts for them."""
+    alike: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
+    for task, labels in classes.items():
+        if not grid.tasks or task in grid.tasks:
+            names = np.where(labels < 0, "", "labelled")
+            counts = grid.choices(1)[0].counts(names, own)[train]
+            alike.setdefault(counts.tobytes(), ([], counts))[0].append(task)
+    return list(alike.values())
 
 
 def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]) -> int:
@@ -248,12 +275,14 @@ class AnswerTable:
         folds: (n,) the fold of each trial.
         choices: {task: the candidates}.
         right: {task: (folds, candidates, n)} whether the fit without a fold, and without the
-            trial's own fold, answers the trial rightly.
+            trial's own fold, answers the trial rightly; True for trials that are not tested.
+        tested: {task: (n,) whether a trial has a label and a fold}; all where a task has no entry.
     """
 
     folds: NDArray[np.int64]
     choices: dict[str, list[Choice]]
     right: dict[str, NDArray[np.bool_]] = field(repr=False)
+    tested: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
 
     def held_out(self, task: str) -> NDArray[np.bool_]:
         """(candidates, n) answers to each trial by the fit without its fold."""
@@ -279,6 +308,7 @@ class AnswerTable:
         for fold, candidate in enumerate(picked):
             own = self.folds == fold
             hits[own] = self.right[task][fold][candidate, own]
+        hits = hits[self.tested.get(task, self.folds >= 0)]
         usual = self.choices[task][int(np.bincount(picked).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
 
@@ -331,13 +361,14 @@ def evaluate(
     jobs: int = 1,
     progress: Callable[[], object] | None = None,
     nested: bool = True,
+    own: NDArray[np.bool_] | None = None,
 ) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
 
     Args:
         X: (n, p).
-        y: {task: (n,) labels}.
-        folds: (n,) from 0.
+        y: {task: (n,) labels}; empty where a trial has none, which then does not count.
+        folds: (n,) from 0; -1 for trials that are never left out, nor tested.
         grids: the candidates.
         features: names of the types, in the order of X.
         widths: columns of each; equal where None.
@@ -345,6 +376,7 @@ def evaluate(
         progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the table,
             `AnswerTable.held_out` alone is then valid.
+        own: (n,) whether a trial is the owner's, where simulated ones are among them.
 
     Raises:
         InputError: there are fewer than three folds, or X is not finite.
@@ -357,14 +389,18 @@ def evaluate(
         raise InputError(
             f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
         )
-    classes = {task: np.unique(labels, return_inverse=True)[1] for task, labels in y.items()}
+    classes = {
+        task: np.where(labels == "", -1, np.unique(labels[labels != ""]).searchsorted(labels))
+        for task, labels in y.items()
+    }
+    tested = {task: (labels >= 0) & (folds >= 0) for task, labels in classes.items()}
     pairs = [(i, j) for i in range(count) for j in range(i, count if nested else i + 1)]
     tests = [np.flatnonzero((folds == i) | (folds == j)) for i, j in pairs]
     everything = np.arange(len(X))
     wide = widths_of(X.shape[1], features, widths)
     work = (
         delayed(_answers)(
-            X, classes, np.delete(everything, test), test, grids, tuple(features), wide
+            X, classes, np.delete(everything, test), test, grids, tuple(features), wide, own
         )
         for test in tests
     )
@@ -384,7 +420,9 @@ def evaluate(
             progress()
         for task, answers in result.items():
             # For fold i these are answers to fold j, and the other way round.
-            for without, tested in {(i, j), (j, i)}:
-                own = folds[test] == tested
-                right[task][without][:, test[own]] = answers[:, own]
-    return AnswerTable(folds, choices, right)
+            for without, asked in {(i, j), (j, i)}:
+                places = folds[test] == asked
+                right[task][without][:, test[places]] = answers[:, places]
+    for task, each in right.items():
+        each[:, :, ~tested[task]] = True
+    return AnswerTable(folds, choices, right, tested)

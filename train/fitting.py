@@ -20,6 +20,8 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, kinds_of
 from train.dataset import DataSet, load_trials, read
+from train.evaluate import Labels
+from train.mix import mix
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
@@ -137,9 +139,9 @@ def fit(
         dataset = data
     else:
         raw = read([data] if isinstance(data, str | Path) else data, progress=progress)
-        drawn = kinds_of(raw.recordings) is not None
+        drawn = raw.mixed or kinds_of(raw.recordings) is not None
         every = candidates({}, joints=raw.joints, drawn=drawn, features=features, quick=quick)
-        if window_s is None and not quick:
+        if window_s is None and not (quick or raw.mixed):
             windows = _windows([float(r.t[-1] - r.t[0]) for r in raw.recordings])
         load = partial(
             load_trials,
@@ -147,11 +149,12 @@ def fit(
             horizon_s=windows[-1],
             features=expand([name for candidate in every for name in candidate.sets]),
             arm=arm,
+            partial=True,
             progress=progress,
         )
         fixed = threshold is not None or onset is not None
-        if not fixed and "threshold_counts" not in raw.recordings[0].meta.get("skin", {}):
-            threshold, onset = thresholds.proposed(raw.recordings)
+        if not fixed and "threshold_counts" not in raw.own[0].meta.get("skin", {}):
+            threshold, onset = thresholds.proposed(raw.own)
             notes.append(
                 f"warning: the skin was saved without thresholds; a threshold of {threshold} and "
                 f"an onset of {onset} counts come from the noise before contact"
@@ -176,30 +179,51 @@ def fit(
         raise InputError(f"{counted} too few to fit; record at least {FEWEST_TRIALS}")
     if k is not None and not 1 <= k <= n - 1:
         raise InputError(f"k must be 1 to {n - 1} with {n} trials, not {k}")
-    tried = candidates(
-        y,
-        joints=dataset.joints > 0,
-        drawn=kinds_of([trial.recording for trial in dataset.trials]) is not None,
-        features=features,
-        projection=projection,
-        scaling=scaling,
-        components=components,
-        k=k,
-        quick=quick,
-    )
-    choosing = Choosing(dataset, y, tried, samples, leave_out, quick, jobs, progress)
-    if len(windows) > 1:
-        windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
-    window_s, why = choosing.window(windows)
+    own = dataset.own
+
+    def choosing(of: DataSet, y: Labels) -> Choosing:
+        tried = candidates(
+            y,
+            joints=of.joints > 0,
+            drawn=own is not None or kinds_of([t.recording for t in of.trials]) is not None,
+            features=features,
+            projection=projection,
+            scaling=scaling,
+            components=components,
+            k=k,
+            quick=quick,
+        )
+        return Choosing(of, y, tried, samples, leave_out, quick, jobs, progress)
+
+    if own is None:
+        choice_of = choosing(dataset, y)
+        if len(windows) > 1:
+            windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
+        window_s, why = choice_of.window(windows)
+        chosen, folds, without = choice_of.choose(window_s)
+    else:
+        window_s = windows[0]
+        X = dataset.with_kernels(window_s).features(window_s, samples)
+
+        def settings(of: DataSet, y: Labels) -> dict[str, Chosen]:
+            return choosing(of, y).choose(windows[0])[0]
+
+        mixed = mix(dataset, y, own, settings, X, samples, leave_out, quick=quick, jobs=jobs)
+        chosen, folds, without, why = mixed.chosen, mixed.folds, mixed.without, mixed.notes
+        y = {task: y[task] for task in chosen}
     notes += why
-    chosen, folds, without = choosing.choose(window_s)
+    tried = choosing(dataset, y).tried
     dataset = dataset.with_kernels(window_s)
     choices = {task: settings.choice for task, settings in chosen.items()}
     measured = dataset
     dataset = measured.of([name for choice in choices.values() for name in choice.features])
     X = dataset.features(window_s, samples)
-    notes += _leaks(measured, y)
-    points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes)
+    felt = np.ones(n, dtype=bool) if own is None else own
+    notes += _leaks(measured.part(felt), {task: labels[felt] for task, labels in y.items()})
+    calibrating = int((folds >= 0).sum())
+    points = _decision_points(
+        dataset, choices, decision_points_s, window_s, samples, notes, calibrating
+    )
     sequential = None
     if points:
         used = [choice for by_task in (choices, *without) for choice in by_task.values()]
@@ -207,10 +231,11 @@ def fit(
         at_points = np.stack([seen.features(s, samples) for s in points])
         sequential = SequentialClassifier(
             choices, points, seen.names, jobs=jobs, widths=seen.widths(samples)
-        ).fit(at_points, y, folds, without)
+        ).fit(at_points, y, folds, without, own)
         classifier = sequential.decision_points_[-1]
     else:
-        classifier = ContactClassifier(choices, dataset.names, dataset.widths(samples)).fit(X, y)
+        classifier = ContactClassifier(choices, dataset.names, dataset.widths(samples))
+        classifier.fit(X, y, own)
     return Fitted(
         dataset=dataset,
         measured=measured,
@@ -282,14 +307,16 @@ def _decision_points(
     window_s: float,
     samples: int,
     notes: list[str],
+    calibrating: int | None = None,
 ) -> tuple[float, ...]:
     """The decision points asked for, or the default ones where they can be calibrated."""
     if wanted is not None:
         return tuple(wanted)
     n = len(dataset.trials)
-    if not FEWEST <= n <= MOST_TRIALS:
+    tested = n if calibrating is None else calibrating
+    if not FEWEST <= tested <= MOST_TRIALS:
         notes.append(
-            f"no decision points before the full window: {n} trials are not the {FEWEST} "
+            f"no decision points before the full window: {tested} trials are not the {FEWEST} "
             f"to {MOST_TRIALS} that are calibrated by default"
         )
         return ()

@@ -121,6 +121,8 @@ class Choice:
         shrinkage: of `lda`.
         features: names of those it takes; all where empty.
         targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
+        weights: how often a simulated trial and one of the owner's count in scaling and projection,
+            where there are both; 0 for trials that are not used at all.
     """
 
     scaling: str
@@ -130,13 +132,31 @@ class Choice:
     shrinkage: float = 0.01
     features: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
+    weights: tuple[int, int] = (1, 1)
 
     def space(self, task: str) -> Space:
-        """Tasks whose spaces are equal share a projection, with the components of the larger."""
+        """Tasks whose spaces are equal share a projection, with the components of the larger.
+
+        So they do if they also lack the labels of the same trials.
+        """
         if self.projection == "pca":
-            return self.projection, self.scaling, self.features
+            return self.projection, self.scaling, self.features, self.weights
         targets = self.targets or (task,)
-        return self.projection, self.scaling, self.features, self.shrinkage, targets
+        return self.projection, self.scaling, self.features, self.weights, self.shrinkage, targets
+
+    def counts(
+        self, labels: NDArray[np.str_], own: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.int64]:
+        """(n,) how often each trial counts: 0 without a label, else by the weights.
+
+        Args:
+            labels: (n,) of the task; empty where a trial has none.
+            own: (n,) whether a trial is the owner's; None where no weights are needed.
+        """
+        counts = np.ones(len(labels), dtype=np.int64)
+        if own is not None:
+            counts = np.where(own, self.weights[1], self.weights[0])
+        return np.where(labels == "", 0, counts)
 
 
 class ContactClassifier:
@@ -151,8 +171,9 @@ class ContactClassifier:
         spaces_: {task: Space}.
         columns_: {space: the columns of the vectors that it takes, rising}.
         projections_: {space: Projection}, with the components of the task that has most.
-        rows_: {space: (n, c)} projected training trials.
-        classes_: {task: sorted labels}; `labels_`: {task: (n,) class indices}.
+        members_: {space: (m,) the trials that it was fitted on, rising}.
+        rows_: {space: (m, c)} these trials, projected.
+        classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
         components_: {task: components kept}, at most as many as there are.
     """
 
@@ -166,35 +187,79 @@ class ContactClassifier:
         self.features = tuple(features)
         self.widths = widths
 
-    def fit(self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]) -> ContactClassifier:
-        """Fit every task on X (n, p) and its labels y[task] (n,)."""
+    def fit(
+        self,
+        X: NDArray[np.float64],
+        y: Mapping[str, NDArray[np.str_]],
+        own: NDArray[np.bool_] | None = None,
+    ) -> ContactClassifier:
+        """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for it.
+
+        Args:
+            X, y: the trials; labels are empty where a trial has none.
+            own: (n,) whether a trial is the owner's, see `Choice.counts`.
+        """
         X = np.asarray(X, dtype=np.float64)
         if not np.isfinite(X).all():
             raise InputError(
                 f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
             )
         self.n_features_in_ = X.shape[1]
-        for choice in self.choices.values():
-            if not 1 <= choice.k <= len(X):
-                raise InputError(f"k must be 1 to {len(X)} training trials, not {choice.k}")
+        self.spaces_: dict[str, Space] = {}
+        counts: dict[Space, NDArray[np.int64]] = {}
+        for task, choice in self.choices.items():
+            each = choice.counts(y[task], own)
+            space = (*choice.space(task), () if (each == 1).all() else each.tobytes())
+            self.spaces_[task], counts[space] = space, each
+            n = int((each > 0).sum())
+            if not 1 <= choice.k <= n:
+                raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
             if choice.components < 1:
                 raise InputError(f"components must be at least 1, not {choice.components}")
-        self.spaces_ = {task: choice.space(task) for task, choice in self.choices.items()}
         widths = widths_of(X.shape[1], self.features, self.widths)
         self.columns_ = {
             self.spaces_[task]: columns_of(choice.features, self.features, widths)
             for task, choice in self.choices.items()
         }
-        self.projections_ = projections(self.choices, self.features, widths, X, y)
-        self.rows_ = {s: self.project(s, X) for s in self.projections_}
+        self.projections_ = {
+            space: self._projection(space, widths, X, y, np.repeat(np.arange(len(X)), each))
+            for space, each in counts.items()
+        }
+        self.members_ = {space: np.flatnonzero(each) for space, each in counts.items()}
+        self.rows_ = {s: self.project(s, X[members]) for s, members in self.members_.items()}
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}
         for task, choice in self.choices.items():
-            self.classes_[task], self.labels_[task] = np.unique(y[task], return_inverse=True)
+            labels = y[task][self.members_[self.spaces_[task]]]
+            self.classes_[task], self.labels_[task] = np.unique(labels, return_inverse=True)
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
         return self
+
+    def _projection(
+        self,
+        space: Space,
+        widths: Sequence[int],
+        X: NDArray[np.float64],
+        y: Mapping[str, NDArray[np.str_]],
+        trials: NDArray[np.int64],
+    ) -> Projection:
+        """The projection of a space, fitted on some trials, of which one may be there often."""
+        tasks = [task for task, own in self.spaces_.items() if own == space]
+        choice = self.choices[tasks[0]]
+        names, own_widths = types_of(choice.features, self.features, widths)
+        return Projection(
+            choice.scaling,
+            max(self.choices[task].components for task in tasks),
+            names,
+            choice.projection,
+            choice.shrinkage,
+            own_widths,
+        ).fit(
+            X[trials][:, self.columns_[space]],
+            np.column_stack([y[target][trials] for target in choice.targets or tasks[:1]]),
+        )
 
     def project(self, space: Space, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates (m, c) of vectors (m, p)."""
@@ -208,10 +273,11 @@ class ContactClassifier:
         nearest = NearestNeighbours(self.choices[task].k).fit(
             self.rows_[space][:, :c], self.classes_[task][self.labels_[task]]
         )
-        return nearest.kneighbors(self.project(space, X)[:, :c])
+        distances, rows = nearest.kneighbors(self.project(space, X)[:, :c])
+        return distances, self.members_[space][rows]
 
     def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, n) squared distances of vectors (m, p) to all training trials."""
+        """(m, members) squared distances of vectors (m, p) to the trials of the task's space."""
         space, c = self.spaces_[task], self.components_[task]
         return squared_distances(self.project(space, X)[:, :c], self.rows_[space][:, :c])
 
@@ -219,7 +285,8 @@ class ContactClassifier:
         """{task: (m,) labels} for vectors (m, p)."""
         answers: dict[str, NDArray[np.str_]] = {}
         for task in self.choices:
-            _, rows = self.neighbours(task, np.asarray(X, dtype=np.float64))
+            squares = self.squares(task, np.asarray(X, dtype=np.float64))
+            rows = np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
             winners, _ = vote(self.labels_[task][rows], len(self.classes_[task]))
             answers[task] = self.classes_[task][winners]
         return answers
@@ -239,32 +306,3 @@ def types_of(
     """Names and widths of the `wanted` among the features, in their order; all if empty."""
     taken = [(f, w) for f, w in zip(features, widths, strict=True) if not wanted or f in wanted]
     return [name for name, _ in taken], [width for _, width in taken]
-
-
-def projections(
-    choices: Mapping[str, Choice],
-    features: Sequence[str],
-    widths: Sequence[int],
-    X: NDArray[np.float64],
-    y: Mapping[str, NDArray[np.str_]],
-) -> dict[Space, Projection]:
-    """{space: Projection} of all tasks, fitted on X (n, p) and labels y[task] (n,)."""
-    fitted: dict[Space, Projection] = {}
-    for task, choice in choices.items():
-        space = choice.space(task)
-        tasks = [name for name, other in choices.items() if other.space(name) == space]
-        if space not in fitted:
-            targets = choice.targets or (task,)
-            names, own_widths = types_of(choice.features, features, widths)
-            fitted[space] = Projection(
-                choice.scaling,
-                max(choices[name].components for name in tasks),
-                names,
-                choice.projection,
-                choice.shrinkage,
-                own_widths,
-            ).fit(
-                X[:, columns_of(choice.features, features, widths)],
-                np.column_stack([y[target] for target in targets]),
-            )
-    return fitted

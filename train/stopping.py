@@ -260,20 +260,22 @@ class SequentialClassifier:
         y: Mapping[str, NDArray[np.str_]],
         folds: NDArray[np.int64] | None = None,
         fold_choices: Sequence[Mapping[str, Choice]] | None = None,
+        own: NDArray[np.bool_] | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
 
         Args:
             X: (decision points, n, p).
-            y: {task: (n,) labels}.
-            folds: (n,) from 0; `folds_of` where None.
+            y: {task: (n,) labels}; empty where a trial has none.
+            folds: (n,) from 0, or -1 for trials that calibrate nothing; `folds_of` where None.
             fold_choices: [fold]{task: Choice}, chosen without the fold's trials. Where None,
                 `choices` serve every fold; this is exact if they were not chosen by these trials.
+            own: see `ContactClassifier.fit`.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
         """
-        n = X.shape[1]
+        n = X.shape[1] if folds is None else int((folds >= 0).sum())
         if n < FEWEST:
             raise InputError(
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or export "
@@ -287,22 +289,26 @@ class SequentialClassifier:
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(kept, self.features, widths)
         types = types_of(kept, self.features, widths)
-        self.decision_points_ = _models(X[..., self.columns_], y, self.choices, *types)
+        self.decision_points_ = _models(X[..., self.columns_], y, self.choices, *types, own)
         self.n_features_in_ = len(self.columns_)
-        work = (delayed(self._fold)(X, y, folds == k, chosen[k]) for k in range(count))
+        work = (delayed(self._fold)(X, y, folds == k, chosen[k], own) for k in range(count))
         by_fold = Parallel(n_jobs=self.jobs)(work)
         self.held_out_ = {}
         for task in self.choices:
-            named = np.empty((len(X), n), dtype=y[task].dtype)
+            named = np.empty(X.shape[:2], dtype=y[task].dtype)
             margins, distances = np.empty(named.shape), np.empty(named.shape)
             for k, answers_of in enumerate(by_fold):
-                own = folds == k
-                named[:, own], margins[:, own], distances[:, own] = answers_of[task]
-            self.held_out_[task] = HeldOut(named == y[task], margins, distances)
+                left_out = folds == k
+                named[:, left_out], margins[:, left_out], distances[:, left_out] = answers_of[task]
+            tested = (folds >= 0) & (y[task] != "")
+            right = named == y[task]
+            self.held_out_[task] = HeldOut(
+                right[:, tested], margins[:, tested], distances[:, tested]
+            )
         most = finest({task: y[task] for task in self.choices})
         self.novelty_ = novelty(most, self.held_out_[most].distances)
         self.stopping_ = {
-            task: self._calibrated(task, held_out, folds)
+            task: self._calibrated(task, held_out, folds[(folds >= 0) & (y[task] != "")])
             for task, held_out in self.held_out_.items()
         }
         return self
@@ -311,13 +317,15 @@ class SequentialClassifier:
         self,
         X: NDArray[np.float64],
         y: Mapping[str, NDArray[np.str_]],
-        own: NDArray[np.bool_],
+        left_out: NDArray[np.bool_],
         choices: Mapping[str, Choice],
+        own: NDArray[np.bool_] | None,
     ) -> dict[str, tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]]:
-        others = {task: y[task][~own] for task in y}
-        models = _models(X[:, ~own], others, choices, self.features, self.widths)
+        others = {task: y[task][~left_out] for task in y}
+        owned = None if own is None else own[~left_out]
+        models = _models(X[:, ~left_out], others, choices, self.features, self.widths, owned)
         with threadpool_limits(1):
-            return {task: answers(models, task, X[:, own]) for task in choices}
+            return {task: answers(models, task, X[:, left_out]) for task in choices}
 
     def _calibrated(self, task: str, held_out: HeldOut, folds: NDArray[np.int64]) -> Stopping:
         confidence = calibrated(held_out, folds)
@@ -344,10 +352,11 @@ def _models(
     choices: Mapping[str, Choice],
     features: Sequence[str],
     widths: Sequence[int] | None,
+    own: NDArray[np.bool_] | None,
 ) -> list[ContactClassifier]:
     # Decompositions this small are slower on several threads than on one.
     with threadpool_limits(1):
-        return [ContactClassifier(choices, features, widths).fit(x, y) for x in X]
+        return [ContactClassifier(choices, features, widths).fit(x, y, own) for x in X]
 
 
 def calibrated(held_out: HeldOut, folds: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -105,7 +105,7 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
     text = report(fitted)
     assert "warning: without a contact above 150 counts, and counted as wrong: " in text
     assert "python -m train thresholds" in text
-    assert "warning: left out for lack of a label for object: " in text
+    assert "recordings are left out for lack of a label for object: " in text
     assert "the window of 9 s is longer than any recording goes on after its onset" in text
 
 

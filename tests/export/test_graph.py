@@ -61,6 +61,24 @@ def differences(fitted, model, queries):
     return wrong
 
 
+def test_a_task_that_some_trials_lack_names_its_neighbours_by_their_rows(tmp_path):
+    X = features(30)
+    y = {"t": labels_for(X, 3, 0), "some": labels_for(X, 2, 1)}
+    y["some"][::3] = ""
+    choice = Choice("none", 2, 3)
+    fitted = ContactClassifier({"t": choice, "some": choice}).fit(X, y)
+    path = tmp_path / "model.onnx"
+    path.write_bytes(to_onnx(fitted, describe(fitted)))
+    answers = Model(path).run(X)
+    for task in y:
+        distances, rows = fitted.neighbours(task, X)
+        assert (answers[f"{task}_neighbours"] == rows).all()
+        assert (answers[f"{task}_distances"] == distances).all()
+        labels = fitted.classes_[task][answers[f"{task}_label"]]
+        assert (labels == fitted.predict(X)[task]).all()
+    assert (answers["some_neighbours"] % 3 > 0).all()
+
+
 def hard_set(kind, draw):
     """(X, queries) with 24 columns of a kind that is hard for arithmetic that rounds."""
     n = int(draw.integers(4, 40))

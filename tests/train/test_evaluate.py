@@ -8,7 +8,7 @@ from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
 from train.evaluate import SearchGrid, choose, evaluate, fits, group_folds, stratified_folds
-from train.pipeline import NearestNeighbours
+from train.pipeline import ContactClassifier, NearestNeighbours
 from train.projection import Projection
 
 TWO = ("max_force", "contact_area")
@@ -65,6 +65,25 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
             train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
             for choice, right in zip(table.choices["t"], table.right["t"][fold], strict=True):
                 assert (right[test] == told(choice, X, y, train, test)).all()
+
+
+def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_of_the_estimators():
+    X, y = trials()
+    y[::5] = ""
+    own = np.arange(len(y)) % 2 == 0
+    folds = np.where(own, np.arange(len(y)) // 2 % 3, -1)
+    grids = [replace(grid, weights=(1, 3)) for grid in GRIDS]
+    table = evaluate(X, {"t": y}, folds, grids, features=TWO, own=own)
+    tested = own & (y != "")
+    assert (table.tested["t"] == tested).all()
+    for fold in range(3):
+        train, test = folds != fold, (folds == fold) & tested
+        for choice, right in zip(table.choices["t"], table.right["t"][fold], strict=True):
+            fitted = ContactClassifier({"t": choice}, TWO).fit(
+                X[train], {"t": y[train]}, own[train]
+            )
+            assert (right[test] == (fitted.predict(X[test])["t"] == y[test])).all()
+    assert table.nested("t").total == tested.sum()
 
 
 def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():

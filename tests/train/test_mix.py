@@ -1,0 +1,87 @@
+"""Simulated trials beside the owner's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import train
+from edge.errors import InputError
+from edge.recording import save
+from train.pipeline import Choice, ContactClassifier
+from train.projection import Projection
+
+GIVEN = {"features": ["max_force", "contact_area"], "projection": "lda", "quick": True, "jobs": 1}
+
+
+def saved(folder, make_touch, count, *, simulated, swap=False, first=0, **more):
+    """Hard and soft touches, and the folder; `swap` gives each the other's category."""
+    for seed in range(first, first + count):
+        kind = ("hard", "soft")[seed % 2]
+        touch = make_touch(kind=kind, seed=seed)
+        labels = {"category": ("rigid-fixed", "soft-fixed")[(seed + swap) % 2], **more}
+        if simulated:
+            labels |= {"softness": labels["category"].split("-")[0], "object": f"{kind} {seed % 6}"}
+        meta = {**touch.meta, "labels": labels, **({"simulation": {}} if simulated else {})}
+        save(folder / f"{seed:02}.npz", replace(touch, meta=meta))
+    return str(folder)
+
+
+def test_five_trials_with_a_category_alone_are_trained_with_all_the_simulated_ones(
+    make_touch, tmp_path
+):
+    simulated = saved(tmp_path / "simulated", make_touch, 24, simulated=True)
+    own = saved(tmp_path / "own", make_touch, 5, simulated=False, first=50)
+    fitted = train.fit([own, simulated], **GIVEN)
+    assert len(fitted.dataset.trials) == 29
+    assert set(fitted.chosen) == {"category", "softness"}
+    for chosen in fitted.chosen.values():
+        assert (chosen.accuracy.right, chosen.accuracy.total) == (5, 5)
+        assert chosen.choice.weights == (1, 5)
+    assert "5 of your own trials beside 24 simulated ones" in fitted.notes[0]
+    assert "not fitted, as fewer than 3 of your own have it: object" in fitted.notes[1]
+    assert "yours counted 5 times (half of the weight) 100.0%, both 100.0%" in fitted.notes[2]
+
+
+def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(make_touch, tmp_path):
+    simulated = saved(tmp_path / "simulated", make_touch, 24, simulated=True, swap=True)
+    own = saved(tmp_path / "own", make_touch, 22, simulated=False, first=50, room="kitchen")
+    fitted = train.fit([own, simulated], **GIVEN)
+    assert fitted.chosen["category"].choice.weights == (0, 1)
+    assert fitted.chosen["room"].choice.weights == (0, 1)  # no simulated trial has a room
+    assert fitted.classifier.rows_[fitted.classifier.spaces_["category"]].shape[0] == 22
+    assert any("simulated trials no longer help category" in note for note in fitted.notes)
+    assert fitted.sequential.stopping_["category"].trials == 22
+
+
+def test_two_trials_choose_nothing(make_touch, tmp_path):
+    simulated = saved(tmp_path / "simulated", make_touch, 8, simulated=True)
+    own = saved(tmp_path / "own", make_touch, 2, simulated=False, first=50)
+    with pytest.raises(InputError, match="2 of the trials are no simulated ones; record at least"):
+        train.fit([own, simulated], **GIVEN)
+
+
+def test_a_weight_of_three_is_a_trial_that_stands_three_times():
+    rng = np.random.default_rng(0)
+    X, labels = rng.normal(size=(12, 6)), np.array(["a", "b", "c"] * 4)
+    own = np.arange(12) >= 8
+    choice = Choice("IV", 2, 1, "lda", weights=(1, 3))
+    fitted = ContactClassifier({"t": choice}, ("max_force", "contact_area")).fit(
+        X, {"t": labels}, own
+    )
+    times = np.repeat(np.arange(12), np.where(own, 3, 1))
+    oracle = Projection("IV", 2, ("max_force", "contact_area"), "lda").fit(X[times], labels[times])
+    space = fitted.spaces_["t"]
+    assert fitted.projections_[space].weights_.tobytes() == oracle.weights_.tobytes()
+    assert (fitted.rows_[space] == oracle.transform(X)).all()
+
+
+def test_a_task_is_fitted_on_the_trials_that_have_a_label_and_names_them_by_their_rows():
+    X = np.arange(10.0)[:, None] * [1.0, 2.0]
+    labels = np.array(["", "a", "", "b"] + ["a", "b"] * 3)
+    fitted = ContactClassifier({"t": Choice("none", 1, 1)}, ("max_force", "contact_area")).fit(
+        X, {"t": labels}
+    )
+    _, rows = fitted.neighbours("t", X)
+    assert rows[:, 0].tolist() == [1, 1, 1, 3, 4, 5, 6, 7, 8, 9]
+    assert fitted.predict(X)["t"].tolist() == ["a", "a", "a", *labels[3:]]

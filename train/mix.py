@@ -1,0 +1,183 @@
+"""Simulated trials beside the owner's: how much each counts, chosen on the owner's trials.
+
+The settings of a task are chosen on the simulated trials, of which there are many. On the owner's,
+of which there may be ten, only the weight is chosen: by trials, or objects, that are left out in
+turn, while the simulated ones are always there. A weight is how often a trial counts in scaling and
+projection, in whole numbers. As a neighbour, each votes once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from train.choose import FEWEST_GROUPS, QUICK_FOLDS, TRIAL, Chosen
+from train.dataset import DataSet
+from train.evaluate import (
+    FOLDS,
+    AnswerTable,
+    Labels,
+    SearchGrid,
+    evaluate,
+    group_folds,
+    stratified_folds,
+)
+from train.pipeline import Choice
+
+FEWEST_OWN = 3
+"""The owner's trials with a label for a task from which on it is fitted."""
+ALONE, SIMULATED, ONCE = (0, 1), (1, 0), (1, 1)
+"""Weights of the simulated trials and of the owner's."""
+
+
+@dataclass(frozen=True)
+class Mix:
+    """What the owner's trials choose.
+
+    Attributes:
+        chosen: {task: its settings, with the weights}; accuracies are those on the owner's trials.
+        folds: (n,) the fold of each of the owner's trials, -1 for simulated ones.
+        without: [fold]{task: the choice made without the fold's trials}.
+        notes: sentences that say how much the simulated trials help.
+    """
+
+    chosen: dict[str, Chosen]
+    folds: NDArray[np.int64]
+    without: list[dict[str, Choice]]
+    notes: list[str]
+
+
+def mix(
+    dataset: DataSet,
+    y: Labels,
+    own: NDArray[np.bool_],
+    settings: Callable[[DataSet, Labels], dict[str, Chosen]],
+    features: NDArray[np.float64],
+    samples: int,
+    leave_out: str,
+    *,
+    quick: bool = False,
+    jobs: int = 1,
+) -> Mix:
+    """Choose the weights of each task.
+
+    Args:
+        dataset: all trials.
+        y: {task: (n,) labels}.
+        own: (n,) whether a trial is the owner's.
+        settings: chooses the settings of tasks on some of the trials.
+        features: (n, p) of the data set's, at the full window.
+        samples: values of a feature.
+        leave_out: label whose groups are left out where the owner's trials have several of them.
+        quick: fewer folds.
+        jobs: processes.
+
+    Raises:
+        InputError: the owner's trials are too few, or have no label.
+    """
+    labelled = {task: int((labels[own] != "").sum()) for task, labels in y.items()}
+    few = [task for task in y if labelled[task] < FEWEST_OWN]
+    y = {task: labels for task, labels in y.items() if task not in few}
+    if not y:
+        raise InputError(
+            f"{int(own.sum())} of the trials are no simulated ones; record at least {FEWEST_OWN} "
+            "with a label, or export the simulated ones alone"
+        )
+    shared = [t for t in y if set(y[t][own].tolist()) & set(y[t][~own].tolist()) - {""}]
+    chosen: dict[str, Chosen] = {}
+    for tasks, trials in ((shared, ~own), ([t for t in y if t not in shared], own)):
+        if tasks:
+            chosen |= settings(dataset.part(trials), {t: y[t][trials] for t in tasks})
+    half = max(round((~own).sum() / own.sum()), 1)
+    weights = tuple(dict.fromkeys(((1, half), ONCE, ALONE, SIMULATED)))
+    grids = [
+        _grid(task, chosen[task].choice, each, labelled[task])
+        for task in y
+        for each in (weights if task in shared else (ALONE,))
+    ]
+
+    def answers(folds: NDArray[np.int64]) -> AnswerTable:
+        everyone = np.full(len(own), -1)
+        everyone[own] = folds
+        return evaluate(
+            features,
+            y,
+            everyone,
+            grids,
+            features=dataset.names,
+            widths=dataset.widths(samples),
+            jobs=jobs,
+            own=own,
+        )
+
+    finest = max(y, key=lambda task: len(set(y[task][own].tolist())))
+    count = QUICK_FOLDS if quick else FOLDS
+    by_trial = by_group = answers(stratified_folds(y[finest][own], count))
+    groups = None if leave_out == TRIAL else dataset.part(own).groups(leave_out)
+    if groups is not None and len(set(groups.tolist())) >= FEWEST_GROUPS:
+        by_group = answers(group_folds(groups, count))
+    without: list[dict[str, Choice]] = [{} for _ in range(int(by_trial.folds.max()) + 1)]
+    notes = [
+        f"{int(own.sum())} of your own trials beside {int((~own).sum())} simulated ones, on which "
+        "the settings are chosen (the table); the other accuracies are those on your own"
+    ]
+    if few:
+        notes.append(
+            f"not fitted, as fewer than {FEWEST_OWN} of your own have it: {', '.join(few)}"
+        )
+    for task, settled in chosen.items():
+        table = by_trial if task == leave_out else by_group
+        best = table.choices[task][table.chosen(task)]
+        for fold, choice_of in enumerate(without):
+            choice_of[task] = table.choices[task][by_trial.without(task, fold)]
+        chosen[task] = replace(
+            settled,
+            choice=best,
+            accuracy=table.nested(task),
+            by_trial=by_trial.nested(task),
+            left_out=TRIAL if table is by_trial else leave_out,
+        )
+        notes.append(f"{task}: {_shares(table, task, half)}")
+        if task in shared and best.weights == ALONE:
+            notes.append(
+                f"simulated trials no longer help {task}: export your own alone, which also "
+                "chooses the features by them"
+            )
+    return Mix(chosen, by_trial.folds, without, notes)
+
+
+def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> SearchGrid:
+    """The one candidate of a task with some weights."""
+    return SearchGrid(
+        choice.scaling,
+        choice.projection,
+        choice.features,
+        (choice.components,),
+        choice.components,
+        (choice.shrinkage,),
+        (min(choice.k, max(own // 2, 1)) if weights == ALONE else choice.k,),
+        choice.targets,
+        (task,),
+        weights,
+    )
+
+
+def _shares(table: AnswerTable, task: str, half: int) -> str:
+    """The accuracy with each of the weights, and which are taken."""
+    names = {
+        (1, half): f"both, yours counted {half} times (half of the weight)",
+        ONCE: "both",
+        ALONE: "your own alone",
+        SIMULATED: "simulated alone",
+    }
+    answers = table.held_out(task)[:, table.tested[task]]
+    shares = [
+        f"{names[choice.weights]} {right.mean():.1%}"
+        for choice, right in zip(table.choices[task], answers, strict=True)
+    ]
+    taken = table.choices[task][table.chosen(task)].weights
+    return f"{', '.join(shares)}; taken: {names[taken]}"
