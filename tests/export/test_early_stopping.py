@@ -45,7 +45,9 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     info = replace(early[0].info, tasks={"t": Task(("common", "known", "rare"), 3, 4, "none", 0.5)})
     sequential = SequentialClassifier({"t": Choice("none", 4, 3)}, info.decision_points_s)
     sequential.fit(X, {"t": labels})
-    info = replace(info, stopping=sequential.stopping_, novelty=sequential.novelty_, rows=132)
+    info = replace(
+        info, stopping=sequential.stopping_, novelty=sequential.novelty_, rows=132, trials=()
+    )
     (tmp_path / "model.onnx").write_bytes(to_onnx(sequential, info))
     model = Model(tmp_path / "model.onnx")
     for point, fitted in enumerate(sequential.decision_points_):
