@@ -6,9 +6,10 @@ import errno
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import NO_FAULTS, Fault, Route, Script
+from edge.fake.faults import NO_FAULTS, Fault, Kind, Route, Script
 from edge.i2c.bus import LARGEST_BYTES, LARGEST_MESSAGES, Message, Transfer, bus_error, wire_bits
 from edge.i2c.chip import FakeChip
 from edge.i2c.tca9548a import FakeTCA9548A
@@ -70,7 +71,7 @@ class FakeBus:
         self.bits = 0
         """Bits on the wire so far."""
         self.transactions = 0
-        self._held: dict[tuple[Route, int], bytes] = {}
+        self._held: dict[tuple[Route, int], NDArray[np.uint8]] = {}
         self._count = count
         self._open = True
 
@@ -118,91 +119,72 @@ class FakeBus:
         route, chips = self._route(address)
         fault = self.script.next(route, self.now())
         self.transactions += 1
-        if fault is not None and fault.kind == "foreign":
+        if fault.kind == "foreign":
             for chip in self.chips.values():
                 if isinstance(chip, FakeTCA9548A):
                     chip.write(_another(chip.read(1, 0.0)), 0.0)
                     chip.stop()
             route, chips = self._route(address)
-        if fault is not None and fault.kind == "error":
-            self._spend(11 if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
-            if fault.code == errno.ETIMEDOUT and self.timed:
-                self.hand.advance(self.timeout_s)
-            self._stop()
-            raise bus_error(fault.code, self.name, address)
-        if fault is not None and fault.kind == "reset":
+        if fault.kind == "reset":
             for chip in chips:
                 chip.reset()
-        if not chips:
+        code = fault.code if fault.kind == "error" else 0 if chips else errno.EREMOTEIO
+        if code == 0:
+            self._spend(self._count(messages))
+            for message in messages:
+                self._carry(message, chips, fault.kind, route)
+        elif code in (errno.EREMOTEIO, errno.ENXIO):
             self._spend(11)
-            self._stop()
-            raise bus_error(errno.EREMOTEIO, self.name, address)
-        self._spend(self._count(messages))
-        t = self.now()
-        for message in messages:
-            self._carry(message, chips, t, fault, route)
-        self._stop()
+        elif code == errno.ETIMEDOUT and self.timed:
+            self.hand.advance(self.timeout_s)
+        for chip in self.chips.values():
+            chip.stop()
+        if code:
+            raise bus_error(code, self.name, address)
 
     def _refuse(self, messages: Sequence[Message]) -> None:
-        address, last = messages[0].address, messages[-1]
-        refused = errno.EINVAL if len(messages) > LARGEST_MESSAGES else 0
-        for message in messages:
-            if message.address != address or len(message.buffer) > LARGEST_BYTES:
-                refused = errno.EINVAL
-            elif message.read and message is not last:
-                refused = refused or errno.EOPNOTSUPP
-        if refused:
-            raise bus_error(refused, self.name, address)
+        address, long = messages[0].address, len(messages) > LARGEST_MESSAGES
+        if long or any(m.address != address or len(m.buffer) > LARGEST_BYTES for m in messages):
+            raise bus_error(errno.EINVAL, self.name, address)
+        if any(message.read for message in messages[:-1]):
+            raise bus_error(errno.EOPNOTSUPP, self.name, address)
 
     def _route(self, address: int) -> tuple[Route, list[FakeChip]]:
         """Every chip that hears the address, and the way to it."""
-        own = self.chips.get(address)
-        chips = [] if own is None else [own]
-        mux_address, channel = None, None
-        for at, mux in self.chips.items():
-            if isinstance(mux, FakeTCA9548A) and at != address:
+        route = Route(self.name, address)
+        chips = [self.chips[address]] if address in self.chips else []
+        for mux_address, mux in self.chips.items():
+            if isinstance(mux, FakeTCA9548A) and mux_address != address:
                 for n in mux.connected:
-                    if own is None:
-                        mux_address, channel = at, n
+                    if address not in self.chips:
+                        route = Route(self.name, address, mux_address, n)
                     if address in mux.channels[n]:
                         chips.append(mux.channels[n][address])
-        return Route(self.name, address, mux_address, channel), chips
+        return route, chips
 
-    def _carry(
-        self,
-        message: Message,
-        chips: Sequence[FakeChip],
-        t: float,
-        fault: Fault | None,
-        route: Route,
-    ) -> None:
+    def _carry(self, message: Message, chips: list[FakeChip], kind: Kind, route: Route) -> None:
+        """Carry one message, with the effect of a kind of fault."""
+        t, n, draw = self.now(), len(message.buffer), self.script.random.randrange
         if not message.read:
             data = message.buffer.tobytes()
-            to_mux = any(isinstance(chip, FakeTCA9548A) for chip in chips)
-            if fault is not None and fault.kind == "misroute" and to_mux:
+            if kind == "misroute" and any(isinstance(chip, FakeTCA9548A) for chip in chips):
                 data = _another(data)
             for chip in chips:
                 chip.write(data, t)
             return
-        out = np.frombuffer(chips[0].read(len(message.buffer), t), dtype=np.uint8)
-        if len(chips) > 1 or self.script.faults:
-            out = out.copy()
-            for chip in chips[1:]:  # two chips at one address pull the same wire low
-                out &= np.frombuffer(chip.read(len(out), t), dtype=np.uint8)
-        if fault is not None and fault.kind == "flip":
-            bit = self.script.random.randrange(8 * len(out))
+        served = [np.frombuffer(chip.read(n, t), dtype=np.uint8) for chip in chips]
+        # Two chips at one address pull the same wire low.
+        out = np.bitwise_and.reduce(served) if len(served) > 1 else served[0].copy()
+        if kind == "flip":
+            bit = draw(8 * n)
             out[bit // 8] ^= 1 << bit % 8
-        if fault is not None and fault.kind == "break":
-            out[self.script.random.randrange(len(out)) :] = 0xFF
-        if fault is not None and fault.kind == "hold":
-            out[:] = np.frombuffer(self._held.get((route, len(out)), out.tobytes()), dtype=np.uint8)
-        elif len(out) > 2:
-            self._held[route, len(out)] = out.tobytes()
+        elif kind == "break":
+            out[draw(n) :] = 0xFF
+        if kind == "hold":
+            out = self._held.get((route, n), out)
+        elif n > 2:
+            self._held[route, n] = out
         message.buffer[:] = out
-
-    def _stop(self) -> None:
-        for chip in self.chips.values():
-            chip.stop()
 
     def _spend(self, bits: int) -> None:
         self.bits += bits

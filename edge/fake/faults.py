@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-Kind = Literal["error", "flip", "misroute", "foreign", "reset", "hold", "break"]
+Kind = Literal["none", "error", "flip", "misroute", "foreign", "reset", "hold", "break"]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Fault:
             makes a write to a mux select another channel; `foreign` is another program that
             selects another channel first; `reset` resets the chip first; `hold` makes the chip
             serve its former bytes; `break` lets go of the wire at a random byte of those read,
-            from which on all bits are 1.
+            from which on all bits are 1; `none` does nothing.
         code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
             bus from being opened again while the fault lasts.
         at: numbers of transactions on the bus, counted from 0 when the script starts.
@@ -47,6 +47,7 @@ class Fault:
 
 
 NO_FAULTS: tuple[Fault, ...] = ()
+NO_FAULT = Fault("none")
 
 
 class Route(NamedTuple):
@@ -62,8 +63,8 @@ class Script:
     """The faults of one bus.
 
     >>> script = Script([Fault(at=[1])], "bus 0")
-    >>> [script.next(Route("bus 0", 0x2C), 0.0) is not None for _ in range(3)]
-    [False, True, False]
+    >>> [script.next(Route("bus 0", 0x2C), 0.0).kind for _ in range(3)]
+    ['none', 'error', 'none']
     """
 
     def __init__(self, faults: Sequence[Fault], bus: str, seed: int = 0) -> None:
@@ -74,8 +75,8 @@ class Script:
         # One stream for each bus, so that its faults do not depend on the other threads.
         self.random = random.Random(f"faults/{seed}/{bus}")
 
-    def next(self, route: Route, t: float) -> Fault | None:
-        """The first fault that matches the next transaction, or None."""
+    def next(self, route: Route, t: float) -> Fault:
+        """The first fault that matches the next transaction, or `NO_FAULT`."""
         self._n += 1
         for fault in self.faults:
             if (
@@ -88,15 +89,9 @@ class Script:
             ):
                 self.met += 1
                 return fault
-        return None
+        return NO_FAULT
 
     def unplugged(self, t: float) -> bool:
         """Whether the adapter is gone at `t`."""
-        return any(
-            f.kind == "error"
-            and f.code == errno.ENODEV
-            and f.at is None
-            and f.rate >= 1.0
-            and f.during[0] <= t < f.during[1]
-            for f in self.faults
-        )
+        gone = [f for f in self.faults if (f.kind, f.code, f.at) == ("error", errno.ENODEV, None)]
+        return any(fault.during[0] <= t < fault.during[1] for fault in gone)

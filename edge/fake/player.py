@@ -16,7 +16,7 @@ from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
 from edge.fake.faults import NO_FAULTS, Fault
 from edge.i2c import block
-from edge.i2c.bus import Bus, wire_bits
+from edge.i2c.bus import wire_bits
 from edge.i2c.chip import UNUSED, ChipSpec, Sense
 from edge.i2c.serial_bus import serial_bits
 from edge.i2c.tca9548a import FakeTCA9548A
@@ -27,6 +27,11 @@ from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
+NOISE_COUNTS = 0.8
+"""Noise of the fake skins that commands open, below that from which a chip that always serves the
+same bytes is stuck: a fake may be calibrated with noise, and then played without."""
+NOISE_FRAMES, NOISE_STEP_S = 97, 0.001
+"""The noise is a list of frames, repeated: one for each so many seconds."""
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
 
@@ -87,8 +92,8 @@ class Playback:
         return None if np.isnan(joints[0]) else joints
 
 
-def calibrated(file: SkinFile) -> SkinFile:
-    """The file with its calibration, or with that of fake chips without noise."""
+def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
+    """The file with its calibration, or with that of fake chips with this noise."""
     if file.calibration is not None:
         return file
     baseline = np.zeros(file.layout.rows * file.layout.cols, dtype=np.uint16)
@@ -97,7 +102,8 @@ def calibrated(file: SkinFile) -> SkinFile:
             if taxel != UNUSED:
                 baseline[taxel] = chip.kind.rest(chip)
     shape = file.layout.shape
-    return replace(file, calibration=TaxelCalibration(baseline.reshape(shape), np.zeros(shape)))
+    noise = np.full(shape, noise_counts)
+    return replace(file, calibration=TaxelCalibration(baseline.reshape(shape), noise))
 
 
 def fake_buses(
@@ -108,6 +114,7 @@ def fake_buses(
     timed: bool = False,
     overhead_s: float = 0.0,
     faults: Sequence[Fault] = NO_FAULTS,
+    noise_counts: float = 0.0,
     seed: int = 0,
 ) -> list[FakeBus]:
     """Fake chips on fake buses, as the skin's file lays them out.
@@ -119,7 +126,8 @@ def fake_buses(
         timed: the clock advances with the bits on the wire, and conversions take their time.
         overhead_s: time of the software for each transaction, where timed.
         faults: see `edge.fake.faults`.
-        seed: of the faults and of what power-up leaves undefined.
+        noise_counts: standard deviation of the noise on raw values.
+        seed: of the noise, the faults and what power-up leaves undefined.
     """
     rest = calibrated(file).calibration
     assert rest is not None
@@ -136,7 +144,9 @@ def fake_buses(
             seed=seed,
             count=serial_bits if spec.serial else wire_bits,
         )
-        felt = _Felt(spec, scene, rest.baseline.ravel())
+        shape = NOISE_FRAMES if noise_counts else 1, rest.baseline.size
+        noise = noise_counts * np.random.default_rng([seed, b]).standard_normal(shape)
+        felt = _Felt(spec, scene, rest.baseline.ravel(), np.rint(noise))
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
             model = chip.kind.fake(chip, felt.sense(chip), timed, power_up)
@@ -151,34 +161,36 @@ def fake_buses(
 
 
 class _Felt:
-    """Raw values of all taxels of one bus, with rest value and sign put back."""
+    """Raw values of all taxels of one bus: rest values, and the scene with its sign and noise."""
 
-    def __init__(self, spec: BusSpec, scene: Scene, rest: NDArray[np.uint16]) -> None:
-        self._scene = scene
-        # One place more than taxels, for stages without one.
-        self._rest = np.append(rest, 0).astype(np.int64)
-        self._gain = np.zeros(len(self._rest), dtype=np.int64)
-        self._top = np.full(len(self._rest), 65534, dtype=np.int64)
+    def __init__(
+        self,
+        spec: BusSpec,
+        scene: Scene,
+        rest: NDArray[np.uint16],
+        noise: NDArray[np.float64],
+    ) -> None:
+        self._scene, self._noise = scene, noise.astype(np.int64)
+        self._rest = rest.astype(np.int64)
+        self._gain, self._top = np.zeros_like(self._rest), np.ones_like(self._rest)
         for chip in spec.chips:
-            taxels = list(chip.taxels)
+            taxels = [taxel for taxel in chip.taxels if taxel != UNUSED]
             self._gain[taxels], self._top[taxels] = chip.sign, chip.highest
-        self._gain[UNUSED], self._rest[UNUSED] = 0, spec.chips[0].kind.rest(spec.chips[0])
-        self._at, self._raw = math.nan, self._rest
+        self._at, self._raw = math.nan, rest
 
-    def raw(self, t: float) -> NDArray[np.int64]:
-        """(taxels + 1,) raw values at a time; chips asking for the same time share them."""
+    def raw(self, t: float) -> NDArray[np.uint16]:
+        """(taxels,) raw values at a time; chips asking for the same time share them."""
         if t != self._at:
-            self._raw = self._rest.copy()
-            self._raw[:-1] += self._gain[:-1] * self._scene(t).reshape(-1)
-            np.minimum(self._raw, self._top, out=self._raw)
-            np.maximum(self._raw, 1, out=self._raw)
-            self._at = t
+            noise = self._noise[int((t + TIME_ROUNDING_S) / NOISE_STEP_S) % len(self._noise)]
+            raw = self._rest + self._gain * self._scene(t).reshape(-1) + noise
+            self._raw, self._at = np.clip(raw, 1, self._top).astype(np.uint16), t
         return self._raw
 
     def sense(self, chip: ChipSpec) -> Sense:
-        """The function that gives one chip its raw values."""
-        taxels = np.array(chip.taxels)
-        return lambda t: self.raw(t).take(taxels, mode="wrap").astype(np.uint16)
+        """The function that gives one chip its raw values; a stage without a taxel rests."""
+        taxels, unused = np.array(chip.taxels), np.array(chip.taxels) == UNUSED
+        rest = chip.kind.rest(chip)
+        return lambda t: np.where(unused, rest, self.raw(t)[taxels]).astype(np.uint16)
 
 
 def fake_skin(
@@ -188,13 +200,14 @@ def fake_skin(
     clock: VirtualClock | None = None,
     timed: bool = False,
     faults: Sequence[Fault] = NO_FAULTS,
+    noise_counts: float = 0.0,
     seed: int = 0,
     touch_counts: int | None = None,
 ) -> Skin:
     """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
     clock = clock or VirtualClock()
-    file = calibrated(file)
-    buses = fake_buses(file, scene, clock, timed=timed, seed=seed)
+    file = calibrated(file, noise_counts)
+    buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed)
     skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
     skin.start()
     clock.sleep_until(clock.now())
@@ -230,6 +243,7 @@ def play(
     *,
     loop: bool = False,
     clock: VirtualClock | None = None,
+    noise_counts: float = 0.0,
     touch_counts: int | None = None,
 ) -> tuple[Skin, Playback]:
     """A fake skin that feels a recording.
@@ -238,7 +252,7 @@ def play(
         InputError: the recording's shape is not the skin's.
     """
     scene = playback(file, recording, loop=loop)
-    skin = fake_skin(file, scene, clock=clock, touch_counts=touch_counts)
+    skin = fake_skin(file, scene, clock=clock, noise_counts=noise_counts, touch_counts=touch_counts)
     scene.start = skin.clock.now()
     return skin, scene
 
@@ -250,16 +264,12 @@ def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list
     """
     every_chip = replace(file, reading=replace(file.reading, region_of_interest=False))
     with still(every_chip) as skin:
-        buses = [reader.bus for reader in skin.readers]
-        before = [_spent(bus, overhead_s) for bus in buses]
+        buses = [reader.bus for reader in skin.readers if isinstance(reader.bus, FakeBus)]
+        for bus in buses:
+            bus.bits = bus.transactions = 0
         for _ in range(frames):
             skin.read()
-        return [_spent(bus, overhead_s) - b for bus, b in zip(buses, before, strict=True)]
-
-
-def _spent(bus: Bus, overhead_s: float) -> float:
-    assert isinstance(bus, FakeBus)
-    return bus.bits + bus.transactions * overhead_s * bus.clock_hz
+        return [bus.bits + bus.transactions * overhead_s * bus.clock_hz for bus in buses]
 
 
 def skin_file(layout: SkinLayout) -> SkinFile:

@@ -18,6 +18,7 @@ from edge import demo
 from edge.fake.player import calibrated
 from edge.i2c.chip import UNUSED
 from edge.recording import Recording, load
+from edge.skin.decoder import Decoder
 from edge.skin.file import SkinFile
 from edge.touch.layout import SkinLayout
 
@@ -52,11 +53,7 @@ def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str
         )
         counts_per_newton = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
     most = reach(file)
-    covered = np.zeros(file.layout.rows * file.layout.cols, dtype=np.bool_)
-    for chip in file.chips:
-        covered[[taxel for taxel in chip.taxels if taxel != UNUSED]] = True
-    for row, col in file.signal.dead:
-        covered[row * file.layout.cols + col] = False
+    covered = Decoder(file).served.reshape(file.layout.shape)
     for number in range(trials):
         for kind, (path, source) in enumerate(sources):
             rng = np.random.default_rng([seed, kind, number])
@@ -70,7 +67,7 @@ def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str
                 "source": f"a simulated touch of the demo ({path.stem}), mapped onto this skin",
                 "trial": name,
             }
-            valid = None if covered.all() else covered.reshape(file.layout.shape)
+            valid = None if covered.all() else covered
             yield name, Recording(t, counts.astype(np.uint16), valid=valid, meta=meta)
 
 
@@ -85,13 +82,9 @@ def reach(file: SkinFile) -> int:
     """The greatest count that a touch can give on every fake chip."""
     rest = calibrated(file).calibration
     assert rest is not None
-    most = 65535
-    for chip in file.chips:
-        for taxel in chip.taxels:
-            if taxel != UNUSED:
-                at = int(rest.baseline.flat[taxel])
-                most = min(most, at - 1 if chip.sign < 0 else chip.highest - at)
-    return most
+    at = rest.baseline.ravel().tolist()
+    places = [(chip, taxel) for chip in file.chips for taxel in chip.taxels if taxel != UNUSED]
+    return min(at[t] - 1 if chip.sign < 0 else chip.highest - at[t] for chip, t in places)
 
 
 def pitch(layout: SkinLayout) -> tuple[float, float]:
@@ -108,20 +101,18 @@ def _mapped(
         col = rng.uniform(0.0, onto.cols)
     strength, speed = rng.uniform(*STRENGTH), rng.uniform(*SPEED)
     forces = strength * (source.frames / (source.layout.counts_per_newton or 1.0))
-    middle = _middle(forces)
     lasts = float(source.t[-1] - source.t[0]) / speed
     t = np.arange(int((LEAD_S + lasts + TAIL_S) * rate_hz) + 1) / rate_hz
     at = (t - LEAD_S) * speed + source.t[0]
-    right = np.clip(np.searchsorted(source.t, at, side="right"), 1, len(source.t) - 1)
-    share = (at - source.t[right - 1]) / (source.t[right] - source.t[right - 1])
-    share = np.clip(share, 0.0, 1.0)[:, None, None]
-    felt = (1.0 - share) * forces[right - 1] + share * forces[right]
+    frame = np.interp(at, source.t, np.arange(len(source.t)))
+    left = np.minimum(frame.astype(int), len(source.t) - 2)
+    share = (frame - left)[:, None, None]
+    felt = (1.0 - share) * forces[left] + share * forces[left + 1]
     felt[at < source.t[0]] = 0.0
-    along = _spread(source.layout.rows, pitch(source.layout)[0], pitch(onto)[0], onto.rows,
-                    middle[0], row)  # fmt: skip
-    rings = {"from_ring": source.layout.wraps, "onto_ring": onto.wraps}
-    around = _spread(source.layout.cols, pitch(source.layout)[1], pitch(onto)[1], onto.cols,
-                     middle[1], col, **rings)  # fmt: skip
+    along, around = (
+        _spread(source.layout, onto, axis, middle, centre)
+        for axis, (middle, centre) in enumerate(zip(_middle(forces), (row, col), strict=True))
+    )
     return t, along.T @ felt @ around
 
 
@@ -135,31 +126,23 @@ def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _spread(
-    sources: int,
-    source_pitch: float,
-    pitch: float,
-    taxels: int,
-    middle: float,
-    centre: float,
-    *,
-    from_ring: bool = False,
-    onto_ring: bool = False,
+    source: SkinLayout, onto: SkinLayout, axis: int, middle: float, centre: float
 ) -> NDArray[np.float64]:
-    """(sources, taxels) shares of each source row or column that fall on each row or column.
+    """(sources, taxels) shares of each source row (axis 0) or column on each row or column.
 
     Sources and taxels are as wide as their pitch. The position `middle` of the sources is mapped
     to the position `centre` of the taxels.
     """
+    sources, taxels = source.shape[axis], onto.shape[axis]
     offset = np.arange(sources) - middle
-    if from_ring:
+    if axis == 1 and source.wraps:
         offset = (offset + sources / 2.0) % sources - sources / 2.0
-    ratio = source_pitch / pitch
+    ratio = pitch(source)[axis] / pitch(onto)[axis]
     left = (centre + offset * ratio - ratio / 2.0)[:, None]
     edges = np.arange(taxels) - 0.5
     shares = np.zeros((sources, taxels))
     # A contact that is wider than the skin goes round it as often as it must.
-    turns = range(-2, 3) if onto_ring else range(1)
-    for turn in turns:
+    for turn in range(-2, 3) if axis == 1 and onto.wraps else range(1):
         low = edges + turn * taxels
         shares += np.maximum(0.0, np.minimum(left + ratio, low + 1.0) - np.maximum(left, low))
     return shares / ratio

@@ -36,11 +36,19 @@ STANDARD = 0x00
 """The kind of a request that every USB device answers (bits 5 and 6 of its first byte)."""
 KIND = 0x60
 GET_STATUS, GET_DESCRIPTOR, SET_CONFIGURATION, SET_INTERFACE = 0, 6, 9, 11
+STANDARD_ANSWERS = {
+    (GET_STATUS, 0): bytes(2),
+    (GET_DESCRIPTOR, 0x0100): DEVICE_DESCRIPTOR,
+    (GET_DESCRIPTOR, 0x0200): CONFIGURATION_DESCRIPTOR,
+    (SET_CONFIGURATION, 1): b"",
+    (SET_INTERFACE, 0): b"",
+}
+"""Data by request and value."""
 FUNCTIONS, DELAY, STATUS, TRANSFER = 1, 2, 3, 4
 """Requests of the adapter; TRANSFER is the first of four, to which BEGIN and END are added."""
-END = 2
+BEGIN, END = 1, 2
 I2C_M_RD = 1
-CARRIES = 0x0EFF0001
+CARRIES = struct.pack("<I", 0x0EFF0001)
 """Plain I2C, and SMBus made from it (I2C_FUNC_I2C | I2C_FUNC_SMBUS_EMUL)."""
 ACKNOWLEDGED, NOT_ACKNOWLEDGED = 1, 2
 
@@ -103,43 +111,25 @@ class UsbAdapter:
             BusError: the request is unknown, or the bus failed to carry a message.
         """
         kind, request, value, index, length = struct.unpack("<BBHHH", setup)
-        if kind & KIND == STANDARD:
-            return self._standard(request, value)[:length]
-        if request == FUNCTIONS:
-            return struct.pack("<I", CARRIES)
-        if request == STATUS:
-            return bytes([self._status])
-        if TRANSFER <= request < TRANSFER + 4:
-            reads = bool(value & I2C_M_RD)
-            message = read(index, length) if reads else write(index, data)
-            self._take(message, last=bool(request - TRANSFER & END))
-            return message.buffer.tobytes() if reads else b""
-        if request == DELAY:
-            return b""
-        raise bus_error(errno.EOPNOTSUPP, self.bus.name)
-
-    def _standard(self, request: int, value: int) -> bytes:
-        if request == GET_STATUS:
-            return bytes(2)
-        if request in (SET_CONFIGURATION, SET_INTERFACE):
-            return b""
-        descriptors = {1: DEVICE_DESCRIPTOR, 2: CONFIGURATION_DESCRIPTOR}
-        if request == GET_DESCRIPTOR and value >> 8 in descriptors:
-            return descriptors[value >> 8]
-        raise bus_error(errno.EOPNOTSUPP, self.bus.name)
-
-    def _take(self, message: Message, *, last: bool) -> None:
-        self._messages.append(message)
+        standard = kind & KIND == STANDARD
+        if standard and (request, value) in STANDARD_ANSWERS:
+            return STANDARD_ANSWERS[request, value][:length]
+        if standard or not FUNCTIONS <= request < TRANSFER + 4:
+            raise bus_error(errno.EOPNOTSUPP, self.bus.name)
+        if request < TRANSFER:
+            return {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}[request]
+        message = read(index, length) if value & I2C_M_RD else write(index, data)
+        begins, ends = request - TRANSFER & BEGIN, request - TRANSFER & END
+        self._messages = [message] if begins else [*self._messages, message]
         self._status = ACKNOWLEDGED
-        if not last and not message.read:
-            return
-        messages, self._messages = self._messages, []
-        if not last:
+        if message.read and not ends:
             raise bus_error(errno.EOPNOTSUPP, self.bus.name, message.address)
-        try:
-            self.bus.transfer(self.bus.prepare(*messages))
-        except BusNack:
-            self._status = NOT_ACKNOWLEDGED
+        if ends:
+            try:
+                self.bus.transfer(self.bus.prepare(*self._messages))
+            except BusNack:
+                self._status = NOT_ACKNOWLEDGED
+        return message.buffer.tobytes() if message.read else b""
 
 
 def data_length(header: bytes) -> int:

@@ -189,28 +189,21 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
         if bus.device in devices:
             raise InputError(f"{place} has the same device as bus {devices[bus.device]}")
         devices[bus.device] = b
-        direct = {c.address for c in bus.chips if c.mux is None}
-        muxes = {c.mux for c in bus.chips if c.mux is not None}
-        if muxes and bus.clock_hz > FASTEST_MUX_HZ:
+        claimed: dict[tuple[int | None, ...], str] = {
+            (None, None, chip.mux): "a mux" for chip in bus.chips if chip.mux is not None
+        }
+        if claimed and bus.clock_hz > FASTEST_MUX_HZ:
             raise InputError(
                 f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most {FASTEST_MUX_HZ}"
             )
-        for address in direct & muxes:
-            raise InputError(f"{place}: a mux and a chip have the same address, {address:#04x}")
-        seen: dict[tuple[int | None, int | None, int], int] = {}
-        for c, chip in enumerate(bus.chips):
+        # A chip behind a mux hears what is sent to the chips in front of it.
+        for c, chip in sorted(enumerate(bus.chips), key=lambda entry: entry[1].mux is not None):
             place = f"bus {b} chip {c}"
             route = (chip.mux, chip.channel, chip.address)
-            if route in seen:
-                raise InputError(
-                    f"{where}: {place} has the same address as chip {seen[route]}, {chip.route}"
-                )
-            if chip.mux is not None and chip.address in direct | muxes:
-                raise InputError(
-                    f"{where}: {place}: another chip, in front of the mux, has the same address "
-                    f"{chip.address:#04x}"
-                )
-            seen[route] = c
+            other = claimed.get(route) or claimed.get((None, None, chip.address))
+            if other is not None:
+                raise InputError(f"{where}: {place} has the same address as {other}, {chip.route}")
+            claimed[route] = f"chip {c}"
             for taxel in chip.taxels:
                 if taxel in owner and taxel != UNUSED:
                     row, col = divmod(taxel, layout.cols)
