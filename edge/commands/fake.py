@@ -18,7 +18,7 @@ from edge.commands.output import Output
 from edge.commands.source import ending_signals
 from edge.errors import InputError
 from edge.fake.clock import PacedClock
-from edge.fake.player import fake_buses, playback
+from edge.fake.player import NOISE_COUNTS, fake_buses, playback
 from edge.fake.touches import still, touches
 from edge.fake.usb_adapter import UsbAdapter, plugged
 from edge.recording import load as load_recording
@@ -46,6 +46,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "feel this recording over and over, or nothing",
     )
     parser.add_argument(
+        "--noise",
+        type=within(float, 0.0, 1000.0),
+        default=NOISE_COUNTS,
+        metavar="COUNTS",
+        help="noise of the chips of --plug, as a standard deviation (default: %(default)g)",
+    )
+    parser.add_argument(
         "--trials",
         type=within(int, 1, 1000),
         default=TRIALS,
@@ -56,13 +63,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def plug(file: SkinFile, recording: str, output: Output) -> int:
+def plug(file: SkinFile, recording: str, noise: float, output: Output) -> int:
     """Keep the skin's chips on this machine's buses until a signal comes.
 
     Args:
         file: the skin.
         recording: the path of the recording that the chips feel over and over; without one (an
             empty path) they feel nothing.
+        noise: standard deviation of the raw values, in counts.
         output: where to print the device of each bus.
     """
     for spec in file.buses:
@@ -72,7 +80,7 @@ def plug(file: SkinFile, recording: str, output: Output) -> int:
     scene = playback(file, felt, loop=True)
     clock = PacedClock()
     with stop_on(*ending_signals()) as stop, ExitStack() as adapters:
-        for bus in fake_buses(file, scene, clock):
+        for bus in fake_buses(file, scene, clock, noise_counts=noise):
             device = adapters.enter_context(plugged(UsbAdapter(bus)))
             output.event(
                 {"event": "plugged", "bus": bus.name, "device": device},
@@ -86,7 +94,8 @@ def plug(file: SkinFile, recording: str, output: Output) -> int:
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings and print the commands to rehearse with, or plug the skin in."""
     if arguments.plug is not None:
-        return plug(load(arguments.skin), arguments.plug, Output.of(arguments))
+        file, output = load(arguments.skin), Output.of(arguments)
+        return plug(file, arguments.plug, arguments.noise, output)
     file = load(arguments.skin)
     folder, rest = arguments.out / "touches", arguments.out / "still.npz"
     save(rest, still(file, STILL_S))

@@ -44,12 +44,21 @@ def task_label(text: str) -> tuple[str, str]:
 
 def add_skin(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
+    from edge.fake.player import NOISE_COUNTS  # a replay needs no chips
+
     parser.add_argument("--skin", metavar="skin.toml", help="the file that describes the skin")
     parser.add_argument(
         "--fake",
         metavar="REC.npz",
         help="need no hardware: play this recording onto fake chips, as fast as possible; without "
         "--skin, the chips are chosen to suit the recording",
+    )
+    parser.add_argument(
+        "--noise",
+        type=within(float, 0.0, 1000.0),
+        default=NOISE_COUNTS,
+        metavar="COUNTS",
+        help="noise of the fake chips of a --skin, as a standard deviation (default: %(default)g)",
     )
     parser.add_argument(
         "--real-time", action="store_true", help="play the recording at its original speed"

@@ -113,7 +113,16 @@ def open_skin(
         skin = Skin.open(file, calibrated=calibrated, touch_counts=touch)
     else:
         clock = PacedClock() if arguments.real_time else VirtualClock()
-        skin, playback = play(file, recording, loop=arguments.loop, clock=clock, touch_counts=touch)
+        # Without a skin file nobody calibrates, and the chips serve the recording as it is.
+        noise = 0.0 if arguments.skin is None else arguments.noise
+        skin, playback = play(
+            file,
+            recording,
+            loop=arguments.loop,
+            clock=clock,
+            noise_counts=noise,
+            touch_counts=touch,
+        )
         lasts_s, source = min(playback.ends, lasts_s), f"fake {arguments.fake}"
     with skin:
         for status in skin.status():

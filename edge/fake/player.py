@@ -27,7 +27,7 @@ from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
-NOISE_COUNTS = 0.8
+NOISE_COUNTS = 0.7
 """Noise of the fake skins that commands open, below that from which a chip that always serves the
 same bytes is stuck: a fake may be calibrated with noise, and then played without."""
 NOISE_FRAMES, NOISE_STEP_S = 97, 0.001

@@ -15,7 +15,9 @@ from edge.commands.calibrate import (
     restless,
     unusable,
 )
+from edge.fake.player import NOISE_COUNTS
 from edge.skin import file as skinfile
+from edge.skin.calibration import dead_band
 
 
 def test_a_taxel_is_restless_beyond_the_limit_and_not_at_it():
@@ -33,9 +35,25 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin,
     assert Path(event["backup"]).read_text() == before
     file = skinfile.load(skin)
     assert (file.calibration.baseline == 20946).all()
-    assert (file.calibration.noise == 0.0).all()
     assert file.calibration.taken is not None
     assert edge("check", skin)[1][0]["remarks"] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "deviation"),
+    # Rounding to whole counts adds a variance of 1/12.
+    [((), (NOISE_COUNTS**2 + 1 / 12) ** 0.5), (("--noise", 3), (9 + 1 / 12) ** 0.5)],
+)
+def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
+    edge, skin, quiet, options, deviation
+):
+    fake = ("--skin", skin, "--fake", quiet, *options)
+    (first,), (again,) = (edge("calibrate", *fake, "--frames", 180)[1] for _ in range(2))
+    assert first == again
+    file = skinfile.load(skin)
+    assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(deviation, rel=0.03)
+    assert dead_band(file).min() >= 4 * deviation
+    assert edge("calibrate", *fake, "--frames", 180, "--noise", 0)[1][0]["noise_largest"] == 0.0
 
 
 def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):

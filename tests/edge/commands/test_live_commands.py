@@ -32,12 +32,13 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     monkeypatch.setattr("edge.i2c.block.FAKE_RATE_HZ", 0.0)
     skin, rest = skinfile.shipped("matrix"), tmp_path / "rest.npz"
     recording.save(rest, still(skinfile.load(skin), 2.0))
-    status, (chip,), err = edge("scan", "--skin", skin, "--fake", rest)
+    fake = ("--skin", skin, "--fake", rest, "--noise", 0)
+    status, (chip,), err = edge("scan", *fake)
     assert (status, chip["state"], chip["invalid"]) == (1, "running", 100)
     assert err.count("|" + "." * 10 + "|") == 10
     assert err.endswith("0 of 1 chips answer; taxels without a valid value: 100\n")
     more = ("--label", "object=box", "--out", tmp_path / "trials")
-    status, events, err = edge("record", "--skin", skin, "--fake", rest, *more)
+    status, events, err = edge("record", *fake, *more)
     assert (status, [(e["event"], e["invalid"]) for e in events]) == (1, [("taxels", 100)])
     assert "nothing was saved; taxels without a valid value: 100" in err
 
