@@ -1,8 +1,9 @@
-"""Find mistakes in a skin file, and the frame rate that its wires carry.
+"""Find mistakes in a skin file, and the frame rate that its wires carry; or look at the board.
 
 Reads a skin file and runs its drivers over a fake bus that counts the bits on the wires. The exit
 status is 1 if the skin cannot work as the file describes it, or the wires cannot carry the frame
-rate that the file asks for.
+rate that the file asks for. Without a skin file, prints what a board needs and what this machine
+has: buses and rights, versions, clock, load and disk, with a remedy for all that will not do.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ FRAMES = 100
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("skin", metavar="skin.toml", help="the file that describes the skin")
+    parser.add_argument(
+        "skin",
+        nargs="?",
+        metavar="skin.toml",
+        help="the file that describes the skin; without it, look at this machine",
+    )
     parser.add_argument(
         "--overhead",
         type=within(float, 0.0, 10_000.0),
@@ -72,9 +78,24 @@ def remarks(file: SkinFile) -> Iterator[str]:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
 
 
+def check_board(output: Output) -> int:
+    """Print a table of this machine; 1 if something needs a remedy."""
+    from edge.runtime.board import look  # needs Linux or macOS
+
+    rows = list(look())
+    width = max(len(row.name) for row in rows)
+    lines = [f"{'!' if row.remedy else ' '} {row.name:<{width}}  {row.value}" for row in rows]
+    remedies = [f"! {row.name}: {row.remedy}" for row in rows if row.remedy]
+    table = "\n".join([*lines, *remedies])
+    output.event({"event": "board", "rows": [row._asdict() for row in rows]}, table)
+    return 1 if remedies else 0
+
+
 def run(arguments: argparse.Namespace) -> int:
-    """Print mistakes and remarks; 1 if the skin cannot work."""
+    """Print mistakes and remarks; 1 if the skin, or this machine, cannot work."""
     output = Output.of(arguments)
+    if arguments.skin is None:
+        return check_board(output)
     file = load(arguments.skin)
     bits = [count / FRAMES for count in frame_bits(file, FRAMES)]
     spent = [c / FRAMES for c in frame_bits(file, FRAMES, arguments.overhead * 1e-6)]
@@ -100,6 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
             for bus, b in zip(file.buses, bits, strict=True)
         ],
         "frame_rate_hz": round(rate, 1),
+        "overhead_us": arguments.overhead,
         "asked_hz": asked,
         "remarks": wrong + said,
     }
@@ -118,7 +140,8 @@ def _text(
         for bus, spec in zip(event["buses"], file.buses, strict=True)
     ]
     lines.append(
-        f"The wires carry {event['frame_rate_hz']:g} frames a second; the file asks for "
+        f"The wires carry {event['frame_rate_hz']:g} frames a second, with "
+        f"{event['overhead_us']:g} us of software for each transaction; the file asks for "
         f"{event['asked_hz']:g}."
     )
     lines += [f"Wrong:  {sentence}" for sentence in wrong]

@@ -3,9 +3,13 @@
 import json
 import shutil
 
+import numpy
 import pytest
 
+from edge import __version__
 from edge.cli import main
+from edge.model.info import FORMAT
+from edge.runtime import board as board_module
 from edge.skin import file as skinfile
 
 PAD = """[skin]
@@ -76,7 +80,7 @@ def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin)
     """A frame of Cody's first bus takes 12 chips, 3 channels and a check in every fourth."""
     _, (bare,), _ = edge("check", skin)
     _, (event,), _ = edge("check", skin, "--overhead", 100)
-    assert event["buses"] == bare["buses"]
+    assert (event["buses"], event["overhead_us"]) == (bare["buses"], 100.0)
     frame_s = bare["buses"][0]["bits"] / 400e3
     assert 1.0 / event["frame_rate_hz"] == pytest.approx(frame_s + 1.9e-3, abs=1e-4)
 
@@ -117,3 +121,52 @@ def test_a_person_is_told_each_thing_once(tmp_path, capsys, monkeypatch):
     assert first == f"{path}: skin, 3 x 4 taxels on 1 chip"
     assert last.startswith("Remark: not calibrated yet")
     assert out.out.count("pitch_m") == 1
+
+
+@pytest.fixture
+def board(tmp_path, monkeypatch):
+    """A machine with the given devices, of which one belongs to another group."""
+    (tmp_path / "dev").mkdir()
+    monkeypatch.setattr(board_module.os, "access", lambda device, mode: device.name != "i2c-7")
+    monkeypatch.setattr(board_module.os, "getloadavg", lambda: (0.1, 0.1, 0.1))
+
+    def look(**adapters):
+        for device, name in adapters.items():
+            (tmp_path / "dev" / device.replace("_", "-")).touch()
+            folder = tmp_path / "sys/class/i2c-dev" / device.replace("_", "-")
+            folder.mkdir(parents=True)
+            (folder / "name").write_text(f"{name}\n")
+        return {row.name: row for row in board_module.look(tmp_path)}
+
+    return look
+
+
+def test_a_board_is_told_what_it_has(board):
+    rows = board(i2c_1="bcm2835")
+    assert rows["program"].value == f"edge-classify {__version__}; reads models of format {FORMAT}"
+    assert rows["numpy"].value == numpy.__version__
+    assert rows["/dev/i2c-1"].value.startswith("bcm2835, group ")
+    assert not any(row.remedy for row in rows.values())
+
+
+def test_what_a_board_lacks_comes_with_its_remedy(board, monkeypatch):
+    assert "raspi-config" in board()["/dev/i2c-*"].remedy
+    rows = board(i2c_1="bcm2835", i2c_7="CP2112")
+    assert "/dev/i2c-*" not in rows
+    assert "sudo usermod -aG i2c $USER" in rows["/dev/i2c-7"].remedy
+    monkeypatch.setattr(board_module.os, "getloadavg", lambda: (99.0, 0.0, 0.0))
+    monkeypatch.setattr(board_module.time, "time", lambda: 0.0)
+    monkeypatch.setattr(board_module, "PACKAGES", ("no-such",))
+    rows = board()
+    remedies = {name for name, row in rows.items() if row.remedy}
+    assert remedies == {"no-such", "clock", "load", "/dev/i2c-7"}
+    assert rows["no-such"].remedy == "run `pip install no-such`"
+
+
+def test_check_without_a_skin_prints_the_board(edge, monkeypatch):
+    rows = [board_module.Row("disk", "5 MB", "delete"), board_module.Row("python", "3.11")]
+    monkeypatch.setattr(board_module, "look", lambda: rows)
+    status, (event,), _ = edge("check")
+    assert (status, event["event"], event["rows"][0]["remedy"]) == (1, "board", "delete")
+    monkeypatch.setattr(board_module, "look", lambda: rows[1:])
+    assert edge("check")[0] == 0

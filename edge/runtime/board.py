@@ -1,0 +1,86 @@
+"""The machine that the program runs on: what a board needs, and what is there."""
+
+from __future__ import annotations
+
+import grp
+import os
+import platform
+import pwd
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import NamedTuple
+
+from edge import __version__
+from edge.model.info import FORMAT
+
+PACKAGES = ("numpy", "onnxruntime", "smbus2")
+GROUPS = {"i2c-*": "i2c", "ttyACM*": "dialout", "ttyUSB*": "dialout"}
+"""Group that may use the devices of each name."""
+LEAST_FREE_MB = 200
+"""A trial of 384 taxels takes about 0.1 MB."""
+
+
+class Row(NamedTuple):
+    """One thing about the machine: its name, what it is, and a remedy where it will not do."""
+
+    name: str
+    value: str
+    remedy: str = ""
+
+
+def look(root: Path = Path("/")) -> Iterator[Row]:
+    """Everything that a board needs, row by row.
+
+    Args:
+        root: holds `dev` and `sys`.
+    """
+    yield Row("program", f"edge-classify {__version__}; reads models of format {FORMAT}")
+    wide = sys.maxsize > 2**32
+    system = f"{platform.system()} {platform.release()}, {platform.machine()}"
+    yield Row("system", system, "" if wide else "install a 64-bit system: ONNX Runtime needs one")
+    yield Row("python", platform.python_version())
+    for package in PACKAGES:
+        try:
+            yield Row(package, version(package))
+        except PackageNotFoundError:
+            yield Row(package, "missing", f"run `pip install {package}`")
+    yield from _devices(root)
+    groups = sorted(_group(number) for number in {os.getegid(), *os.getgroups()})
+    yield Row("user", f"{pwd.getpwuid(os.geteuid()).pw_name}; groups {', '.join(groups)}")
+    # A board without a battery for its clock starts in the past.
+    behind = time.time() < Path(__file__).stat().st_mtime
+    said = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+    yield Row("clock", said, "set the clock: `sudo timedatectl set-ntp true`" if behind else "")
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    busy = "end other programs: they delay the frames" if load > cores else ""
+    yield Row("load", f"{load:.1f} on {cores} cores", busy)
+    free_mb = shutil.disk_usage(Path.cwd()).free // 1_000_000
+    full = "delete old recordings and maps" if free_mb < LEAST_FREE_MB else ""
+    yield Row("disk", f"{free_mb} MB free in this folder", full)
+
+
+def _devices(root: Path) -> Iterator[Row]:
+    """I2C buses and serial ports, and whether this user may open them."""
+    devices = [(d, group) for p, group in GROUPS.items() for d in sorted((root / "dev").glob(p))]
+    for device, group in devices:
+        name = root / "sys/class/i2c-dev" / device.name / "name"
+        adapter = f"{name.read_text().strip()}, " if name.exists() else ""
+        owner = f"{adapter}group {_group(device.stat().st_gid)}"
+        join = f"may not be opened; run `sudo usermod -aG {group} $USER`, and log in again"
+        yield Row(
+            f"/dev/{device.name}", owner, "" if os.access(device, os.R_OK | os.W_OK) else join
+        )
+    if not devices:
+        switch_on = "switch I2C on (`sudo raspi-config`, or `sudo modprobe i2c-dev`), or plug it in"
+        yield Row("/dev/i2c-*", "no I2C bus and no serial port", switch_on)
+
+
+def _group(number: int) -> str:
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
