@@ -16,7 +16,8 @@ help:
 	@echo "Everyday"
 	@echo "  make test          lint, types and tests, as CI runs them"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
-	@echo "                     and write model.onnx and golden.npz to OUT (default: build); NAME=..."
+	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
+	@echo "                     build); NAME=... names the model"
 	@echo "  make demo          fit a model to a small simulated set and decide on touches new to it"
 	@echo "  make study         the paper's analyses of DATA beside ours: build/study/report.html"
 	@echo "  make tradeoff      what accuracy costs in time: build/tradeoff/report.html; BOARD=board.json"
@@ -95,7 +96,8 @@ FRONTED := --front $(FRONT) --fronts $(OUT)/tradeoff/front.json
 endif
 
 export: $(READY)
-	$(BIN)/python -m export --data $(RECORDINGS) $(BESIDE) --out $(OUT) $(FRONTED) $(addprefix --name ,$(NAME)) $(EXPORT)
+	$(BIN)/python -m export --data $(RECORDINGS) $(BESIDE) --out $(OUT) --report $(FRONTED) \
+	  $(addprefix --name ,$(NAME)) $(EXPORT)
 
 DEMO := $(OUT)/demo
 

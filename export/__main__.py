@@ -12,6 +12,7 @@ from joblib import cpu_count
 from edge.cli import dispatch
 from edge.commands.options import add_arm, open_arm, within
 from edge.errors import InputError
+from edge.model.model import Model
 from edge.touch import measures
 from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
@@ -116,6 +117,9 @@ def parser() -> argparse.ArgumentParser:
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
     top.add_argument(
+        "--report", action="store_true", help="also write OUT/report.html, as `make export` does"
+    )
+    top.add_argument(
         "--jobs", type=count, default=cpu_count(), help="processes (default: all cores)"
     )
     top.set_defaults(run=run)
@@ -153,8 +157,13 @@ def run(arguments: argparse.Namespace) -> int:
     )
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name)
-    print(report(fitted, measure(fitted)), file=sys.stderr)
+    prices = measure(fitted)
+    print(report(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+    if arguments.report:
+        from export.report import write  # loads matplotlib
+
+        print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0
 
 

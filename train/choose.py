@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
 
@@ -245,6 +245,8 @@ class Chosen:
         left_out: `trial`, or the label whose groups were left out.
         candidates: nested accuracy of each candidate's own choice of numbers.
         picks: the best settings of each candidate.
+        folds: (n,) of `accuracy`.
+        by_fold: the choice without each fold's trials, whose answers `accuracy` counts.
     """
 
     choice: Choice
@@ -253,6 +255,8 @@ class Chosen:
     left_out: str
     candidates: tuple[Result, ...] = ()
     picks: tuple[Choice, ...] = ()
+    folds: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
+    by_fold: tuple[Choice, ...] = ()
 
 
 class Choosing:
@@ -398,8 +402,10 @@ class Choosing:
             for by_task, choice in zip(without, chosen_without, strict=True):
                 by_task[task] = choice
             picked = [trials.choices[task].index(choice) for choice in chosen_without]
+            folds = range(int(table.folds.max()) + 1)
+            nested = [table.without(task, fold, prices, margin=margin) for fold in folds]
             accuracies = [
-                table.nested(task, prices, margin=margin),
+                table.answered(task, nested),
                 trials.answered(task, picked),
                 *(table.nested(task, prices, places) for places in own),
             ]
@@ -412,6 +418,8 @@ class Choosing:
                 self._leave_out if grouped else TRIAL,
                 tuple(rest),
                 tuple(choices[table.chosen(task, prices, places)] for places in own),
+                table.folds,
+                tuple(choices[place] for place in nested),
             )
         return chosen, trials.folds, without
 
