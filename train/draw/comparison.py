@@ -18,11 +18,10 @@ from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
 from edge.touch.track import ContactTracker
 from train.dataset import arm_of, contacts
-from train.draw.recording import curves
+from train.draw.recording import curves, units
 
 MOST = 6
 """More columns would not be readable at the width of a page."""
-FEATURES = ("max_force", "contact_area", "contact_motion")
 TITLES = {"max_force": "largest force", "contact_area": "area", "contact_motion": "moved"}
 UNITS = {"newton": "N", "metre": "m", "taxel": "taxels", "count": "counts"}
 GAMMA = 0.4
@@ -90,10 +89,10 @@ def _draw(
     ):
         image = _skin(axes[0, column], recording, onset, horizon, strongest)
         decided = None if model is None else _decided(name, recording, model)
-        for row, feature in enumerate(FEATURES, start=1):
+        for row, (feature, unit) in enumerate(units(recording.layout).items(), start=1):
             _curve(axes[row, column], recording, series, feature, horizon, decided)
             if column == 0:
-                axes[row, 0].set_ylabel(f"{TITLES[feature]} ({_unit(recording, feature)})")
+                axes[row, 0].set_ylabel(f"{TITLES[feature]} ({UNITS.get(unit, unit)})")
         axes[3, column].set_xlabel("seconds from onset")
         if decided is not None:
             share = f"{decided.confidence:.0%} after {decided.window_s:g} s"
@@ -145,14 +144,6 @@ def _within(recording: Recording, onset: float, horizon: float) -> np.ndarray:
     return (recording.t >= onset) & (recording.t <= onset + horizon)
 
 
-def _unit(recording: Recording, feature: str) -> str:
-    layout = recording.layout
-    unit = {"max_force": layout.force_unit, "contact_area": "taxel"}.get(
-        feature, layout.length_unit
-    )
-    return UNITS.get(unit, unit)
-
-
 def _skin(axis: Any, recording: Recording, onset: float, horizon: float, strongest: float) -> Any:
     """The frame with the largest total force inside the window."""
     from matplotlib.colors import PowerNorm
@@ -162,9 +153,8 @@ def _skin(axis: Any, recording: Recording, onset: float, horizon: float, stronge
     k = int(total.argmax())
     scale = PowerNorm(GAMMA, vmin=0.0, vmax=strongest)
     image = axis.imshow(force[k], norm=scale, cmap="magma", aspect="auto")
-    said = recording.labels
-    kind = said.get("category", "").replace("-", ", ")
-    thing = said.get("object", "")
+    kind = recording.labels.get("category", "").replace("-", ", ")
+    thing = recording.labels.get("object", "")
     axis.set_title("\n".join(filter(None, (kind, thing))) or "touch", fontsize=14, weight="bold")
     axis.set_xlabel(f"column, at {recording.t[k] - onset:.2f} s")
     return image

@@ -13,7 +13,7 @@ from edge.files import write_whole
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import WINDOW_S
+from edge.touch.features import FEATURES, WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
@@ -62,12 +62,7 @@ def draw(
     grid = figure.add_gridspec(len(heights), FRAMES, height_ratios=heights)
     _frames(figure, grid, recording, layout, onset)
     third = FRAMES // 3
-    units = {
-        "max_force": layout.force_unit,
-        "contact_area": "taxel",
-        "contact_motion": layout.length_unit,
-    }
-    for i, (name, unit) in enumerate(units.items()):
+    for i, (name, unit) in enumerate(units(layout).items()):
         axis = figure.add_subplot(grid[1, third * i : third * (i + 1)])
         axis.set(title=name, xlabel="seconds from onset", ylabel=unit)
         if series is None:
@@ -82,6 +77,11 @@ def draw(
         _push(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, chain, layout, onset)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
+
+
+def units(layout: SkinLayout) -> dict[str, str]:
+    """{feature: unit} of the paper's three features."""
+    return dict(zip(FEATURES, (layout.force_unit, "taxel", layout.length_unit), strict=True))
 
 
 def curves(series: FeatureSeries) -> dict[str, np.ndarray]:

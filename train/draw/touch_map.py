@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from edge.errors import InputError
 from edge.files import write_whole
@@ -66,18 +62,13 @@ def draw(
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
     positions = np.array([touch.position for touch in touches])
-    figure, axes = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
+    figure = Figure(figsize=(12, 5.2), layout="constrained")
+    axes = figure.subplots(1, 2)
     name, lines = ("", []) if info is None else outline(info)
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
         for i, line in enumerate(lines):
-            axis.plot(
-                line[:, across],
-                line[:, up],
-                color="0.6",
-                linewidth=2.0,
-                label=name if i == 0 else None,
-                zorder=0,
-            )
+            behind = {"color": "0.6", "lw": 2.0, "zorder": 0}
+            axis.plot(line[:, across], line[:, up], label=None if i else name, **behind)
         for i, label in enumerate(sorted(set(labels))):
             those = np.array([seen == label for seen in labels])
             axis.scatter(
@@ -104,4 +95,3 @@ def draw(
     figure.suptitle(f"{count} contact{'s' * (count != 1)} in the frame of {frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
-    plt.close(figure)

@@ -14,56 +14,29 @@ from typing import Any
 from edge.files import write_whole
 from train.report.section import Figure, Section, Table
 
-STYLE = """
-:root { color-scheme: light dark; --ink: #1b2430; --paper: #fff; --line: #d5dbe3; --soft: #eef2f6;
-  --link: #1f5fa8; --miss: #fdf0ec; }
-@media (prefers-color-scheme: dark) { :root { --ink: #dde3ea; --paper: #14191f; --line: #39434f;
-  --soft: #222a33; --link: #8ab8f0; --miss: #3a2620; }
-  img { filter: invert(.92) hue-rotate(180deg); mix-blend-mode: lighten; } }
-* { box-sizing: border-box; }
-body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper);
-  margin: 0 auto; max-width: 68rem; padding: 1.2rem; overflow-wrap: break-word; }
-h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .5rem; } a { color: var(--link); }
-h2 { font-size: 1.25rem; margin: 1.6rem 0 .6rem; } summary { cursor: pointer; }
-summary h2 { display: inline-block; font-size: 1.1rem; margin: .5rem 0; }
-details.section { border-top: 1px solid var(--line); }
-h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
-p, dl { max-width: 46rem; } dt { font-weight: 600; }
-dd { margin: 0 0 .6rem 1.2rem; } code { font-size: .93em; }
-figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
-figcaption { font-weight: 600; margin-bottom: .3rem; }
-.table { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums;
-  max-width: 100%; }
-th { background: var(--soft); text-align: left; vertical-align: bottom; }
-th, td { padding: .18rem .55rem; border-bottom: 1px solid var(--line); }
-td.number { text-align: right; white-space: nowrap; } tr.no td { background: var(--miss); }
-@media (max-width: 700px) { body { padding: .8rem; } .more { display: none; }
-  th, td { padding: .18rem .35rem; } }
-"""
-
+STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 LONGEST = 32
 """Rows that a table may have before it is folded."""
 CODE = re.compile(r"`([^`]+)`")
-KEYS = 4
+KEYS = 1
 """First columns that are repeated beside timings, to tell the rows apart."""
 
 
 def table_csv(table: Table) -> dict[str, str]:
     """{file name: CSV text} of the table; columns that a clock measured have their own file."""
     columns = table.columns
-    files = {f"{table.name}.csv": [c for c in columns if c not in table.timed]}
+    files = {table.name: [c for c in columns if c not in table.timed]}
     if table.timed:
-        timings = [c for i, c in enumerate(columns) if i < KEYS or c in table.timed]
-        files[f"{table.name}_timings.csv"] = timings
-    return {name: _csv(table, shown) for name, shown in files.items()}
-
-
-def _csv(table: Table, columns: Sequence[str]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([columns, *([row[c] for c in columns] for row in table.rows)])
-    return text.getvalue()
+        files[f"{table.name}_timings"] = [
+            c for i, c in enumerate(columns) if i < KEYS or c in table.timed
+        ]
+    texts = {}
+    for name, shown in files.items():
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerows([shown, *([row[c] for c in shown] for row in table.rows)])
+        texts[f"{name}.csv"] = text.getvalue()
+    return texts
 
 
 def _text(text: str) -> str:

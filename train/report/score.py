@@ -72,12 +72,6 @@ def nested(
     return {task: table.nested(task) for task in y}
 
 
-def best_cell(grid: NDArray[np.float64]) -> tuple[int, int]:
-    """(row, column) of the highest entry; of equal ones the first row, then the first column."""
-    row, column = np.unravel_index(int(np.argmax(grid)), grid.shape)
-    return int(row), int(column)
-
-
 def votes(
     rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int
 ) -> NDArray[np.str_]:
@@ -99,10 +93,12 @@ def grid_search(
     )
     results = {}
     for task, labels in y.items():
-        row, column = best_cell(accuracies(rows, labels))
-        said = votes(rows, labels, row + 1, column + 1)
+        table = accuracies(rows, labels)
+        # Of equal accuracies the fewest components, then the smallest k.
+        components, k = (int(i) + 1 for i in np.unravel_index(table.argmax(), table.shape))
+        said = votes(rows, labels, components, k)
         right = int((said == labels).sum())
-        results[task] = Result(right, len(labels), row + 1, column + 1, said)
+        results[task] = Result(right, len(labels), components, k, said)
     return results
 
 

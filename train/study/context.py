@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,9 +46,3 @@ class Context:
     ) -> NDArray[np.float64]:
         """The trials' feature vectors."""
         return self.dataset.features(window_s, SAMPLES, names)
-
-    def map(
-        self, what: str, function: Callable[..., Any], cases: Sequence[tuple[Any, ...]]
-    ) -> list[Any]:
-        """function(*case) of each case, in their order, by all processes."""
-        return self.workers.map(what, function, cases)

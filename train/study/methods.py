@@ -90,7 +90,7 @@ def section(context: Context) -> Section:
     if GROUP_TASK in y and others:
         folds = group_folds(y[GROUP_TASK])
         cases += [(f, X, others, folds, *more) for f, X, more in compared.values()]
-    answers = context.map("methods", _call, cases)
+    answers = context.workers.map("methods", _call, cases)
     known = dict(zip(compared, answers, strict=False))
     unseen = dict(zip(compared, answers[len(compared) :], strict=False))
     text = [sentence(task, known, unseen) for task in y]

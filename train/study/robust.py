@@ -44,11 +44,11 @@ def variants(scene: Scene) -> list[dict[str, Scene]]:
         )
     sensor: dict[str, Scene] = {}
     for name in SENSOR:
-        without = tuple(effect for effect in scene.add if effect != name)
         if name in scene.add:
-            sensor[f"without {name}"] = replace(scene, add=without)
+            others = tuple(effect for effect in scene.add if effect != name)
+            sensor[f"without {name}"] = replace(scene, add=others)
         else:
-            sensor[f"with {name}"] = replace(scene, add=(*without, name))
+            sensor[f"with {name}"] = replace(scene, add=(*scene.add, name))
     return [*({name: changed[name]} for name in changed), sensor]
 
 
@@ -107,7 +107,7 @@ def anew(
             drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
             cases.append((group, drawn, set(wanted), data.layout, data.tracking, data.chain))
     merged: dict[str, dict[str, FeatureSeries | None]] = {n: {} for group in groups for n in group}
-    for answer in context.map("simulated again", measured, cases):
+    for answer in context.workers.map("simulated again", measured, cases):
         for name, contacts in answer.items():
             merged[name] |= contacts
     strange = [file for file in wanted if any(file not in contacts for contacts in merged.values())]
@@ -132,9 +132,9 @@ def section(context: Context) -> Section | None:
             "or study them without a scene"
         )
     changed = [vectors(contacts) for contacts in series.values()]
-    own = context.map("their accuracy", grid_search, [(x, y) for x in changed])
+    own = context.workers.map("their accuracy", grid_search, [(x, y) for x in changed])
     plain = grid_search(X, y)
-    to = context.map("trained here", transfer, [(X, y, plain, x) for x in changed])
+    to = context.workers.map("trained here", transfer, [(X, y, plain, x) for x in changed])
     rows = [
         {"change": name, "task": task, "trained and tested": how, **score(result)}
         | {"without contact": sum(contact is None for contact in series[name])}

@@ -92,7 +92,7 @@ def confusion(context: Context) -> Section:
 def window(context: Context) -> Section:
     """Fig. 10."""
     cases = [(context.vectors(seconds), context.labels) for seconds in WINDOWS_S]
-    answers = context.map("time window", grid_search, cases)
+    answers = context.workers.map("time window", grid_search, cases)
     results = dict(zip(WINDOWS_S, answers, strict=True))
     text = ["Each feature is sampled 40 times, whatever the window, as in the paper."]
     for task in context.labels:
@@ -119,7 +119,7 @@ def window(context: Context) -> Section:
 def scaling(context: Context) -> Section:
     """Table II."""
     cases = [(context.vectors(), context.labels, method) for method in SCALINGS]
-    answers = context.map("feature scaling", grid_search, cases)
+    answers = context.workers.map("feature scaling", grid_search, cases)
     text = (
         "Scaling follows Eqs. 1 to 5, with the statistics of a feature over all its samples in the "
         "training trials of a fold. Methods I and II differ by a constant for each feature, and so "
@@ -137,7 +137,7 @@ def scaling(context: Context) -> Section:
 def features(context: Context) -> Section:
     """Table III."""
     cases = [(context.vectors(names=names), context.labels, "none", names) for names in SUBSETS]
-    answers = context.map("features", grid_search, cases)
+    answers = context.workers.map("features", grid_search, cases)
     results = {" ".join(names): result for names, result in zip(SUBSETS, answers, strict=True)}
     text = "These are all single features, pairs, and all three, unscaled, over 1.2 s."
     title = "Effect of the features (Table III)"
@@ -183,12 +183,12 @@ def resolution(context: Context) -> Section:
         for chunk in chunks
         if chunk.size
     ]
-    answers = context.map("taxel resolution", _through_coarser, cases)
+    answers = context.workers.map("taxel resolution", _through_coarser, cases)
     series = [list(chain.from_iterable(parts)) for parts in zip(*answers, strict=True)]
     skins = data.layout, *(skin for skin, _ in coarser(data.layout, []))
     taxels = [skin.rows * skin.cols for skin in skins]
     X = [context.vectors(), *map(vectors, series)]
-    searched = context.map("its accuracy", grid_search, [(x, labels) for x in X])
+    searched = context.workers.map("its accuracy", grid_search, [(x, labels) for x in X])
     results = dict(zip(taxels, searched, strict=True))
     lost = dict(zip(taxels, [0, *(s.count(None) for s in series)], strict=True))
     title = "Effect of taxel resolution (Table I, Fig. 9)"

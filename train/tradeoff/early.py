@@ -6,23 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from edge.model.stopping import StoppingRule
 from train.dataset import DataSet
 from train.evaluate import Result, stratified_folds
 from train.fitting import fit
-from train.pipeline import Choice, ContactClassifier
-from train.progress import bar
 from train.report.score import paired
+from train.report.work import Workers
 from train.stopping import NEVER, THRESHOLDS, answers, confidences, finest, stops, withheld
 from train.tradeoff.choices import some
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
-RATES = (0.02, 0.05, 0.1, 0.2)
 BINS = 10
 
 
@@ -73,14 +69,12 @@ class StoppingComparison:
         decision_points_s: windows.
         right: (decision points, n) whether each fixed window's decision is right.
         confidence: (decision points, n) calibrated.
-        labels: (decision points, n) labels named.
         certified: one entry for each asked error.
     """
 
     decision_points_s: tuple[float, ...]
     right: NDArray[np.bool_]
     confidence: NDArray[np.float64]
-    labels: NDArray[np.str_]
     certified: list[Certified]
 
     @property
@@ -104,21 +98,13 @@ class StoppingComparison:
             curve.append((threshold, float(seconds[at].mean()), wrong))
         return curve
 
-    def reliability(self) -> list[tuple[float, float, int]]:
-        """(mean confidence, share right, decisions) of `BINS` equal ranges of confidence."""
-        confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
-        ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
-        return [
-            (float(confidence[own].mean()), float(right[own].mean()), int(own.sum()))
-            for own in (ranges == i for i in range(BINS))
-            if own.any()
-        ]
-
     @property
     def calibration_error(self) -> float:
-        """Expected calibration error: the bins' mean gap of confidence and share right."""
-        said, right, counts = np.array(self.reliability()).T
-        return float(np.average(np.abs(said - right), weights=counts))
+        """Expected calibration error: mean gap of confidence and share right, in equal ranges."""
+        confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
+        ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
+        gaps = np.bincount(ranges, confidence - right)
+        return float(np.abs(gaps).sum() / len(right))
 
 
 @dataclass(frozen=True)
@@ -138,12 +124,9 @@ def compare_stopping(
     """{task: comparison}. Folds are held out in turn; a quick export of the others answers them."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
-    work = (
-        delayed(_held_out)(dataset, np.flatnonzero(folds == k), decision_points_s)
-        for k in range(FOLDS)
-    )
-    answered = Parallel(n_jobs=jobs, return_as="generator", max_nbytes=None)(work)
-    held_out = list(bar(answered, total=FOLDS, desc="deciding early"))
+    tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
+    cases = [(dataset, test, decision_points_s) for test in tests]
+    held_out: list[_Fold] = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
     comparisons = {}
     for task, labels in y.items():
@@ -157,7 +140,6 @@ def compare_stopping(
             tuple(decision_points_s),
             right,
             confidence,
-            named,
             [_certified(error, task, held_out, right, decision_points_s) for error in ERRORS],
         )
     return comparisons
@@ -173,12 +155,11 @@ def _held_out(
     names = fitted.dataset.names
     new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])
     named, confidence, unknown = {}, {}, {}
-    with threadpool_limits(1):
-        for task in model.choices:
-            named[task], margins, distances = answers(model.decision_points_, task, new)
-            stopping = model.stopping_[task]
-            confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
-            unknown[task] = withheld(model.novelty_, task, distances)
+    for task in model.choices:
+        named[task], margins, distances = answers(model.decision_points_, task, new)
+        stopping = model.stopping_[task]
+        confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
+        unknown[task] = withheld(model.novelty_, task, distances)
     rules = {
         task: {error: stopping.rule(error) for error in ERRORS}
         for task, stopping in model.stopping_.items()
@@ -210,65 +191,3 @@ def _certified(
     )
     means = [float(share.mean()) for share in shares] if rows else [np.nan] * 3
     return Certified(error, len(rows), decided.astype(bool), waited.astype(bool), *means)
-
-
-@dataclass(frozen=True)
-class NoveltyCount:
-    """Contacts with trained objects and with others that are called unknown, at one rate.
-
-    Attributes:
-        novelty_rate: share of contacts with trained objects that are called unknown.
-        known: trials of trained objects.
-        strange: trials of objects left out entirely.
-        unknown: number of the strange trials that are called unknown.
-    """
-
-    novelty_rate: float
-    known: int
-    strange: int
-    unknown: int
-
-
-def novelty(
-    dataset: DataSet,
-    labels: NDArray[np.str_],
-    choice: Choice,
-    rates: Sequence[float] = RATES,
-) -> list[NoveltyCount]:
-    """One count for each rate; none where too few labels are left.
-
-    A third of the labels is left out entirely, in turn; of the others, one fold at a time.
-
-    Args:
-        dataset: the trials.
-        labels: (n,) of the task with most labels.
-        choice: of that task.
-        rates: novelty rates.
-    """
-    measured = dataset.of(choice.features)
-    X, widths = measured.features(), measured.widths()
-    names = np.unique(labels)
-    folds = stratified_folds(labels, FOLDS)
-    known: list[NDArray[np.float64]] = []
-    strange: list[NDArray[np.float64]] = []
-    with threadpool_limits(1):
-        for third in range(3):
-            left_out = np.isin(labels, names[third::3])
-            for fold in range(FOLDS):
-                train = np.flatnonzero(~left_out & (folds != fold))
-                if len(np.unique(labels[train])) < 2 or len(train) <= choice.k:
-                    continue
-                model = ContactClassifier({"task": choice}, measured.names, widths).fit(
-                    X[train], {"task": labels[train]}
-                )
-                for rows, trials in ((known, ~left_out), (strange, left_out)):
-                    asked = X[trials & (folds == fold)]
-                    if len(asked):
-                        rows.append(model.squares("task", asked).min(axis=1))
-    if not known or not strange:
-        return []
-    near, far = np.concatenate(known), np.concatenate(strange)
-    return [
-        NoveltyCount(rate, len(near), len(far), int((far > np.quantile(near, 1 - rate)).sum()))
-        for rate in rates
-    ]

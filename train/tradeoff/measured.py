@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from train.dataset import DataSet
 from train.evaluate import Labels, Result
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
-from train.tradeoff.early import NoveltyCount, StoppingComparison
+from train.tradeoff.early import StoppingComparison
 
 
 @dataclass(frozen=True)
@@ -34,27 +33,23 @@ class Measured:
     """Accuracies and times of one data set on one board.
 
     Attributes:
-        dataset: the trials, with the features of every candidate.
         y: {task: (n,) labels}, the main task first.
         board: figures of the machine that decides.
         wire_s: from the end of the window until its last frame is read.
         breakaways: {object: seconds} until static friction breaks; empty without a scene.
         points: the quick choice at each window.
         comparisons: {task: deciding early beside fixed windows}.
-        novelty: how often contacts are called unknown.
         costs: changes beside the choice at the usual window.
         wrong, second: an owner's price of a wrong decision and of a second's wait.
         formats: what each number format costs and gives (`board.read_formats`); empty if unknown.
     """
 
-    dataset: DataSet
     y: Labels
     board: Board
     wire_s: float
     breakaways: Mapping[str, float]
     points: Points
     comparisons: Mapping[str, StoppingComparison]
-    novelty: Sequence[NoveltyCount]
     costs: Sequence[Saving]
     wrong: float = 10.0
     second: float = 1.0

@@ -15,8 +15,7 @@ from train.report.page import write
 from train.report.section import Section, counted
 from train.report.work import Workers
 from train.simulate import scene as scenes
-from train.stopping import finest
-from train.tradeoff import answer, costs, early, stopping
+from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import WINDOWS_S, chosen, followed, front
@@ -28,8 +27,7 @@ SECTIONS: tuple[Callable[[Measured], Section], ...] = (
     costs.section,
     answer.prices,
     answer.reasons,
-    stopping.section,
-    stopping.unknown,
+    answer.early,
     lambda measured: boards.section(measured.board),
     answer.glossary,
 )
@@ -78,20 +76,17 @@ def tradeoff(
         raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     y = {task: dataset.labels(task) for task in order}
-    workers, most = Workers(jobs), finest(y)
+    workers = Workers(jobs)
     made = workers.map("windows", chosen, [(dataset, window) for window in WINDOWS_S])
     points = dict(zip(WINDOWS_S, made, strict=True))
-    full = points[WINDOWS_S[-1]]
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
     measured = Measured(
-        dataset=dataset,
         y=y,
         board=board,
         wire_s=waited_s(dataset.layout, rate),
         breakaways={} if scene is None else breakaway_times(scene),
         points=points,
         comparisons=early.compare_stopping(dataset, WINDOWS_S, jobs=jobs),
-        novelty=early.novelty(dataset, y[most], full[most].choice),
         costs=costs.measure(raw, dataset, points, workers),
         wrong=wrong,
         second=second,

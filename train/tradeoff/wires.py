@@ -26,12 +26,10 @@ class Wire:
 
     Attributes:
         name: description of the wiring.
-        bits: bits of a frame on all buses together.
         frame_s: seconds of a frame on the slowest bus.
     """
 
     name: str
-    bits: float
     frame_s: float
 
     def every(self, rate_hz: float) -> int:
@@ -42,8 +40,7 @@ class Wire:
 def count(name: str, file: SkinFile) -> Wire:
     """The wire of a skin file."""
     bits = [total / FRAMES for total in frame_bits(file, FRAMES)]
-    rate = frame_rate(bits, [bus.clock_hz for bus in file.buses])
-    return Wire(name, sum(bits), 1.0 / rate)
+    return Wire(name, 1.0 / frame_rate(bits, [bus.clock_hz for bus in file.buses]))
 
 
 def spread(layout: SkinLayout, buses: int, clock_hz: int = 400_000) -> SkinFile:

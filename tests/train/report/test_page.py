@@ -50,7 +50,7 @@ def test_what_a_clock_measured_stands_in_a_file_of_its_own():
     files = table_csv(table(timed=("seconds",)))
     assert sorted(files) == ["speed.csv", "speed_timings.csv"]
     assert "seconds" not in files["speed.csv"]
-    assert files["speed_timings.csv"].splitlines()[0] == "case,n,seconds"
+    assert files["speed_timings.csv"].splitlines()[0] == "case,seconds"
 
 
 def test_the_page_holds_its_pictures(tmp_path):
