@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import classification_report
@@ -18,15 +17,15 @@ from edge.model.model import Model
 from export.api import names, warnings
 from train.choose import TRIAL, Chosen
 from train.dataset import DataSet
-from train.draw.explanation import MOST_NEAR, Case, figure
+from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, ContactClassifier, vote
 from train.report import page
-from train.report.figures import STYLE, canvas, confusion, curve, png
+from train.report.figures import confusion, lines, picture
 from train.report.score import interval, percent
-from train.report.section import Figure, Row, Section, Table, counted
+from train.report.section import Row, Section, Table, counted
 from train.report.work import Workers
 
 PARTS = 4
@@ -189,7 +188,7 @@ def _accuracy(task: str, chosen: Chosen, answer: _Answers, untouched: Sequence[s
         f"How often it is right: {task}",
         [text],
         [Table(f"recall_{_file(task)}", "Recall of each class", rows)],
-        [Figure(f"confusion_{_file(task)}", title, confusion(truth, said, title))],
+        [confusion(f"confusion_{_file(task)}", title, truth, said)],
     )
 
 
@@ -219,9 +218,12 @@ def _wrong(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
             )
             if order < DRAWN:
                 case = _case(dataset, trials, trial, task, answer, why, labels)
-                drawn = figure([case], dataset.layout, fitted.window_s)
+
+                def draw(canvas: Any, phone: bool, case: Case = case) -> None:
+                    draw_case(canvas, case, dataset.layout, fitted.window_s, phone)
+
                 name = f"wrong_{_file(task)}_{order + 1}"
-                figures.append(Figure(name, f"{case.title}, over the nearest trials", png(drawn)))
+                figures.append(picture(name, case.title, draw, (4.8, 8.4)))
     text = [
         "Each of these trials was told wrong by a model that had not seen it. The last column "
         "names the feature that tells most between the wrong answer and the nearest trial of the "
@@ -291,14 +293,6 @@ def _learning(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
         task: [Result(int((said == answer.truth).sum()), n) for said in answer.said]
         for task, answer in answers.items()
     }
-    with mpl.rc_context(STYLE):
-        drawn = canvas(5.8, 3.6)
-        axes: Any = drawn.subplots()
-        for order, (task, row) in enumerate(results.items()):
-            curve(axes, order, task, sizes, row)
-        axes.set(xlabel="trials to learn from", ylabel="right of left-out trials, %", ylim=(0, 102))
-        drawn.legend(loc="outside lower left", ncols=2, fontsize=8, frameon=False)
-        image = png(drawn)
     rows: list[Row] = [
         {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}
         for i, size in enumerate(sizes)
@@ -315,9 +309,9 @@ def _learning(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
         "objects rather than more touches."
     )
     title = "Right answers by the number of trials"
-    return Section("What more recordings would buy", text, [
-        Table("learning", title, rows)
-    ], [Figure("learning", title, image)])  # fmt: skip
+    drawn = lines("learning", title, sizes, results, label="trials to learn from")
+    tables = [Table("learning", title, rows)]
+    return Section("What more recordings would buy", text, tables, [drawn])
 
 
 def _sizes(fitted: Fitted, model: Model, prices: Sequence[tuple[float, float]]) -> Section:

@@ -46,20 +46,9 @@ class Case:
     rival: str
 
 
-def figure(cases: Sequence[Case], layout: SkinLayout, window_s: float) -> Figure:
-    """The three features of each case beside those of its nearest trials, and the pulls."""
-    with mpl.rc_context(STYLE):
-        drawn = Figure(figsize=(5.8, 5.0 * len(cases)), layout="constrained")
-        for part, case in zip(
-            drawn.subfigures(len(cases), squeeze=False)[:, 0], cases, strict=True
-        ):
-            _draw(part, case, layout, window_s)
-    return drawn
-
-
-def _draw(part: Any, case: Case, layout: SkinLayout, window_s: float) -> None:
-    part.suptitle(case.title, fontsize=10, weight="bold")
-    axes = part.subplots(2, 2).ravel()
+def draw_case(part: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool) -> None:
+    """Draw the three features of a case beside those of its nearest trials, and the pulls."""
+    axes = part.subplots(*(4, 1) if phone else (2, 2)).ravel()
     units = (layout.force_unit, "taxels", layout.length_unit)
     legend = {}
     for axis, unit, name in zip(axes, units, curves(case.touch), strict=False):
@@ -118,8 +107,15 @@ def draw(recording: Recording, out: Path, model: Model, folder: Path, where: str
             f"{folder}: holds none of the nearest trials, such as {next(iter(known))}; name their "
             "folder by --data"
         )
-    with write_whole(out) as file:
-        figure(cases, recording.layout, info.window_s).savefig(file, format="png", dpi=110)
+    with mpl.rc_context(STYLE):
+        drawn = Figure(figsize=(6.4, 5.0 * len(cases)), layout="constrained")
+        for part, case in zip(
+            drawn.subfigures(len(cases), squeeze=False)[:, 0], cases, strict=True
+        ):
+            part.suptitle(case.title, fontsize=10, weight="bold")
+            draw_case(part, case, recording.layout, info.window_s, False)
+        with write_whole(out) as file:
+            drawn.savefig(file, format="png", dpi=110)
 
 
 def _trial(folder: Path, name: str) -> FeatureSeries | None:
