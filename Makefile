@@ -188,8 +188,9 @@ endif
 stopping: $(READY)
 	$(BIN)/python -m bench.stopping --data $(RECORDINGS) $(STOPPING)
 
+# FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
 faults: $(READY)
-	$(BIN)/python -m bench.faults
+	$(BIN)/python -m tests.faults $(FAULTS)
 
 soak: $(READY)
 	$(BIN)/python -m bench.soak

@@ -1,4 +1,4 @@
-"""What a bus may do, and what the skin makes of it (`python -m bench.faults` plays all faults)."""
+"""What a bus may do, and what the skin makes of it (`python -m tests.faults` plays all faults)."""
 
 import errno
 import math
@@ -27,7 +27,7 @@ from edge.skin.bus_reader import (
 )
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
-from tests.edge.skin.campaign import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts, sweep
+from tests.faults import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts, sweep
 
 CODY = SKINS["cody"]
 ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
@@ -44,7 +44,7 @@ def test_a_fault_gives_no_wrong_value_and_costs_no_other_chip(name):
     assert (outcome.wrong, outcome.others) == (0, 0)
     assert outcome.back_s < BACK_S
     hangs = any(f.code == errno.ETIMEDOUT and f.kind == "error" for f in faults)
-    assert outcome.missed <= (3 * outcome.met if hangs else 0)
+    assert outcome.missed_ticks <= (3 * outcome.met if hangs else 0)
 
 
 @pytest.mark.parametrize("overhead_us", [0, 100])
@@ -76,7 +76,7 @@ def test_one_fault_anywhere_gives_no_wrong_value(name, where):
 def test_a_chip_that_never_comes_back_stays_out_and_costs_nothing():
     forever = Fault(bus=CODY.buses[0].device, channel=0, address=0x2C)
     outcome = run("", CODY, [forever], seconds=1.2)
-    assert (outcome.missing, outcome.missed) == (12, 0)
+    assert (outcome.missing, outcome.missed_ticks) == (12, 0)
     assert math.isnan(outcome.back_s)
 
 

@@ -18,7 +18,7 @@ from edge.skin.file import Reading
 from edge.skin.loop import Loop
 from edge.skin.skin import SILENT_FRAMES, Skin
 from edge.skin.wiring import BusSpec
-from tests.edge.skin.campaign import SKINS
+from tests.faults import SKINS
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 PAD = skinfile.load(skinfile.shipped("mpr121"))

@@ -1,0 +1,346 @@
+"""What the skin makes of all that can go wrong on its wires, judged by what its chips really felt.
+
+`python -m tests.faults` prints tables; the same seed gives the same tables. Scripts of faults, and
+the loss of all settings between two frames, are played onto fake skins in virtual time, which
+advances with the bits on the wire and with the software's overhead for each transaction. Then one
+fault of each kind is played at every transaction of a frame and of the set-up; `--every 10` takes
+every tenth. The exit status is 1 if a valid value is wrong, or a taxel is not valid again within
+half a second of the fault's end. The tests of `edge.skin.bus_reader` play a part of this.
+"""
+
+import argparse
+import errno
+import math
+import sys
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from edge.fake.clock import VirtualClock
+from edge.fake.faults import Fault
+from edge.fake.player import calibrated, fake_buses
+from edge.i2c import block
+from edge.i2c.chip import ChipSpec
+from edge.skin import file as skinfile
+from edge.skin.loop import Schedule
+from edge.skin.skin import Skin
+from edge.skin.wiring import BusSpec
+from tests.wires import one_bus
+
+OVERHEADS_US = (0.0, 50.0, 100.0)
+"""Microseconds a transaction."""
+BACK_S = 0.5
+"""Time after a fault's end within which every taxel must be valid again."""
+BEGIN_S, END_S, LASTS_S = 0.5, 1.0, 2.2
+"""When a lasting fault begins and ends, and how long it is watched."""
+REPEATED = (3, 20, 37, 54)
+"""Frames before which all chips lose their settings, where that repeats."""
+INTACT_FRAMES = 12
+"""A sweep goes on for so many frames after the last invalid taxel."""
+CODES = (errno.EREMOTEIO, errno.EIO, errno.ETIMEDOUT, errno.EAGAIN, errno.ENODEV)
+KINDS = {
+    **{
+        errno.errorcode[code]: Fault(code=code)
+        for code in (*CODES, errno.EINVAL, errno.EBUSY, errno.EACCES)
+    },
+    "reset": Fault("reset"),
+    "a frame that breaks off": Fault("break"),
+    "a wrong mux channel": Fault("misroute"),
+    "another program's mux channel": Fault("foreign"),
+}
+"""Faults that the protocol can tell."""
+UNKNOWABLE = r"""
+\* The protocol cannot tell. An AD7147's words carry no check, so that a flipped bit is a value
+unless it gives 0, 0xFFFF or a count that no touch reaches; an MPR121's words have six spare bits of
+sixteen. A chip that serves old bytes is found after 100 frames if its calibration saw noise. A
+wrong channel is found by reading the mux back, which a skin file may switch off."""
+
+
+def skins():
+    """The shipped skins, one bus for all of Cody's chips, and microcontrollers, calibrated.
+
+    With 100 us of overhead for each transaction, 32 AD7147 on one bus carry 36 Hz.
+    """
+    cody, pad = (calibrated(skinfile.load(skinfile.shipped(n))) for n in ("cody", "mpr121"))
+    single = one_bus(cody)
+    single = replace(single, reading=replace(single.reading, rate_hz=36.0))
+    taxels = [tuple(range(128 * i, 128 * i + 128)) for i in range(3)]
+    chips = [ChipSpec(block.KIND, 0x28, t) for t in taxels]
+    buses = tuple(BusSpec(f"/dev/i2c-{i + 1}", (chip,)) for i, chip in enumerate(chips))
+    return {"cody": cody, "mpr121": pad, "one bus": single, "block": replace(cody, buses=buses)}
+
+
+SKINS = skins()
+
+
+class Pattern:
+    """A scene whose counts differ between all taxels, and from each 10 ms to the next few."""
+
+    def __init__(self, file):
+        shape = file.layout.shape
+        # An MPR121 has 10 bits, some of which are its rest value.
+        first, self.step = (20, 4) if file.chips[0].kind.name == "mpr121" else (300, 8)
+        self.base = first + self.step * np.arange(shape[0] * shape[1]).reshape(shape)
+
+    def __call__(self, t):
+        return (self.base + int(t / 0.01 + 1e-6) % self.step).astype(np.uint16)
+
+    def wrong(self, frame):
+        """Number of valid taxels whose count their chip did not feel at its last conversion.
+
+        That may be a conversion (9 ms) before the reading: two steps are right.
+        """
+        phase = frame.counts.astype(np.int64) - self.base
+        right = ~frame.valid
+        for age in (0.0, 0.005, 0.01):
+            felt = np.floor((frame.times - age) / 0.01 + 1e-6).astype(np.int64) % self.step
+            right |= phase == felt
+        return int((~right).sum())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The effect of a script of faults on a skin.
+
+    Attributes:
+        name: of the script.
+        met: transactions that met a fault; positions tried in a sweep.
+        wrong: values called valid that no chip felt.
+        missing: most invalid taxels of one frame.
+        others: readings lost on chips that the script does not touch.
+        missed_ticks: ticks left out.
+        back_s: longest time from a fault's end until every taxel was valid; NaN if never.
+    """
+
+    name: str
+    met: int = 0
+    wrong: int = 0
+    missing: int = 0
+    others: int = 0
+    missed_ticks: int = 0
+    back_s: float = 0.0
+
+
+class Watched:
+    """A fake skin that feels its pattern, was started while faults were played, and is judged."""
+
+    def __init__(self, file, *, faults=(), overhead_s=0.0, seed=0):
+        clock, self.feels = VirtualClock(), Pattern(file)
+        self.buses = fake_buses(
+            file, self.feels, clock, timed=True, overhead_s=overhead_s, faults=faults, seed=seed
+        )
+        self.skin = Skin(file, self.buses, clock=clock)
+        self.skin.start()
+        clock.sleep_until(math.ceil(clock.now() / 0.01) * 0.01)
+        self.wrong = self.missing = self.others = 0
+        self.back_at = -math.inf
+        """When all taxels were valid again; infinity while one is not."""
+        self.spared = np.zeros(file.layout.shape, dtype=bool)
+
+    def read(self):
+        """Read and judge a frame."""
+        frame = self.skin.read()
+        invalid = ~frame.valid
+        self.wrong += self.feels.wrong(frame)
+        self.missing = max(self.missing, int(invalid.sum()))
+        self.others += int((invalid & self.spared).sum())
+        if invalid.any():
+            self.back_at = math.inf
+        elif self.back_at == math.inf:
+            self.back_at = self.skin.clock.now()
+        return frame
+
+    def outcome(self, name, met, end, schedule=None):
+        """The outcome of faults that ended at a time."""
+        back = math.nan if self.back_at == math.inf else max(0.0, self.back_at - end)
+        missed_ticks = 0 if schedule is None else schedule.missed_ticks
+        return Outcome(name, met, self.wrong, self.missing, self.others, missed_ticks, back)
+
+
+def run(name, file, faults, *, touched=None, end_s=END_S, seconds=LASTS_S, overhead_s=0.0, seed=0):
+    """Play a script for some seconds."""
+    watched = Watched(file, overhead_s=overhead_s, seed=seed)
+    for bus in file.buses if touched else ():
+        for chip in bus.chips:
+            watched.spared.flat[list(chip.taxels)] = not touched(chip, bus.device)
+    with watched.skin as skin:
+        start = skin.clock.now()
+        moved = [replace(f, during=tuple(start + t for t in f.during)) for f in faults]
+        for bus in watched.buses:
+            bus.inject(moved, seed)
+        schedule = Schedule(skin.clock, skin.period_s)
+        while schedule.wait() - start < seconds:
+            watched.read()
+    met = sum(bus.script.met for bus in watched.buses)
+    return watched.outcome(name, met, start + end_s, schedule)
+
+
+def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
+    """Play one fault at each transaction of four frames, or of the set-up, on every bus.
+
+    Four frames hold every kind of transaction, the check of a chip's settings too.
+    """
+    watched = Watched(file)
+    with watched.skin:
+        before = [bus.transactions for bus in watched.buses]
+        for _ in range(4):
+            watched.read()
+        frame = [bus.transactions - n for bus, n in zip(watched.buses, before, strict=True)]
+    outcomes = [
+        _one_fault(file, replace(fault, at=[position], bus=bus.device), set_up, overhead_s)
+        for bus, count in zip(file.buses, before if set_up else frame, strict=True)
+        for position in range(first, count, every)
+    ]
+    return Outcome(
+        f"{name}, {'set-up' if set_up else 'frame'}",
+        met=len(outcomes),
+        wrong=sum(outcome.wrong for outcome in outcomes),
+        missing=max((outcome.missing for outcome in outcomes), default=0),
+        back_s=max((outcome.back_s for outcome in outcomes), default=0.0),
+    )
+
+
+def _one_fault(file, fault, set_up, overhead_s):
+    watched = Watched(file, faults=[fault] if set_up else [], overhead_s=overhead_s)
+    with watched.skin as skin:
+        for bus in [] if set_up else watched.buses:
+            bus.inject([fault])
+        start = end = skin.clock.now()
+        for k in range(1, 1000):
+            skin.clock.sleep_until(start + k * skin.period_s)
+            t = watched.read().t
+            if not any(bus.script.met for bus in watched.buses):
+                end = t
+            if k > 4 and t - max(end, watched.back_at) > INTACT_FRAMES * skin.period_s:
+                break
+    return watched.outcome("", 1, end)
+
+
+def brown_out(name, file, *, at=(3,), overhead_s=0.0):
+    """Reset every chip and mux between two frames, before each of the numbered frames."""
+    watched = Watched(file, overhead_s=overhead_s)
+    with watched.skin as skin:
+        schedule = Schedule(skin.clock, skin.period_s)
+        schedule.wait()
+        for k in range(1, at[-1] + 60):
+            if k in at:
+                end = skin.clock.now()
+                for chip in models(watched.buses):
+                    chip.reset()
+            watched.read()
+            schedule.wait()
+    return watched.outcome(name, len(at), end, schedule)
+
+
+def models(buses):
+    """The models of all chips and muxes of fake buses."""
+    for chip in [chip for bus in buses for chip in bus.chips.values()]:
+        yield chip
+        for channel in getattr(chip, "channels", []):
+            yield from channel.values()
+
+
+def scripts():
+    """Name, skin, faults and further arguments of `run`; `*` marks what no protocol can tell."""
+    cody, pad = SKINS["cody"], SKINS["mpr121"]
+    first = cody.buses[0].device
+    lasting = {"during": (BEGIN_S, END_S)}
+    chip = {"bus": first, "mux": 0x70, "channel": 1, "address": 0x2D, **lasting}
+    one_chip = {"touched": lambda chip, bus: (bus, chip.channel, chip.address) == (first, 1, 0x2D)}
+    on_first = {"touched": lambda chip, bus: bus == first}
+    yield "NACK on one chip", cody, [Fault(**chip)], one_chip
+    yield "NACK on one mux", cody, [Fault(bus=first, address=0x70, **lasting)], on_first
+    yield "NACK on all", cody, [Fault(**lasting)], {}
+    for code in (errno.EIO, errno.EAGAIN, errno.ETIMEDOUT):
+        yield f"{errno.errorcode[code]} on one chip", cody, [Fault(code=code, **chip)], one_chip
+    for code in (errno.EIO, errno.ETIMEDOUT, errno.ENODEV):
+        fault = Fault(code=code, bus=first, **lasting)
+        yield f"{errno.errorcode[code]} on one bus", cody, [fault], on_first
+    yield "ENODEV on all buses", cody, [Fault(code=errno.ENODEV, **lasting)], {}
+    short = {"during": (BEGIN_S, BEGIN_S + 0.011)}
+    ends = {"end_s": BEGIN_S + 0.011}
+    yield "a chip resets", cody, [Fault("reset", **{**chip, **short})], {**one_chip, **ends}
+    yield "an MPR121 resets", pad, [Fault("reset", address=0x5B, channel=1, **short)], ends
+    wrong = [Fault("misroute", address=0x70, rate=0.1, **lasting)]
+    yield "a wrong mux channel, 10 % of selections", cody, wrong, {}
+    blind = replace(cody, reading=replace(cody.reading, verify_mux=False))
+    yield "the same without reading back *", blind, wrong, {}
+    foreign = [Fault("foreign", rate=0.005, **lasting)]
+    yield "another program selects a mux channel", cody, foreign, {}
+    flip = [Fault("flip", rate=0.02, **lasting)]
+    yield "bit flips in 2 % of reads, AD7147 *", cody, flip, {}
+    yield "the same, MPR121 *", pad, flip, {}
+    yield "the same, block (CRC)", SKINS["block"], flip, {}
+    yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)], one_chip
+    for rate in (0.001, 0.01, 0.1):
+        for name, codes in (("random errors", CODES[:4]), ("without timeouts", CODES[:2])):
+            faults = [Fault(code=code, rate=rate / len(codes), **lasting) for code in codes]
+            yield f"{name}, {rate:.1%} of transactions", cody, faults, {}
+
+
+def table(outcomes, met):
+    """The outcomes as a Markdown table; `met` heads the column of that number."""
+    heads = ["fault", met, "wrong values called valid", "taxels missing, worst frame"]
+    heads += ["readings lost on other chips", "ticks left out", "all back after, ms"]
+    rows = [
+        [o.name, o.met, o.wrong, o.missing, o.others, o.missed_ticks, f"{1e3 * o.back_s:.0f}"]
+        for o in outcomes
+    ]
+    return "\n".join(f"| {' | '.join(map(str, row))} |" for row in [heads, ["---"] * 7, *rows])
+
+
+def campaign(overhead_us, every, seed):
+    """Play all scripts and sweeps with an overhead, and print their tables.
+
+    Returns:
+        The names of the outcomes that break the promise.
+    """
+    from joblib import Parallel, delayed
+
+    from train.progress import bar
+
+    cost = {"overhead_s": overhead_us * 1e-6}
+    jobs = [
+        delayed(run)(name, file, faults, seed=seed, **more, **cost)
+        for name, file, faults, more in scripts()
+    ]
+    for name, file in SKINS.items():
+        jobs.append(delayed(brown_out)(f"all reset, {name}", file, **cost))
+        jobs.append(delayed(brown_out)(f"all reset 4 times, {name}", file, at=REPEATED, **cost))
+    played = len(jobs)
+    jobs += [
+        delayed(sweep)(f"{kind}, {name}", file, fault, set_up=set_up, every=every, **cost)
+        for name, file in SKINS.items()
+        for kind, fault in KINDS.items()
+        for set_up in (False, True)
+    ]
+    outcomes = Parallel(n_jobs=-1)(bar(jobs, desc=f"{overhead_us:g} us", unit=" scripts"))
+    print(f"\nOverhead of {overhead_us:g} us a transaction:\n")
+    print(
+        f"{table(outcomes[:played], 'met')}{UNKNOWABLE}\n\n{table(outcomes[played:], 'positions')}"
+    )
+    known = [outcome for outcome in outcomes if not outcome.name.endswith("*")]
+    longest = max(known, key=lambda outcome: outcome.back_s)
+    print(f"\nLongest time until all were back: {longest.back_s:.3f} s, {longest.name}", flush=True)
+    broken = [o for o in known if o.wrong or not o.back_s <= BACK_S]
+    return [f"{outcome.name} ({overhead_us:g} us)" for outcome in broken]
+
+
+def main():
+    """Run the campaign; 1 if a promise is broken."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--every", type=int, default=1, help="every so many positions")
+    parser.add_argument(
+        "--overhead", type=float, nargs="+", default=OVERHEADS_US, metavar="US",
+        help="microseconds of software for each transaction (default: 0 50 100)",
+    )  # fmt: skip
+    arguments = parser.parse_args()
+    broken = []
+    for overhead_us in arguments.overhead:
+        broken += campaign(overhead_us, arguments.every, arguments.seed)
+    return f"not as promised: {'; '.join(broken)}" if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
