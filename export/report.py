@@ -30,8 +30,8 @@ from train.report.work import Workers
 
 PARTS = 4
 """The learning curve is fitted to so many parts of the trials, one after another."""
-DRAWN = 2
-"""Trials told wrong that are drawn for each task."""
+DRAWN = 1
+"""Trials told wrong that are drawn for each task; a picture takes as long as hundreds of fits."""
 EXPLAINED = 60
 """Trials over which the features' pulls are averaged."""
 UNFELT = "(no contact)"
@@ -227,8 +227,9 @@ def _wrong(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
     text = [
         "Each of these trials was told wrong by a model that had not seen it. The last column "
         "names the feature that tells most between the wrong answer and the nearest trial of the "
-        "right label. A wrong label or a touch that failed often stands out here. `edge-classify "
-        "explain` and `python -m train show` say the same of any recording."
+        "right label. A wrong label or a touch that failed often stands out here. One of each "
+        "task is drawn; `edge-classify explain` and `python -m train show` say the same of any "
+        "recording."
     ]
     return Section("Trials told wrong", text if rows else ["None."], [
         Table("wrong", "Trials told wrong", rows, narrow=4)

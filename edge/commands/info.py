@@ -1,7 +1,8 @@
-"""Describe a model: its tasks, labels, accuracy, features, skin and arm.
+"""Describe a model, or compare two: tasks, labels, accuracy, features, data, skin and arm.
 
 Prints a model's tasks with their labels and accuracy, its features and training data, and the skin
-and arm that it needs; also its size, and the time of a decision on this machine.
+and arm that it needs; also its size, and the time of a decision on this machine. Of two models it
+prints what differs.
 """
 
 from __future__ import annotations
@@ -20,11 +21,16 @@ from edge.model.info import ModelInfo
 from edge.model.model import Model
 
 ROUNDS = 200
+COARSE = ("kernels", "novelty", "stopping", "units")
+"""Tables whose parts are not compared one by one."""
+NAMED = 6
+"""Names that a line has at most."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
+    parser.add_argument("other", nargs="?", metavar="other.onnx", help="compare with this model")
 
 
 def decision_us(model: Model) -> float:
@@ -34,23 +40,64 @@ def decision_us(model: Model) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the description."""
-    model = Model(arguments.model)
-    about = {
+    """Print the description, or what differs."""
+    output, model = Output.of(arguments), Model(arguments.model)
+    if arguments.other is None:
+        about = {**described(model), "decision_us": round(decision_us(model), 1)}
+        output.event(about, text(model.info, about))
+        return 0
+    changes = differences(described(model), described(Model(arguments.other)))
+    lines = [line for key, pair in changes.items() for line in wrapped(change_text(key, *pair))]
+    said = "\n".join(lines) or "the models do not differ"
+    output.event({"event": "comparison", "changes": changes}, said)
+    return 0
+
+
+def described(model: Model) -> dict[str, Any]:
+    """What a program is told of a model."""
+    return {
         "event": "model",
-        "file": arguments.model,
-        "bytes": os.path.getsize(arguments.model),
-        "decision_us": round(decision_us(model), 1),
+        "file": model.path,
+        "version": model.version,
+        "bytes": os.path.getsize(model.path),
         **json.loads(model.info.to_json()),
     }
-    Output.of(arguments).event(about, text(model.info, about))
-    return 0
+
+
+def differences(a: Any, b: Any, key: str = "") -> dict[str, list[Any]]:
+    """{key, such as `tasks.object.k`: its values in a and b} where they differ; None for none."""
+    if not (isinstance(a, dict) and isinstance(b, dict)) or key in COARSE:
+        return {} if a == b else {key: [a, b]}
+    parts = (differences(a.get(k), b.get(k), f"{key}.{k}".strip(".")) for k in {**a, **b})
+    return {name: pair for part in parts for name, pair in part.items()}
+
+
+def change_text(key: str, a: Any, b: Any) -> str:
+    """A difference for a person: of names, which only one of the models has."""
+    if key in COARSE:
+        return f"{key}: differs"
+    if isinstance(a, list) or isinstance(b, list):
+        a, b = a or [], b or []
+        gone, new = [x for x in a if x not in b], [x for x in b if x not in a]
+        texts = [f"{sign} {_some(side)}" for sign, side in (("-", gone), ("+", new)) if side]
+        return f"{key} ({len(a)} -> {len(b)}): {'; '.join(texts) or 'in another order'}"
+    if key.endswith(".accuracy"):
+        a, b = f"{a:.1%}", f"{b:.1%}"
+    a, b = ("a table" if isinstance(value, dict) else value for value in (a, b))
+    return f"{key}: {a} -> {b}"
+
+
+def _some(values: list[Any]) -> str:
+    rest = len(values) - NAMED
+    return ", ".join(map(str, values[:NAMED])) + (f" and {rest} more" if rest > 0 else "")
 
 
 def text(info: ModelInfo, about: dict[str, Any]) -> str:
     """The description for a person."""
     skin, chain = info.layout, info.chain
-    lines = [f"{about['file']}: {about['bytes'] / 1024:.0f} kB, format {about['format']}", ""]
+    named = f"{info.name} " if info.name else ""
+    size = f"{about['bytes'] / 1024:.0f} kB, format {about['format']}"
+    lines = [f"{about['file']}: {named}{about['version']}, {size}", ""]
     for name, task in info.tasks.items():
         lines += wrapped(
             f"{name}: {task.accuracy:.1%} accurate (nested), {task.components} "

@@ -60,7 +60,7 @@ def draw_case(part: Any, case: Case, layout: SkinLayout, window_s: float, phone:
             style = {"color": colour, "ls": dashes, "lw": 1.0, "ms": 4}
             marks = {"marker": STROKES[place][1], "markevery": (0.04 * place, 0.25)}
             legend[text] = axis.plot(*curve, **style, **marks)[0]
-        axis.set(title=name, xlabel="seconds from onset", ylabel=unit, xlim=(0.0, window_s))
+        axis.set(title=name, xlabel="seconds from onset", ylabel=unit, xlim=(0.0, 1.06 * window_s))
         axis.set_ylim(bottom=0.0)
     strongest = list(case.pulls.items())[:MOST_PULLS]
     signs = [ALIKE[0] if pull > 0.0 else OTHER[0] for _, pull in strongest]

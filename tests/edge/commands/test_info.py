@@ -29,3 +29,26 @@ def test_a_person_gets_sentences(capsys, monkeypatch):
     assert "Skin: 16 x 24 taxels, closed around" in out
     assert f"Fitted on {info.rows} trials" in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_two_models_are_compared_by_what_differs(exported, capsys, monkeypatch):
+    pair = [str(exported / "model.onnx"), str(demo.MODEL)]
+    assert main(["info", *pair]) == 0
+    changes = json.loads(capsys.readouterr().out)["changes"]
+    infos = [Model(path).info for path in pair]
+    assert changes["rows"] == [info.rows for info in infos]
+    assert changes["data_digest"] == [info.data_digest for info in infos]
+    assert changes["tasks.category.labels"] == [list(i.tasks["category"].labels) for i in infos]
+    assert "window_s" not in changes
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert main(["info", *pair]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "tasks.category.labels (2 -> 4): + rigid-movable, soft-movable" in out
+    assert f"rows: 16 -> {infos[1].rows}" in out
+    accuracies = [info.tasks["object"].accuracy for info in infos]
+    assert f"tasks.object.accuracy: {accuracies[0]:.1%} -> {accuracies[1]:.1%}" in out
+
+
+def test_a_model_differs_from_itself_in_nothing(capsys):
+    assert main(["info", str(demo.MODEL), str(demo.MODEL)]) == 0
+    assert json.loads(capsys.readouterr().out) == {"event": "comparison", "changes": {}}
