@@ -21,9 +21,9 @@ from scipy.optimize import brentq
 from bench import mujoco_touch
 from bench.mujoco_touch import LEAD_S, RADIUS_M, RATE_HZ, THRESHOLD_COUNTS, Thing, Touch
 from edge.errors import InputError
+from train.simulate.convergence import kinds
 from train.simulate.effects.lateral import SPREAD
-from train.simulate.engine import run_batch
-from train.simulate.run import kinds
+from train.simulate.engine import readings, run_physics
 from train.simulate.scene import from_dict
 
 UPRIGHT_DEG = (0.0, -4.0, 0.0, -3.9, 0.0)
@@ -74,9 +74,9 @@ def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
             "object": [item],
         }
     )
-    batch = run_batch(scene, tuple(next(iter(kinds(scene).values()))))
+    batch = run_physics(scene, tuple(next(iter(kinds(scene).values()))))
     slide = batch.traces.get("slide_m", np.zeros_like(batch.force))
-    return batch.counts[0], batch.force[0], slide[0]
+    return next(readings(batch)).frames(), batch.force[0], slide[0]
 
 
 def theory(thing: Thing, fixed: bool) -> dict[str, float]:

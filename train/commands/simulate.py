@@ -26,9 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="trials of each object in each condition, instead of the scene's",
     )
-    parser.add_argument(
-        "--batch", type=int, default=1024, help="most trials simulated side by side"
-    )
+    parser.add_argument("--batch", type=int, default=400, help="most trials simulated side by side")
     parser.add_argument("--jobs", type=int, default=1, help="processes; -1 for all cores")
     parser.add_argument(
         "--backend", choices=("local", "dask"), default="local", help="where the batches run"
@@ -51,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.jobs == 0 or arguments.jobs < -1:
         raise InputError(f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}")
     if arguments.explain:
-        from train.simulate.explain import explain
+        from train.simulate.convergence import explain
 
         print(explain(scene))
     if arguments.out:
@@ -66,7 +64,6 @@ def run(arguments: argparse.Namespace) -> int:
                 arguments.out,
                 batch=arguments.batch,
                 jobs=arguments.jobs,
-                backend=arguments.backend,
                 address=arguments.address,
                 progress=bar.update,
             )

@@ -1,7 +1,5 @@
 """Kinematics of an arm, for many trials at once: arrays whose last axis is the trial."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.errors import InputError
 from edge.touch.arm import ZERO, Chain, Joint
 
 Array = NDArray[np.float64]
@@ -59,18 +56,10 @@ class Kinematics:
     """
 
     def __init__(self, chain: Chain) -> None:
-        """Split a chain.
-
-        Raises:
-            InputError: a joint slides.
-        """
+        """Split a chain, none of whose joints slides."""
         self.links: list[Link] = []
         fixed: list[Joint] = []
         for joint in chain.joints:
-            if joint.kind == "prismatic":
-                raise InputError(
-                    f"joint {joint.name!r} slides; the simulator's arms only turn: make it fixed"
-                )
             fixed.append(replace(joint, kind="fixed", translate=ZERO))
             if joint.kind != "fixed":
                 self.links.append(_link(fixed, np.array(joint.axis) / math.hypot(*joint.axis)))

@@ -1,14 +1,12 @@
 """The hooks of every trial: a soft arm that follows its equilibrium point, a bed of taxels, and the
 image of the load. Effects add hooks, or replace some of these (`plan`)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from edge.errors import InputError
-from train.simulate.arm import cross, dot
+from train.simulate.arm import Pose, cross, dot
 from train.simulate.contact import closed_form, covered, curve_gap, share_out, spring_loads
 from train.simulate.trials import Array, Index, Trials, pick, total
 
@@ -125,13 +123,13 @@ def locate(t: Trials, i: Index) -> None:
     t.compliance[0, i] = total(lever * lever * pick(t.give, i))
     t.y_frame[0, i] = dot(point - face, normal) + t.skin.radius_m
     t.jacobian[:, 0, i] = lever
-    keep_pose(t, i, q, point, pose.axes, pose.origins)
+    keep_pose(t, i, q, point, pose)
 
 
-def keep_pose(t: Trials, i: Index, q: Array, point: Array, axes: Array, origins: Array) -> None:
+def keep_pose(t: Trials, i: Index, q: Array, point: Array, pose: Pose) -> None:
     """Keep the arm's pose at the frame, for the effects."""
     t.q_frame[:, i], t.point[:, i] = q, point
-    t.axes[:, :, i], t.origins[:, :, i] = axes, origins
+    t.axes[:, :, i], t.origins[:, :, i] = pose.axes, pose.origins
 
 
 def predict(t: Trials, i: Index) -> None:

@@ -10,12 +10,9 @@ C = (c00, c01, c11) is the motion of y within the step for unit loads. A forearm
 has neither tilt nor moment.
 """
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
-from train.simulate.arm import Array
+from train.simulate.arm import Array, Places
 
 GRAVITY = 9.80665
 
@@ -48,7 +45,7 @@ def total(values: Array) -> Array:
     return np.asarray(np.add.accumulate(values, axis=0)[-1])
 
 
-def by_depth(gaps: Array, stiffness: Array) -> tuple[NDArray[np.intp], Array, Array]:
+def by_depth(gaps: Array, stiffness: Array) -> tuple[Places, Array, Array]:
     """Order, gaps and stiffness, (S, n) each, of springs sorted by their gaps."""
     order = gaps.argsort(axis=0, kind="stable")
     return order, np.take_along_axis(gaps, order, 0), np.take_along_axis(stiffness, order, 0)

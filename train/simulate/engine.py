@@ -5,8 +5,6 @@ trial ends a frame after as many steps as that frame has. So only the trials nea
 steps, and trials of different steps share one loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +14,20 @@ from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
 from train.simulate import streams
-from train.simulate.arm import Array
-from train.simulate.plan import ALL, FRAME, PACE, SAMPLE, SENSOR, SETUP, STEP, TUNE, Plan, make_plan
+from train.simulate.arm import Array, Places
+from train.simulate.plan import (
+    ALL,
+    FRAME,
+    PACE,
+    SAMPLE,
+    SENSOR,
+    SETUP,
+    STEP,
+    TUNE,
+    Plan,
+    make_plan,
+    module_of,
+)
 from train.simulate.readings import FULL, Readings
 from train.simulate.scene_model import Scene, TrialSpec, Value
 from train.simulate.schema import STIFFNESSES
@@ -41,16 +51,12 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
 
     A value that an object does not have, such as the mass of a fixed one, is NaN and never read.
     """
-    groups: dict[tuple[str, int], list[int]] = {}
-    for i, trial in enumerate(specs):
-        groups.setdefault((trial.key, trial.attempt), []).append(i)
+    streamed = [(trial.key, trial.attempt) for trial in specs]
     out: dict[str, Array] = {}
-    for members in groups.values():
-        where = np.array(members)
+    for group in dict.fromkeys(streamed):
+        members = [i for i, own in enumerate(streamed) if own == group]
         for name, drawn in _values(scene, [specs[i] for i in members]).items():
-            if name not in out:
-                out[name] = np.full(len(specs), np.nan)
-            out[name][where] = drawn
+            out.setdefault(name, np.full(len(specs), np.nan))[members] = drawn
     return out
 
 
@@ -58,31 +64,28 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     """The values of trials that share streams: same object, condition and number of redraws."""
     first, numbers = trials[0], np.array([trial.number for trial in trials])
     values = {**first.object.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m, **PLACED}
+    again = f".{first.attempt}" if first.attempt else ""
+
+    def drawn(name: str, kind: str) -> Array:
+        return streams.draws(scene.seed, name + again, first.key, numbers, kind)
+
     out: dict[str, Any] = {name: value.low for name, value in values.items()}
-
-    def draws(what: str, names: list[str], kind: str) -> Iterator[tuple[str, Array]]:
-        again = f".{first.attempt}" if first.attempt else ""
-        streamed = [f"{what}.{name}{again}" for name in names]
-        drawn = streams.draws(scene.seed, streamed, first.key, numbers, kind)
-        return zip(names, drawn, strict=True)
-
-    for name, part in draws("value", [n for n, v in values.items() if v.varies], "uniform"):
-        out[name] = out[name] + (values[name].high - values[name].low) * part
-    spreads = [name for name, deviation in scene.spread.items() if deviation]
-    for spread, away in draws("spread", spreads, "normal"):
-        away *= scene.spread[spread]
-        if spread in out:
-            out[spread] = out[spread] + away
-        for name in SCALED.get(spread, ()):
-            if name in out:
+    for name, value in values.items():
+        if value.high > value.low:
+            out[name] = value.low + (value.high - value.low) * drawn(f"value.{name}", "random")
+    for spread, deviation in scene.spread.items():
+        if deviation:
+            away = deviation * drawn(f"spread.{spread}", "standard_normal")
+            if spread in out:
+                out[spread] = out[spread] + away
+            for name in out.keys() & SCALED.get(spread, ()):
                 out[name] = out[name] * np.exp(away)
     return out
 
 
 def frame_count(scene: Scene) -> int:
     """Number of frames of a trial: the longest lead, the time after it, and the frame at t = 0."""
-    duration = scene.lead.high + scene.trials["after_s"]
-    return round(duration * scene.trials["rate_hz"]) + 1
+    return round((scene.lead.high + scene.trials["after_s"]) * scene.trials["rate_hz"]) + 1
 
 
 def begin(scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None) -> Trials:
@@ -92,28 +95,18 @@ def begin(scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = Non
         InputError: an object touches the arm before it moves.
     """
     t = Trials(scene, specs, values_of(scene, specs), plan or make_plan(scene, specs))
-    t.plan.run((*SETUP, *TUNE), t)
-    check_start(t)
-    return t
-
-
-def check_start(t: Trials) -> None:
-    """Check that no object bears force before the arm has moved.
-
-    Raises:
-        InputError: one does; the sentence names its first trial and the yaw of its face.
-    """
-    t.plan.run(FRAME, t)
+    t.plan.run((*SETUP, *TUNE, *FRAME), t)
     t.y[:], t.compliance[:] = t.y_frame, 0.0
     held = t.ask(ALL, t.y[0], t.compliance[0])[0] > 0.0
     if held.any():
         i = int(np.argmax(held))
         trial, yaw = t.specs[i], abs(t.values["yaw_deg"][i])
         raise InputError(
-            f"{t.scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
+            f"{scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
             f"trial {trial.number} of {trial.key}, where the face is turned by {yaw:.0f} degrees; "
             "give spread.yaw_deg or the object's width_m less, or trials.lead_s more time"
         )
+    return t
 
 
 @dataclass(frozen=True)
@@ -139,11 +132,7 @@ class PhysicsRun:
 
 
 def run_physics(
-    scene: Scene,
-    specs: tuple[TrialSpec, ...],
-    *,
-    plan: Plan | None = None,
-    images: bool = True,
+    scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None, images: bool = True
 ) -> PhysicsRun:
     """The physics of trials run side by side, each with the same bits as it has alone.
 
@@ -158,17 +147,19 @@ def run_physics(
     t = begin(scene, specs, plan=plan)
     frames = frame_count(scene)
     joints, force = np.empty((t.n, frames, len(t.q))), np.zeros((t.n, frames))
-    sources = {"depth_m": (t, "deepest"), **t.plan.traces(t.own)}
+    sources: dict[str, tuple[Any, str]] = {"depth_m": (t, "deepest")}
+    for effect in t.plan.calls:
+        for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
+            sources[name] = t.own[effect], attribute
     traces = {name: np.zeros((t.n, frames)) for name in sources}
     window = np.zeros((t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32)
     joints[:, 0] = t.q.T
     scale, active = scene.skin.counts_per_newton, np.arange(t.n)
-    running: Any = ALL
     while active.size:
         starts = active[t.left[active] == 0]
         if starts.size:
             start_frames(t, starts)
-        t.plan.run(STEP, t, running)
+        t.plan.run(STEP, t, active)
         t.left[active] -= 1
         ends = active[t.left[active] == 0]
         if not ends.size:
@@ -177,7 +168,7 @@ def run_physics(
         k = t.frame[ends]
         # A frame ends at its own time: sums of steps would drift from it.
         t.t[ends] = k / t.rate_hz
-        t.plan.run(SAMPLE, t, some_of(t, ends))
+        t.plan.run(SAMPLE, t, ends)
         joints[ends, k] = t.q.T[ends]
         force[ends, k] = t.force[ends]
         for name, (owner, field) in sources.items():
@@ -188,41 +179,26 @@ def run_physics(
             window[ends[touched], k[touched]] = np.moveaxis(np.minimum(counts, FULL), -1, 0)
         if (k == frames - 1).any():
             active = active[t.frame[active] < frames - 1]
-            running = active
-    check_found(t)
+    if t.lost.any():
+        raise EdgeError(
+            f"{scene.name}: the forearm's tilt was not found in {np.count_nonzero(t.lost)} "
+            "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+        )
     times = np.arange(frames) / scene.trials["rate_hz"]
     check_energy(t, joints, times)
     return PhysicsRun(times, joints, force, traces, window, t)
 
 
-def some_of(t: Trials, i: NDArray[np.intp]) -> Any:
-    """An index of trials: `ALL` where it holds all of them."""
-    return ALL if len(i) == t.n else i
-
-
-def start_frames(t: Trials, starts: NDArray[np.intp]) -> None:
+def start_frames(t: Trials, starts: Places) -> None:
     """Choose the step of some trials' next frame, and locate their contacts."""
     before = t.steps[starts]
-    t.plan.run(PACE, t, some_of(t, starts))
+    t.plan.run(PACE, t, starts)
     changed = starts[t.steps[starts] != before]
     if changed.size:
         t.h[changed] = 1.0 / (t.rate_hz * t.steps[changed])
-        t.plan.run(TUNE, t, some_of(t, changed))
-    t.plan.run(FRAME, t, some_of(t, starts))
+        t.plan.run(TUNE, t, changed)
+    t.plan.run(FRAME, t, starts)
     t.left[starts] = t.steps[starts]
-
-
-def check_found(t: Trials) -> None:
-    """Check that the solver found the loads of every contact.
-
-    Raises:
-        EdgeError: it did not; the sentence gives the number of trials.
-    """
-    if t.lost.any():
-        raise EdgeError(
-            f"{t.scene.name}: the forearm's tilt was not found in {np.count_nonzero(t.lost)} "
-            "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
-        )
 
 
 def check_energy(t: Trials, joints: Array, times: Array) -> None:
@@ -265,9 +241,7 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
 
 
 def readings(
-    physics: PhysicsRun,
-    which: NDArray[np.intp] | None = None,
-    scene: Scene | None = None,
+    physics: PhysicsRun, which: Places | None = None, scene: Scene | None = None
 ) -> Iterator[Readings]:
     """The sensor readings of a run's trials, trial by trial.
 
@@ -298,25 +272,3 @@ def readings(
                 if call.which[i]:
                     call.function(seen)
         yield seen
-
-
-@dataclass(frozen=True)
-class Batch(PhysicsRun):
-    """The physics of n trials with their readings; `joints` are those that the clock shows.
-
-    Attributes:
-        counts: (n, frames, rows, cols) uint16.
-        seen: the readings of each trial.
-    """
-
-    counts: NDArray[np.uint16]
-    seen: list[Readings]
-
-
-def run_batch(scene: Scene, specs: tuple[TrialSpec, ...], **options: Any) -> Batch:
-    """The physics and the readings of trials; options as of `run_physics`."""
-    physics = run_physics(scene, specs, **options)
-    seen = list(readings(physics))
-    counts = np.stack([reading.frames() for reading in seen])
-    joints = np.stack([reading.joints for reading in seen])
-    return Batch(**{**vars(physics), "joints": joints}, counts=counts, seen=seen)

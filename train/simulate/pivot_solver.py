@@ -7,15 +7,13 @@ is the answer. Newton's method finds it in a few rounds, with the Hessian of the
 slope takes over.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from train.simulate.arm import Array
+from train.simulate.arm import Array, Mask
 from train.simulate.contact import total
 from train.simulate.plan import Index
 from train.simulate.trials import pick
@@ -49,13 +47,6 @@ class Loads(NamedTuple):
     rows: Array
 
 
-def determinant(c: Array) -> Array:
-    """(n,) the determinant of C (3, n), and 0 where it is only rounding error: an arm of one joint
-    pushes and tilts in one motion, so its C has no inverse."""
-    det = c[0] * c[2] - c[1] * c[1]
-    return np.where(det > NO_DIGITS * c[0] * c[2], det, 0.0)
-
-
 @dataclass(frozen=True)
 class Pivots:
     """Contacts of n pivoting forearms, whose loads must satisfy y = free - C (F, M).
@@ -69,7 +60,6 @@ class Pivots:
             which the face draws back there, metres from the contact's middle.
         gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load (`viscous`).
         free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in them.
-        det: (n,) the determinant of C, from `determinant`.
     """
 
     at: Index
@@ -83,13 +73,20 @@ class Pivots:
     load: Array | float
     free: Array
     c: Array
-    det: Array
+
+    @cached_property
+    def det(self) -> Array:
+        """(n,) the determinant of C, and 0 where it is only rounding error: an arm of one joint
+        pushes and tilts in one motion, so its C has no inverse."""
+        det = self.c[0] * self.c[2] - self.c[1] * self.c[1]
+        return np.where(det > NO_DIGITS * self.c[0] * self.c[2], det, 0.0)
 
     def loads(self, y: Array) -> Loads:
         """The loads of the springs at coordinates y (2, n)."""
         depth = y[0] + self.lever * y[1] - self.line_gap
         deep = max(1, int(np.searchsorted(self.nearest, depth.max(initial=0.0))))
-        inside = np.maximum(depth - pick(self.gaps[:deep], self.at), 0.0)
+        inside = depth - pick(self.gaps[:deep], self.at)
+        np.maximum(inside, 0.0, out=inside)
         touched = (inside > 0.0) * pick(self.stiffness[:deep], self.at)
         np.multiply(inside, touched, out=inside)
         force, held = total(inside), total(touched)
@@ -114,16 +111,15 @@ class Pivots:
         force, moment, k, mean, spread, _ = loads
         r0 = y[0] - self.free[0] + (c00 * force + c01 * moment)
         r1 = y[1] - self.free[1] + (c01 * force + c11 * moment)
-        det_c = self.det
         b01 = c01 + mean * c11
         b00 = c00 + mean * (c01 + b01)
         r = r0 + mean * r1
         first, second = 1.0 + c11 * spread, 1.0 + b00 * k
-        det = 1.0 + b00 * k + c11 * spread + det_c * k * spread
+        det = 1.0 + b00 * k + c11 * spread + self.det * k * spread
         p0 = (first * r - b01 * spread * r1) / det
         p1 = (second * r1 - b01 * k * r) / det
         p = np.array([p0 - mean * p1, p1])
-        single = (det_c == 0.0) & (c00 > 0.0)
+        single = (self.det == 0.0) & (c00 > 0.0)
         if single.any():
             # Such an arm moves along one line, with one stiffness along it.
             lean = c01 / np.where(single, c00, 1.0)
@@ -132,12 +128,11 @@ class Pivots:
             p = np.where(single, np.array([p0, lean * p0]), p)
         return p
 
-    def arm(self, y: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def arm(self, y: Array) -> tuple[Array, Mask]:
         """The loads of the arm at y, and (n,) whether C has an inverse that gives both of them."""
         c00, c01, c11 = self.c
-        det = self.det
-        invertible, d = det > 0.0, self.free - y
-        divisor = np.where(invertible, det, 1.0)
+        invertible, d = self.det > 0.0, self.free - y
+        divisor = np.where(invertible, self.det, 1.0)
         loads = np.array([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / divisor
         return loads, invertible
 
@@ -162,16 +157,11 @@ class Pivots:
         return np.where(force > 0.0, np.array([force, moment]), 0.0)
 
 
-class Answer(NamedTuple):
-    """The loads (2, n), the force on each row (rows, n), and (n,) whether the search failed."""
-
-    loads: Array
-    rows: Array
-    lost: NDArray[np.bool_]
-
-
-def search(pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS) -> Answer:
-    """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of them.
+def search(
+    pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS
+) -> tuple[Array, Array, Mask]:
+    """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of them; the
+    force on each row (rows, n), and (n,) whether the search failed.
 
     The slope of the energy rises steadily along a step. Where it ends uphill by more than half of
     its value at the start, the step is cut back along its secant.
@@ -191,7 +181,7 @@ def search(pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS) -
             p = p * _cut(pivots, y, loads, p)
         y = y - p
         loads = pivots.loads(y)
-    return Answer(pivots.agreed(y, loads), loads.rows, searching)
+    return pivots.agreed(y, loads), loads.rows, searching
 
 
 def _cut(contacts: Pivots, at: Array, loads: Loads, p: Array) -> Array:

@@ -5,19 +5,17 @@ only where a trial calls for it. Each hook gets the trials and the index of thos
 effect. `base` has the hooks of all trials, which run first in their stage.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import InputError
+from train.simulate.arm import Mask
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
-from train.simulate.schema import EFFECTS, FAMILIES, IMPLIED_BY_CONDITION, SHARED
+from train.simulate.schema import EFFECTS, FAMILIES, SHARED
 
 Index = Any
 """Some of the trials: an array of their places, or `ALL`."""
@@ -70,7 +68,7 @@ class Call:
 
     owner: str
     function: Callable[..., Any]
-    which: NDArray[np.bool_]
+    which: Mask
 
     def __post_init__(self) -> None:
         """Prepare the index of these trials."""
@@ -88,11 +86,12 @@ class Plan:
     """
 
     effects: tuple[tuple[str, ...], ...]
-    calls: dict[str, NDArray[np.bool_]]
+    calls: dict[str, Mask]
     stages: dict[str, list[Call]]
 
     def run(self, stages: tuple[str, ...], trials: Any, i: Index = ALL) -> None:
         """Run the hooks of stages for some of the trials."""
+        i = ALL if i is not ALL and len(i) == trials.n else i
         for stage in stages:
             for call in self.stages[stage]:
                 if call.index is ALL:
@@ -102,15 +101,7 @@ class Plan:
                 if some.size:
                     call.function(trials, some)
 
-    def traces(self, own: dict[str, Any]) -> dict[str, tuple[Any, str]]:
-        """{name: (an effect's state, its attribute)} of the values kept for every frame."""
-        return {
-            name: (own[effect], attribute)
-            for effect in self.calls
-            for name, attribute in getattr(module_of(effect), "TRACES", {}).items()
-        }
-
-    def also(self, effect: str, i: Index) -> NDArray[np.bool_]:
+    def also(self, effect: str, i: Index) -> Mask:
         """Whether each of the trials i calls for an effect."""
         if effect in self.calls:
             return self.calls[effect][i]
@@ -133,7 +124,7 @@ def make_plan(scene: Scene, specs: tuple[TrialSpec, ...]) -> Plan:
 
 def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     """The plan of trials, given the effects of each."""
-    calls: dict[str, NDArray[np.bool_]] = {}
+    calls: dict[str, Mask] = {}
     for name in (*SHARED, *EFFECTS):
         wanted = {name, *SHARED.get(name, ())}
         mask = np.array([not wanted.isdisjoint(own) for own in effects])
@@ -155,42 +146,28 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     return Plan(effects, calls, stages)
 
 
-def settings(scene: Scene, effect: str) -> dict[str, float]:
-    """An effect's settings in a scene, with defaults."""
-    defaults = {k: float(f.default or 0.0) for k, f in EFFECTS[effect].settings.items()}
-    return {**defaults, **scene.settings.get(effect, {})}
-
-
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
     """{effect: the reason for it} of an object in a condition, in the order of `EFFECTS`."""
-    required: dict[str, str] = {}
-    for name in FAMILIES[item.family].effects:
-        required[name] = f"family {item.family}"
-    for name in IMPLIED_BY_CONDITION.get(condition, ()):
-        required[name] = condition
+    required = dict.fromkeys(FAMILIES[item.family].effects, f"family {item.family}")
     for name, info in EFFECTS.items():
-        if info.keys and item.given.issuperset(info.keys):
+        if info.condition == condition:
+            required[name] = condition
+        elif info.keys and item.given.issuperset(info.keys):
             required[name] = " and ".join(info.keys)
-    for name in scene.add:
-        if name not in required and _supports(item, condition, name):
+        elif name in scene.add and name not in required and _supports(item, condition, name):
             required[name] = "effects.add"
     for name in scene.leave_out:
         required.pop(name, None)
-    while True:
-        gone = [n for n in required if not required.keys() >= {*EFFECTS[n].needs}]
-        if not gone:
-            return {name: required[name] for name in EFFECTS if name in required}
+    while gone := [n for n in required if not required.keys() >= {*EFFECTS[n].needs}]:
         for name in gone:
-            required.pop(name, None)
+            del required[name]
+    return {name: required[name] for name in EFFECTS if name in required}
 
 
 def _supports(item: SceneObject, condition: str, name: str) -> bool:
     info = EFFECTS[name]
-    if info.families and item.family not in info.families:
-        return False
-    if any(name in names and condition != c for c, names in IMPLIED_BY_CONDITION.items()):
-        return False
-    return item.values.keys() >= {*info.keys}
+    suits = not info.families or item.family in info.families
+    return suits and info.condition in ("", condition) and item.values.keys() >= {*info.keys}
 
 
 def check_supported(scene: Scene, where: str) -> None:
@@ -202,7 +179,7 @@ def check_supported(scene: Scene, where: str) -> None:
     for name in scene.leave_out:
         for item in scene.objects:
             yields = name in FAMILIES[item.family].effects[:1]
-            if yields or (name == "sliding" and "movable" in item.conditions):
+            if yields or EFFECTS[name].condition in item.conditions:
                 raise InputError(
                     f"{where}: effects.leave_out leaves out {name}, without which object "
                     f"{item.name!r} would not be {'soft' if yields else 'movable'}, as its label "
@@ -224,8 +201,8 @@ def check_supported(scene: Scene, where: str) -> None:
             needs.append(f"an object of family {' or '.join(info.families)}")
         if info.keys:
             needs.append(f"an object with {' and '.join(info.keys)}")
-        if name == "sliding":
-            needs.append("a movable object")
+        if info.condition:
+            needs.append(f"a {info.condition} object")
         needs += [f"the effect {need}" for need in info.needs]
         raise InputError(
             f"{where}: effects.add names {name}, which this scene cannot support: "

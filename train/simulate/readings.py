@@ -1,7 +1,5 @@
 """A trial's sensor readings on the way from the load to whole counts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from train.simulate import streams
-from train.simulate.arm import Array
-from train.simulate.plan import settings
+from train.simulate.arm import Array, Mask, Places
 from train.simulate.scene_model import Scene, TrialSpec
 
 FULL = 65535.0
@@ -44,20 +41,16 @@ class Readings:
     which: int
     t: Array
     counts: NDArray[Any]
-    taxels: NDArray[np.intp]
+    taxels: Places
     joints: Array
     times: Array | None = None
-    kept: NDArray[np.bool_] | None = None
-    valid: NDArray[np.bool_] | None = None
+    kept: Mask | None = None
+    valid: Mask | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
         """The skin's rows and columns."""
         return self.scene.skin.rows, self.scene.skin.cols
-
-    def settings(self, effect: str) -> dict[str, float]:
-        """An effect's settings."""
-        return settings(self.scene, effect)
 
     def stream(self, effect: str) -> np.random.Generator:
         """An effect's random numbers in this trial."""

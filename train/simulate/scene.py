@@ -1,24 +1,23 @@
 """Reads and checks a scene's TOML file: arm, motion, skin, objects, trials, spreads and effects."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
 from edge.skin.file import shipped
 from edge.touch.arm import Chain
 from train.simulate import schema
-from train.simulate.arm import Kinematics
-from train.simulate.families import draw_family
+from train.simulate.contact import GRAVITY
 from train.simulate.plan import check_supported
 from train.simulate.scene_model import Cylinder, Scene, SceneObject, SceneTable, Value
-from train.simulate.schema import EFFECTS, OBJECT
-from train.simulate.streams import FARTHEST
+from train.simulate.schema import EFFECTS, OBJECT, Field
+from train.simulate.streams import FARTHEST, stream
 
 CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
@@ -33,6 +32,11 @@ gains above give the lab arm's 115 N/m at mid-forearm."""
 PLACE_M = 0.103
 """The middle of Cody's 16 rows, rounded to a millimetre."""
 
+PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
+DRAWS = 1000
+PRESSED_M = 0.06
+"""How deep the forearm presses a soft object early enough to move it within the window [derived]:
+the arm moves 0.15 m in a second, and gives way itself."""
 CODY_SKIN: dict[str, Any] = dict(read_toml(shipped()).raw["skin"])
 del CODY_SKIN["name"]
 
@@ -140,16 +144,14 @@ def _arm(table: SceneTable) -> dict[str, Any]:
     """The chain, and each joint's stiffness, damping and inertia, which may be unknown."""
     name = table.text("chain", "cody")
     path = Path(table.where).parent / name
-    if name == "cody":
-        chain = Chain.cody()
-    elif path.suffix == ".urdf":
-        chain = Chain.from_urdf(path, table.text("base"), table.text("tip"))
-    else:
-        chain = Chain.from_toml(path)
-    try:
-        Kinematics(chain)
-    except InputError as error:
-        raise InputError(f"{table.called('chain')}: {error}") from None
+    links = {key: table.text(key) for key in ("base", "tip") if path.suffix == ".urdf"}
+    chain = Chain.cody() if name == "cody" else Chain.from_file(path, **links)
+    for joint in chain.joints:
+        if joint.kind == "prismatic":
+            raise InputError(
+                f"{table.called('chain')}: joint {joint.name!r} slides; the simulator's arms only "
+                "turn: make it fixed"
+            )
     out: dict[str, Any] = {"arm": chain}
     for field, key, cody, absent in (
         ("stiffness", "stiffness_nm_rad", CODY_STIFFNESS, REQUIRED),
@@ -179,8 +181,8 @@ def _motion(table: SceneTable, chain: Chain, skin: Cylinder, lead: Value) -> dic
                 raise table.fail(f"start_deg of {joint}", f"{low:g} to {high:g}", angle)
     travel_s = table.number("travel_s", 1e6, 0.0, 1e6, open_low=True)
     last_m = _last_row_m(skin)
-    middle_m = 0.5 * (last_m + skin.row0_z_m)
-    usual_m = PLACE_M if last_m <= PLACE_M <= skin.row0_z_m else middle_m
+    covered = last_m <= PLACE_M <= skin.row0_z_m
+    usual_m = PLACE_M if covered else 0.5 * (last_m + skin.row0_z_m)
     place_m = table.number("place_m", usual_m, last_m, skin.row0_z_m)
     table.done()
     start, rate = (tuple(map(math.radians, degrees)) for degrees in (start, rate))
@@ -298,3 +300,69 @@ def _effects(table: SceneTable) -> dict[str, Any]:
     for name in set(add) & set(leave_out):
         raise table.fail("leave_out", f"a list without {name}, which effects.add adds")
     return {"add": add, "leave_out": leave_out, "settings": settings}
+
+
+def draw_family(
+    table: SceneTable, seed: int, push_n: float, skin: Cylinder
+) -> Iterator[dict[str, Any]]:
+    """The objects of one [[family]], as [[object]] tables.
+
+    Each object draws every range of the family once, uniformly in its logarithm (uniformly where
+    the range begins at 0), from a stream of the family's name. `kinetic_part` gives
+    `friction_kinetic`. An object that may be movable is drawn again until `push_n` newtons, or the
+    force that it passes on to its foot if that is less, move it. A family may give its own
+    `push_n`.
+
+    Raises:
+        InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
+    """
+    name = table.text("name")
+    family = table.choice("family", tuple(schema.FAMILIES))
+    conditions = table.names("conditions", schema.CONDITIONS)
+    count = table.whole("count", allowed=range(1, 1001))
+    part = table.value("kinetic_part", PART, [0.8, 0.95])
+    push_n = table.field("push_n", schema.LABELS["push_n"], push_n)
+    given = [key for key in schema.keys_of(family) if key != "friction_kinetic" and table.has(key)]
+    table.done()
+    # The draws follow the order of the keys in the file.
+    ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in given}
+    movable = "movable" in conditions
+    shared = {"family": family, "conditions": list(conditions)}
+    usual = {key: default for key, default in schema.keys_of(family).items() if default is not None}
+    generator = stream(seed, "family", name)
+    for number in range(count):
+        for _ in range(DRAWS):
+            drawn = {key: _draw(generator, value) for key, value in ranges.items()}
+            if "friction_static" in drawn:
+                drawn["friction_kinetic"] = drawn["friction_static"] * _draw(generator, part)
+            floor = drawn.get("friction_static", 0.0)
+            hold = floor * drawn.get("mass_kg", 0.0) * GRAVITY
+            # Through skin friction the push may also press the object down.
+            level = 1.0 - floor * drawn.get("skin_friction", 0.0)
+            if not movable or hold <= level * min(push_n, passed_on({**usual, **drawn}, skin)):
+                break
+        else:
+            wanted = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
+            raise table.fail("mass_kg", wanted)
+        counts = {key: round(value) for key, value in drawn.items() if OBJECT[key].whole}
+        yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **counts}
+
+
+def passed_on(drawn: Mapping[str, float], skin: Cylinder) -> float:
+    """Newtons that an object passes on to its foot: the force that presses its stems or its elastic
+    layer (`effects.foundation`) `PRESSED_M` deep; infinite for other objects."""
+    if "stem_n_m" in drawn:
+        return round(drawn["stem_count"]) * drawn["stem_n_m"] * PRESSED_M
+    if "modulus_pa" in drawn:
+        length = min(drawn["width_m"], skin.rows * skin.pitch[0])
+        half_width = math.sqrt(2.0 * skin.radius_m * PRESSED_M)
+        per_length = 4.0 / 3.0 * drawn["modulus_pa"] / drawn["depth_m"] * PRESSED_M * half_width
+        return length * per_length
+    return math.inf
+
+
+def _draw(generator: np.random.Generator, value: Value) -> float:
+    low, high, part = value.low, value.high, generator.random()
+    if low <= 0.0:
+        return low + (high - low) * part
+    return math.exp(math.log(low) + (math.log(high) - math.log(low)) * part)

@@ -1,7 +1,5 @@
 """A checked scene: its objects, the values that its trials share, and the table it is read from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,7 +8,7 @@ from edge.config import ConfigTable
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from train.simulate.arm import Kinematics
-from train.simulate.schema import Field
+from train.simulate.schema import EFFECTS, Field
 
 
 @dataclass(frozen=True)
@@ -24,11 +22,6 @@ class Value:
     def middle(self) -> float:
         """The value halfway between the limits."""
         return 0.5 * (self.low + self.high)
-
-    @property
-    def varies(self) -> bool:
-        """Whether each trial draws its own."""
-        return self.high > self.low
 
 
 class SceneTable(ConfigTable):
@@ -155,3 +148,7 @@ class Scene:
     def count(self) -> int:
         """Number of trials of each object in each condition."""
         return int(self.trials["count"])
+
+    def setting(self, effect: str, key: str) -> float:
+        """A setting of an effect, or its default."""
+        return self.settings.get(effect, {}).get(key, EFFECTS[effect].settings[key].default or 0.0)

@@ -1,7 +1,5 @@
 """The keys of a scene file with their limits and defaults, and the table of all effects."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 
@@ -31,6 +29,8 @@ class Effect:
     """Object families that can have it; empty for all."""
     keys: tuple[str, ...] = ()
     """Object keys that it needs; an object with all of them calls for it."""
+    condition: str = ""
+    """The condition whose objects call for it, and no others can."""
 
 
 CONDITIONS = ("fixed", "movable")
@@ -153,7 +153,7 @@ EFFECTS: dict[str, Effect] = {
         {"shear_n_m": Field(0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True)},
         keys=("skin_friction",),
     ),
-    "sliding": Effect("contact"),
+    "sliding": Effect("contact", condition="movable"),
     "slope": Effect("contact", needs=("sliding",), keys=("slope_deg",)),
     "turning": Effect("contact", needs=("sliding",), keys=("aside_m", "foot_m")),
     "stribeck": Effect("contact", needs=("sliding",), keys=("stribeck_m_s",)),
@@ -176,6 +176,5 @@ EFFECTS: dict[str, Effect] = {
     "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02, "of all frames")}),
 }
 STEP = Field(1e-6, 1.0, None, "the physics' step")
-IMPLIED_BY_CONDITION = {"movable": ("sliding",)}
 SHARED = {"viscous": ("relaxation", "inertia")}
 """{module of `effects`: the effects that share it}."""

@@ -1,13 +1,13 @@
 """Random numbers in one stream for each name, condition and trial."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
+
+from train.simulate.arm import Places
 
 FARTHEST = 2.5
 """Largest distance of a normal draw from the mean, in deviations."""
@@ -31,19 +31,16 @@ def stream(seed: int, name: str, condition: str, trial: int | None = None) -> np
 
 
 def draws(
-    seed: int, names: list[str], condition: str, trials: NDArray[np.int64], kind: str
+    seed: int, name: str, condition: str, trials: NDArray[np.int64], kind: str
 ) -> NDArray[np.float64]:
-    """(names, n) draws: for each name, the trial-th number of the condition's stream.
+    """(n,) draws: the trial-th number of the condition's stream.
 
     Args:
         trials: (n,) trial numbers, 0 and up.
-        kind: `uniform` on [0, 1), or `normal` of mean 0 and deviation 1, cut at `FARTHEST`.
+        kind: `random` on [0, 1), or `standard_normal`, cut at `FARTHEST`.
     """
-    drawn = np.empty((len(names), int(trials.max()) + 1))
-    for row, name in zip(drawn, names, strict=True):
-        generator = stream(seed, name, condition)
-        (generator.random if kind == "uniform" else generator.standard_normal)(out=row)
-    return np.clip(drawn, -FARTHEST, FARTHEST)[:, trials]
+    drawn = getattr(stream(seed, name, condition), kind)(int(trials.max()) + 1)
+    return np.asarray(np.clip(drawn, -FARTHEST, FARTHEST)[trials])
 
 
 @cache
@@ -58,7 +55,7 @@ def add_drawn(
     generator: np.random.Generator,
     table: NDArray[np.float32],
     to: NDArray[np.float32],
-    places: NDArray[np.intp],
+    places: Places,
     length: int,
 ) -> None:
     """Add to each number an entry of a table of 65,536 (`quantiles`), chosen by 16 random bits.

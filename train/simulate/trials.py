@@ -1,17 +1,15 @@
 """The state of trials that run side by side, in arrays whose last axis is the trial."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.simulate.arm import Array, Kinematics, Mask, Places
+from train.simulate.arm import Array, Mask, Places
 from train.simulate.contact import bed_law, by_depth, total
-from train.simulate.plan import ALL, Index, Plan, settings
-from train.simulate.scene_model import Cylinder, Scene, TrialSpec
+from train.simulate.plan import ALL, Index, Plan
+from train.simulate.scene_model import Scene, TrialSpec
 
 __all__ = ["ALL", "Array", "Index", "Mask", "Places", "Trials", "pick", "total"]
 WINDOW_HALF = 6
@@ -79,6 +77,7 @@ class Trials:
 
     def __post_init__(self) -> None:
         """Fill the attributes above with zeros."""
+        self.skin, self.kinematics = self.scene.skin, self.scene.kinematics
         skin, n, dof = self.skin, len(self.specs), len(self.scene.stiffness)
         rate_hz, zeros = self.scene.trials["rate_hz"], np.zeros
         self.n, self.rate_hz = n, rate_hz
@@ -108,20 +107,6 @@ class Trials:
         self.soft, self.z, self.taxel_k, self.force, self.deepest, self.inside = zeros((6, n))
         self.image = zeros((skin.rows, window, n))
 
-    @property
-    def skin(self) -> Cylinder:
-        """The skin's shape."""
-        return self.scene.skin
-
-    @property
-    def kinematics(self) -> Kinematics:
-        """The arm's."""
-        return self.scene.kinematics
-
-    def settings(self, effect: str) -> dict[str, float]:
-        """An effect's settings."""
-        return settings(self.scene, effect)
-
     def keep(self, effect: str, state: type[Any], **given: Any) -> Any:
         """Keep an effect's state, a dataclass; an array that is not given is (n,) zeros."""
         empty = {field.name: np.zeros(self.n) for field in fields(state)}
@@ -140,7 +125,7 @@ class Trials:
         self.gaps = np.concatenate([self.gaps, more])
         self.stiffness = np.concatenate([self.stiffness, added])
 
-    def obey(self, i: Index, gaps: Array, stiffness: Array) -> NDArray[np.intp]:
+    def obey(self, i: Index, gaps: Array, stiffness: Array) -> Places:
         """Give some trials the law of springs (E, n of i); returns the springs' order by depth."""
         order, gaps, stiffness = by_depth(gaps, stiffness)
         short = len(gaps) - len(self.law_gaps)

@@ -5,16 +5,14 @@ in which labels are judged; the paper's did ("For an object to be considered mov
 experiments, it needed to be moved by the robot's stereotyped motion", section IV-C).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import InputError
+from train.simulate.arm import Places
 from train.simulate.engine import PhysicsRun, run_physics
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import FAMILIES
@@ -42,38 +40,36 @@ class Contradiction:
 
 def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     """For each trial of a run, how it contradicts its label, or None."""
-    trials, scene = physics.trials, physics.trials.scene
-    labels, touched = scene.labels, physics.force > 0.0
-    onset, every = np.argmax(touched, axis=1), np.arange(len(touched))
-    ever = touched[every, onset]
-    last = onset + round(labels["window_s"] * scene.trials["rate_hz"])
+    trials, labels, touched = physics.trials, physics.trials.scene.labels, physics.force > 0.0
+    onset, every = np.argmax(touched, axis=1), np.arange(trials.n)
+    last = onset + round(labels["window_s"] * trials.rate_hz)
     last = np.minimum(last, touched.shape[1] - 1)
 
     def by_then(name: str) -> Any:
-        return np.maximum.accumulate(physics.traces[name], axis=1)[every, last]
+        trace = physics.traces.get(name, np.zeros(touched.shape))
+        return np.maximum.accumulate(trace, axis=1)[every, last]
 
-    depth = by_then("depth_m")
-    slide = by_then("slide_m") if "slide_m" in physics.traces else np.zeros(len(depth))
+    depth, slide = by_then("depth_m"), by_then("slide_m")
     out: list[Contradiction | None] = []
     for i, trial in enumerate(trials.specs):
+        key = FAMILIES[trial.object.family].thickness
+        thickness = trials.values[key][i] if key else 0.0
         label, what = trial.condition, ""
-        if not ever[i]:
+        if not touched[i, onset[i]]:
             what = "was never touched"
             remedy = "let [motion] reach it, and turn the skin's columns to it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
             what = f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             remedy = "lower its mass_kg or its friction, or leave movable out of its conditions"
-        elif key := FAMILIES[trial.object.family].thickness:
-            thickness = trials.values[key][i]
-            if depth[i] < labels["yields"] * thickness:
-                label = "soft"
-                what = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
-                remedy = "lower its stiffness, or labels.yields"
-        if what:
-            cut, longer = _cut_short(physics, i, physics.t[onset[i]] if ever[i] else 0.0)
-            out.append(Contradiction(label, what + cut, longer + remedy))
-        else:
+        elif depth[i] < labels["yields"] * thickness:
+            label = "soft"
+            what = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
+            remedy = "lower its stiffness, or labels.yields"
+        if not what:
             out.append(None)
+            continue
+        cut, longer = _cut_short(physics, i, physics.t[onset[i]])
+        out.append(Contradiction(label, what + cut, longer + remedy))
     return out
 
 
@@ -82,22 +78,18 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
     trials = physics.trials
     scene, moves = trials.scene, trials.rate[:, 0] != 0.0
     stroke_s = float(trials.travel_s[moves, i].max())
-    left_s, stroke_left_s = physics.t[-1] - onset_s, stroke_s - onset_s
-    if min(left_s, stroke_left_s) >= scene.labels["window_s"]:
+    ends_s = min(physics.t[-1], stroke_s)
+    if ends_s - onset_s >= scene.labels["window_s"]:
         return "", ""
-    if left_s <= stroke_left_s:
-        ended = f", and the trial ended {left_s:.2f} s after the touch"
-        return ended, "give trials.after_s more, or "
-    remedy = "motion.travel_s more time"
-    if stroke_s < scene.travel_s:
-        remedy = "motion.start_deg more room before the joint's limit"
-    ended = f", as the arm's stroke ended {stroke_left_s:.2f} s after the touch"
-    return ended, f"give {remedy}, or "
+    ended = f"ended {ends_s - onset_s:.2f} s after the touch"
+    if ends_s < stroke_s:
+        return f", and the trial {ended}", "give trials.after_s more, or "
+    short = stroke_s < scene.travel_s
+    remedy = "start_deg more room before the joint's limit" if short else "travel_s more time"
+    return f", as the arm's stroke {ended}", f"give motion.{remedy}, or "
 
 
-def true_runs(
-    scene: Scene, specs: tuple[TrialSpec, ...]
-) -> Iterator[tuple[PhysicsRun, NDArray[np.intp]]]:
+def true_runs(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[PhysicsRun, Places]]:
     """Runs of trials, and which trials of each run fit their labels.
 
     Each trial fits its label in exactly one of the runs; its draws depend on nothing but itself.

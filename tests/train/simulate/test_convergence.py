@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tests.train.simulate.scenes import make, one_object
-from train.simulate.convergence import measure
+from train.simulate.convergence import kinds, measure
 from train.simulate.engine import run_physics
-from train.simulate.run import kinds
 
 OBJECTS = (
     ("fixed", {}, ()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate.effects import tilt
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, determinant, search
+from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, search
 from train.simulate.plan import ALL
 from train.simulate.scene_model import Value
 
@@ -30,7 +31,7 @@ def test_newton_on_the_tilt_needs_its_line_search():
 def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
     hard = replace(make(one_object(width_m=0.05), "tilt"), taxel_n_m=Value(1e8, 1e8))
     assert run(hard).force.max() > 0.0
-    monkeypatch.setattr(tilt, "GUARDED_ROUNDS", 0)
+    monkeypatch.setattr(tilt, "search", partial(search, guarded_rounds=0))
     with pytest.raises(EdgeError, match="tilt was not found in 2 trials"):
         run(hard)
 
@@ -93,10 +94,9 @@ def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
     gaps = springs.gaps
     beds = (ALL, gaps[:, None], springs.stiffness[:, None], gaps.min(axis=1))
     rows = (springs.weight, springs.line_gap, springs.lever)
-    c = np.array(c)
-    pivots = Pivots(*beds, *rows, 1.0, 0.0, np.array(free), c, determinant(c))
-    found = search(pivots, np.zeros((2, n)), guarded_rounds)
-    return SimpleNamespace(force=found.loads[0], moment=found.loads[1], lost=found.lost)
+    pivots = Pivots(*beds, *rows, 1.0, 0.0, np.array(free), np.array(c))
+    (force, moment), _, lost = search(pivots, np.zeros((2, n)), guarded_rounds)
+    return SimpleNamespace(force=force, moment=moment, lost=lost)
 
 
 def tilt_error(springs, free, c, loads):

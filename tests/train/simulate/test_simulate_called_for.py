@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
+from tests.train.simulate.scenes import run_batch
 from train.simulate import streams
-from train.simulate.engine import run_batch, values_of
+from train.simulate.convergence import kinds
+from train.simulate.engine import values_of
 from train.simulate.plan import INSTEAD, STAGES, make_plan, required_effects
-from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
 
@@ -96,7 +97,7 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
 
 
 STATE = {
-    *("lateral", "pop", "stems", "tilt", "inertia", "friction", "sliding", "turning", "tipping"),
+    *("pop", "stems", "tilt", "inertia", "friction", "sliding", "turning", "tipping"),
     "viscous",
 }
 """Effects with state of their own."""

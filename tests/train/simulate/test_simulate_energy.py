@@ -17,9 +17,9 @@ import pytest
 from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run, specs_of
 from train.simulate import engine
+from train.simulate.convergence import kinds
 from train.simulate.effects import viscous
 from train.simulate.plan import ALL, Call, make_plan
-from train.simulate.run import kinds
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS, FAMILIES
 

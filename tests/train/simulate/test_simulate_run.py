@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,7 @@ from edge.recording import load
 from train.__main__ import main
 from train.simulate import scene as scenes
 from train.simulate.run import (
-    parts,
     simulate,
-    simulate_part,
-    simulate_trials,
     total_trials,
     write,
 )
@@ -80,7 +78,7 @@ def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):
         protocol="tcp",
         host="127.0.0.1",
     ) as cluster:
-        write(demo, tmp_path, backend="dask", address=cluster.scheduler_address)
+        write(demo, tmp_path, address=cluster.scheduler_address)
     assert digests(tmp_path) == digests(written[0])
 
 
@@ -173,7 +171,7 @@ class TestCommand:
 
     def test_a_folder_that_cannot_be_made(self, demo, tmp_path):
         (tmp_path / "file").write_text("")
-        with pytest.raises(InputError, match="cannot be made"):
+        with pytest.raises(InputError, match="cannot be written"):
             write(demo, tmp_path / "file" / "folder")
 
     def test_show_draws_a_picture(self, written, tmp_path, capsys):
@@ -228,16 +226,14 @@ def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):
     assert "in 2 of them no taxel rises above skin.onset_counts (60), so no touch is felt" in told
 
 
-def test_a_touch_whose_peak_is_the_onset_is_not_felt(demo):
+def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
     """A contact begins above it (`edge.touch.track`)."""
-    from dataclasses import replace
-
-    one = parts(demo)[0][:1]
-    ((_, trial),) = simulate_trials(demo, one)
-    peak = int(trial.frames.max())
-    for onset, felt in ((peak - 1, True), (peak, False)):
-        scene = replace(demo, skin=replace(demo.skin, onset_counts=onset))
-        assert [made.felt for made in simulate_part(scene, one, None)] == [felt]
+    box = {"name": "box", "family": "rigid", "conditions": ["fixed"]}
+    scene = from_dict({"trials": {"count": 1}, "step_s": {"base": 0.01}, "object": [box]})
+    ((_, trial),) = simulate(scene)
+    for onset, unfelt in ((int(trial.frames.max()) - 1, 0), (int(trial.frames.max()), 1)):
+        scene = replace(scene, skin=replace(scene.skin, onset_counts=onset))
+        assert write(scene, tmp_path).unfelt == unfelt
 
 
 def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):

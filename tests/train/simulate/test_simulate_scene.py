@@ -60,8 +60,6 @@ def test_values_ranges_and_defaults():
     scene = from_dict(GOOD)
     box = scene.objects[0]
     assert (box.values["mass_kg"].low, box.values["mass_kg"].high) == (1.0, 2.0)
-    assert box.values["mass_kg"].varies
-    assert not box.values["friction_static"].varies
     assert scene.settings == {"noise": {"counts": 4.0}}
     assert scene.arm.dof == 5
     assert scene.skin.shape == (16, 24)

@@ -9,7 +9,7 @@ import pytest
 
 from edge.errors import InputError
 from tests.train.simulate.scenes import run
-from train.simulate import run as running
+from train.simulate import convergence
 from train.simulate.run import simulate, write
 from train.simulate.scene import from_dict
 
@@ -100,7 +100,7 @@ class TestLabels:
     @pytest.mark.parametrize("step_s", [{}, {"base": 0.01}])
     def test_an_object_inside_the_arm_is_refused_at_once(self, monkeypatch, family, step_s):
         monkeypatch.setattr(
-            running, "measure", lambda *_: pytest.fail("it measured the step first")
+            convergence, "measure", lambda *_: pytest.fail("it measured the step first")
         )
         wide = {"name": "wall", "family": family, "conditions": ["fixed"], "width_m": 1.0}
         one = scene(

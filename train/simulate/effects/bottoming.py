@@ -6,8 +6,6 @@ solid at 1 - 1.4 times its relative density (Gibson and Ashby, Cellular Solids, 
 Two more tangents for each column approximate this, so the bed stays convex and piecewise linear.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.trials import Index, Trials, pick

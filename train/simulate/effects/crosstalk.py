@@ -1,7 +1,5 @@
 """Each taxel also reads a part of its four neighbours' load; the last column meets the first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.readings import Readings
@@ -10,7 +8,7 @@ from train.simulate.readings import Readings
 def sensor(readings: Readings) -> None:
     """Counts + part * (sum of the neighbours' counts)."""
     counts = readings.everywhere()
-    leak = counts * np.float32(readings.settings("crosstalk")["part"])
+    leak = counts * np.float32(readings.scene.setting("crosstalk", "part"))
     counts[:, 1:] += leak[:, :-1]
     counts[:, :-1] += leak[:, 1:]
     counts += np.roll(leak, 1, axis=2)

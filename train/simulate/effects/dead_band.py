@@ -1,7 +1,5 @@
 """Small readings are zero, as in the lab's node (below 6 standard deviations of its noise)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.readings import Readings
@@ -10,4 +8,4 @@ from train.simulate.readings import Readings
 def sensor(readings: Readings) -> None:
     """Zero the counts below the band."""
     counts = readings.counts
-    counts *= counts >= np.float32(readings.settings("dead_band")["counts"])
+    counts *= counts >= np.float32(readings.scene.setting("dead_band", "counts"))

@@ -1,7 +1,5 @@
 """Frames that are lost on the way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.readings import Readings
@@ -9,6 +7,6 @@ from train.simulate.readings import Readings
 
 def clock(readings: Readings) -> None:
     """Choose the frames that arrive; the first one always does."""
-    kept, part = np.ones(len(readings.t), dtype=bool), readings.settings("dropped_frames")["part"]
-    kept[1:] = readings.stream("dropped_frames").random(len(kept) - 1) >= part
-    readings.kept = kept
+    readings.kept = np.ones(len(readings.t), dtype=bool)
+    drawn = readings.stream("dropped_frames").random(len(readings.t) - 1)
+    readings.kept[1:] = drawn >= readings.scene.setting("dropped_frames", "part")

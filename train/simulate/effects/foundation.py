@@ -4,8 +4,6 @@ On such independent columns a cylinder of radius R at depth d bears F/L = (4/3) 
 (Winkler's foundation; Johnson, Contact Mechanics, 4.3).
 """
 
-from __future__ import annotations
-
 from train.simulate.trials import Index, Trials, pick
 
 

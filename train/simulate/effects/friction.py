@@ -9,8 +9,6 @@ A soft object fits itself to a forearm that lies askew, and presses along the fo
 bound then lies around the component of that normal along the face.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +47,7 @@ def stand(t: Trials, i: Index) -> None:
     t.keep(
         "friction",
         Shear,
-        stiffness=t.settings("friction")["shear_n_m"],
+        stiffness=t.scene.setting("friction", "shear_n_m"),
         fits=t.plan.also("tilt", ALL) & t.plan.also("foundation", ALL),
         jacobian=np.zeros_like(t.q),
         coupled=np.zeros((2, t.n)),

@@ -1,8 +1,6 @@
 """The reading lags half a loop's width behind a rising and a falling load (the play operator of
 Prandtl's hysteresis model)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.readings import Readings
@@ -10,7 +8,7 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """y = min(max(y before, x - half), x + half), from a rest at x = 0."""
-    counts, half = readings.counts, np.float32(readings.settings("hysteresis")["counts"])
+    counts, half = readings.counts, np.float32(readings.scene.setting("hysteresis", "counts"))
     y = np.zeros(counts.shape[1], dtype=counts.dtype)
     for frame in counts:
         y = np.minimum(np.maximum(y, frame - half), frame + half)

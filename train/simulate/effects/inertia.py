@@ -11,8 +11,6 @@ second order are no better: they ring, or damp as much. So steps are shorter whe
 and for a while after each jolt, and of the scene's length elsewhere.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -63,7 +61,7 @@ def swing(t: Trials, i: Index) -> None:
 
 def stand(t: Trials, i: Index) -> None:
     """Add the dashpot beside the skin's springs."""
-    t.own["viscous"].loss_s[i] = t.settings("inertia")["loss_s"]
+    t.own["viscous"].loss_s[i] = t.scene.setting("inertia", "loss_s")
 
 
 def pace(t: Trials, i: Index) -> None:

@@ -1,7 +1,5 @@
 """Frames come early or late; each shows the load at its own time, and reports that time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.readings import Readings
@@ -12,7 +10,7 @@ def clock(readings: Readings) -> None:
     counts, joints, t = readings.counts, readings.joints, readings.t
     frame, part = t[1] - t[0], np.zeros(len(t))
     drawn = readings.stream("jitter").standard_normal(len(t) - 2)
-    part[1:-1] = np.clip(drawn * (readings.settings("jitter")["s"] / frame), -0.45, 0.45)
+    part[1:-1] = np.clip(drawn * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45)
     readings.times = t + part * frame
     for values in (joints, counts) if len(counts) else (joints,):
         late = np.maximum(part, 0.0).astype(values.dtype)[:, None]

@@ -16,10 +16,6 @@ and from then on adds its foundation. The margin is one more spring in each line
 convex and piecewise linear. The pressure is close to a half ellipse at any a / H up to 1.5.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 
 from train.simulate.contact import share_out
@@ -29,13 +25,6 @@ MARGIN = 0.19
 """Load of the flat strip beyond the foundation under it, as a width over H."""
 SPREAD = 0.55
 """The same for the load at first touch, which grows with a^2 as on a half space."""
-
-
-@dataclass
-class Lateral:
-    """Depth in metres at which a layer's first column is touched, (n,)."""
-
-    nearest: Array
 
 
 def delay(x: Array, depth: Array) -> Array:
@@ -56,7 +45,6 @@ def widen(t: Trials, i: Index) -> None:
     """Columns are touched at a larger depth."""
     gaps = touched_at(pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i))
     t.column_gaps[:, i] = gaps
-    t.keep("lateral", Lateral).nearest[i] = gaps.min(axis=0)
 
 
 def fill(t: Trials, i: Index) -> None:
@@ -111,7 +99,8 @@ def image(t: Trials, i: Index) -> None:
     root of each column's depth beyond its touch."""
     depth, reach = pick(t.line_depth, i), pick(t.reach, i)
     # A touch so slight that it falls between two columns goes to the nearest.
-    gaps = pick(t.column_gaps, i) - pick(t.own["lateral"].nearest, i)
+    gaps = pick(t.column_gaps, i)
+    gaps = gaps - gaps.min(axis=0)
     inside = np.where(depth > 0.0, depth - gaps[:, None], 0.0)
     touched = inside > 0.0
     loads = np.sqrt(np.where(touched, inside, 0.0)) * reach[:, None]

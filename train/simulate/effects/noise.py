@@ -1,15 +1,13 @@
 """Normal noise on each reading."""
 
-from __future__ import annotations
-
 from train.simulate import streams
 from train.simulate.readings import Readings
 
 
 def sensor(readings: Readings) -> None:
     """Counts + size * N(0, 1)."""
-    table = streams.quantiles(readings.settings("noise")["counts"])
-    band = readings.settings("dead_band")["counts"] if "dead_band" in readings.effects else 0.0
+    table = streams.quantiles(readings.scene.setting("noise", "counts"))
+    band = readings.scene.setting("dead_band", "counts") if "dead_band" in readings.effects else 0.0
     # Noise within the dead band need not be added to a taxel without load.
     if float(table[-1]) >= band:
         readings.everywhere()

@@ -5,8 +5,6 @@ b/2 and 3b/4) approximate it, each exactly in series with the skin's spring. A b
 the hard backing, b deeper.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

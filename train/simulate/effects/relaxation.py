@@ -1,8 +1,6 @@
 """Standard linear solid: a second spring, k1 = ratio * k, in series with a dashpot that relaxes it
 (`viscous`)."""
 
-from __future__ import annotations
-
 from train.simulate.trials import Index, Trials, pick
 
 

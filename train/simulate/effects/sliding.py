@@ -4,8 +4,6 @@ A step first assumes that the object sticks. It moves where the push exceeds `ho
 exactly at rest.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

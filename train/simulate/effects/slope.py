@@ -3,8 +3,6 @@
 On a slope of angle b, uphill along the push, m g (mu cos b + sin b) moves an object.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.trials import Index, Trials, pick

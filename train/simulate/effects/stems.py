@@ -1,8 +1,6 @@
 """Foliage: stems at different depths that bend as cantilevers (k = 3 E I / L^3, one number here),
 damp, and slip off the forearm for good once bent too far."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,8 +53,9 @@ def lay(t: Trials, i: Index) -> None:
         stiffness[:count, trial] = np.exp(deviation * generator.standard_normal(count))
     depth -= depth.min(axis=0)
     stiffness = np.where(stiffness > 0.0, stiffness * values["stem_n_m"], 0.0)
-    row = t.row_z[0] - t.z, 0.5 * np.minimum(values["width_m"], t.rows * t.skin.pitch[0])
-    middle, reach = row[0] / t.skin.pitch[0], row[1] / t.skin.pitch[0]
+    pitch = t.skin.pitch[0]
+    middle = (t.row_z[0] - t.z) / pitch
+    reach = 0.5 * np.minimum(values["width_m"], t.rows * pitch) / pitch
     place = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(t.rows - 1.001, 0.0))
     low, window = np.floor(place), len(t.columns)
     damping = 2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])

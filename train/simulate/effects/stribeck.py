@@ -1,8 +1,6 @@
 """Stribeck's law: friction falls from mu_s to mu_k as the object gathers speed,
 mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), taken at the speed before the step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.trials import Index, Trials, pick

@@ -4,8 +4,6 @@ Rows then press to different depths, a + lever * tilt, and the loads are a force
 (`pivot_solver`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +11,7 @@ import numpy as np
 from train.simulate import base
 from train.simulate.arm import cross, dot
 from train.simulate.contact import by_depth, covered, curve_gap
-from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, determinant, search
+from train.simulate.pivot_solver import Pivots, search
 from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
 
@@ -99,13 +97,12 @@ def locate(t: Trials, i: Index) -> None:
     t.compliance[2, i] = total(turn * given[:, 1])
     t.y_frame[0, i] = dot(point - face, normal) + radius * upright
     t.y_frame[1, i] = tilt
-    base.keep_pose(t, i, q, point, pose.axes, pose.origins)
+    base.keep_pose(t, i, q, point, pose)
 
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
     own, viscous = t.own["tilt"], t.own.get("viscous")
-    c = np.array([c, pick(t.compliance[1], i), pick(t.compliance[2], i)])
     pivots = Pivots(
         i,
         own.gaps,
@@ -117,13 +114,11 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
         1.0 if viscous is None else pick(viscous.gain, i),
         0.0 if viscous is None else pick(viscous.load, i),
         np.array([y, pick(t.y[1], i)]),
-        c,
-        determinant(c),
+        np.array([c, *pick(t.compliance[1:], i)]),
     )
-    result = search(pivots, pick(own.guess, i), GUARDED_ROUNDS)
-    t.row_force[:, i] = result.rows
-    t.lost[i] |= result.lost
-    return result.loads
+    loads, t.row_force[:, i], lost = search(pivots, pick(own.guess, i))
+    t.lost[i] |= lost
+    return loads
 
 
 def settle(t: Trials, i: Index) -> None:

@@ -7,8 +7,6 @@ softening is taken at the step's start, since an explicit concave potential make
 rest implicitly.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -41,16 +39,13 @@ def stand(t: Trials, i: Index) -> None:
     """
     mover, mass = t.own["sliding"], t.values["mass_kg"]
     foot, height = t.values["base_m"], t.values["height_m"]
-    own = t.keep(
-        "tipping",
-        Tipping,
-        tips=t.plan.calls["tipping"] & (mover.static > foot / (2.0 * height)),
-        force=mass * GRAVITY * foot / (2.0 * height),
-        travel=height * np.arctan2(foot, 2.0 * height),
-    )
+    tips = t.plan.calls["tipping"] & (mover.static > foot / (2.0 * height))
+    force = mass * GRAVITY * foot / (2.0 * height)
+    travel = height * np.arctan2(foot, 2.0 * height)
+    t.keep("tipping", Tipping, tips=tips, force=force, travel=travel)
     turned = mass * (foot * foot / (height * height) + 4.0) / 3.0
-    mover.inertia = np.where(own.tips, turned, mover.inertia)
-    mover.lies = np.where(own.tips, 0.5 * math.pi * height, mover.lies)
+    mover.inertia = np.where(tips, turned, mover.inertia)
+    mover.lies = np.where(tips, 0.5 * math.pi * height, mover.lies)
 
 
 def drag(t: Trials, i: Index) -> None:

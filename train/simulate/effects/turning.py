@@ -8,8 +8,6 @@ e^2 / c^2) moves it, and it turns by e / (c^2 + e^2) for each metre at the conta
 turns, other columns of the forearm touch it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

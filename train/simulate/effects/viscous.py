@@ -14,8 +14,6 @@ Where the forearm pivots, each row of the skin has its own element; elsewhere th
 that of the whole contact. The effects `relaxation` and `inertia` share this module.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
