@@ -65,13 +65,14 @@ class Classifier:
     With an error rate, each task follows the fastest stopping rule that the model holds certified
     for that rate: it is decided at the first decision point that is sure enough, and at the rule's
     last in any case (see `edge.model.stopping`). A task for which no rule is certified is decided
-    at the full window, flagged `uncertified`. Further flags are then `unknown` (the contact is
-    unlike everything in training; the label of the task with the most labels, such as the object,
-    is then "unknown") and `unsure` (the window ended before the confidence was reached).
+    at the full window, flagged `uncertified`. An unknown contact waits for the full window, and the
+    label of the task with the most labels, such as the object, is then "unknown". `unsure` flags
+    that the window ended before the confidence was reached.
 
-    Flags of a decision: `tie` (another label had as many votes), `short` (the stream ended inside
-    the window; the last values were held), `gap` (frames are missing in much of the window, see
-    `GAP_SHARE`, or its times are not in seconds), `missing_taxels` (taxels could not be read),
+    Flags of a decision: `unknown` (the contact is unlike everything in training; only a model with
+    decision points can tell), `tie` (another label had as many votes), `short` (the stream ended
+    inside the window; the last values were held), `gap` (frames are missing in much of the window,
+    see `GAP_SHARE`, or its times are not in seconds), `missing_taxels` (taxels could not be read),
     `missing_pose` (joint angles were absent in part of the window), `skin_motion` (motion was
     measured on the skin, though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
     `out_of_range` (see `OUT_OF_RANGE`).
@@ -111,9 +112,9 @@ class Classifier:
             InputError: the skin is not the one that the model was made for, a rate is outside
                 (0, 1), or the model certifies the error rate for no task.
         """
+        check_rate(novelty_rate, "the novelty rate")
         self._rules: dict[str, StoppingRule | None] = {}
         if error is not None:
-            check_rate(novelty_rate, "the novelty rate")
             self._rules = stopping_rules(model, error)
         self.model, self.error, self.novelty_rate = model, error, novelty_rate
         self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
@@ -292,7 +293,7 @@ class Classifier:
     def _novel(self, decision_point: int, decisions: dict[str, Decision]) -> float:
         """The smallest novelty rate at which the contact counts as unknown."""
         novelty = self.model.info.novelty
-        if self.error is None or novelty is None:
+        if novelty is None:
             return 1.0
         return novelty.rate(decision_point, float(decisions[novelty.task].distances[0]))
 
@@ -313,6 +314,8 @@ class Classifier:
         flags = (*blank.flags, AS_TRAINED) if decision.distances[0] == 0.0 else blank.flags
         flags = (*flags, OUT_OF_RANGE) if decision.out_of_range else flags
         label, confidence = decision.label, decision.confidence
+        unknown = novel <= self.novelty_rate
+        flags = (*flags, "unknown") if unknown else flags
         if self.error is None:
             flags = (*flags, "tie") if decision.tie else flags
             return replace(
@@ -324,13 +327,11 @@ class Classifier:
             at, decision.label_distances.tolist(), info.tasks[blank.task].labels.index(label)
         )
         sure = rule is not None and confidence >= rule.confidence
-        last = len(self.model.decision_points_s) - 1 if rule is None else rule.last
-        if not sure and at < last:
+        full = len(self.model.decision_points_s) - 1
+        last = full if rule is None or unknown else rule.last
+        if at < last and (unknown or not sure):
             return None
-        if novel <= self.novelty_rate:
-            flags = (*flags, "unknown")
-        novelty = info.novelty
-        if novelty is not None and novelty.withholds(blank.task, novel, self.novelty_rate):
+        if unknown and info.novelty is not None and blank.task == info.novelty.task:
             label, confidence = UNKNOWN, 1.0 - novel
         elif rule is not None and not sure and not rule.fixed:
             flags = (*flags, "unsure")

@@ -23,9 +23,10 @@ are monotone in `error`. So a rule's certified error is the largest upper confid
 the way to it, and one table of rules serves every `error`. The confidences for the tests of a
 fold's trials come from a logistic regression on the other folds.
 
-An error is a wrong label. For the task with most labels, which names nothing when a touch is
-unlike the training data, an `unknown` for a trained object at `NOVELTY_RATE` is an error too. The
-limits for a fold's distances are those of the other folds.
+A touch that is unlike the training data at a decision point waits, for the full window if it stays
+so: rules are tested with this wait, at `NOVELTY_RATE` and with the other folds' limits for a fold's
+distances. An error is a wrong label. The task with most labels then names nothing, so an `unknown`
+for a trained object is an error of it too.
 
 The tests are exact for the average of the folds' models. The exported model is fitted on all
 trials, a tenth (or a fifth) more, with its own choice of settings. On average it errs a little less
@@ -48,7 +49,14 @@ from scipy.stats import beta
 from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
-from edge.model.stopping import TEST_SHARE, Novelty, Stopping, StoppingRule, margin
+from edge.model.stopping import (
+    NOVELTY_RATE,
+    TEST_SHARE,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    margin,
+)
 from edge.touch.features import FEATURES
 from train.pipeline import (
     Choice,
@@ -87,11 +95,13 @@ class HeldOut:
         right: (decision points, n) whether the named labels are right.
         margins: (decision points, n) their margins.
         distances: (decision points, n) to the nearest training trial.
+        unknown: (decision points, n) whether the trial is unlike all trained ones.
     """
 
     right: NDArray[np.bool_]
     margins: NDArray[np.float64]
     distances: NDArray[np.float64]
+    unknown: NDArray[np.bool_]
 
 
 def answers(
@@ -142,11 +152,20 @@ def upper_limit(wrong: int, trials: int, level: float) -> float:
     return 1.0 if wrong >= trials else float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
 
 
-def stops(confidence: NDArray[np.float64], rule: StoppingRule) -> NDArray[np.int64]:
-    """(n,) the decision point at which a rule decides, for confidences (points, n)."""
-    sure = confidence >= rule.confidence
-    sure[rule.last] = True
-    return np.asarray(sure.argmax(axis=0))
+def stops(
+    confidence: NDArray[np.float64], rule: StoppingRule, unknown: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """(n,) the decision point at which a rule decides, as `edge.Classifier` does.
+
+    Args:
+        confidence: (points, n) that the labels are right.
+        rule: the rule.
+        unknown: (points, n) whether the contact is unlike all trained ones, and so waits.
+    """
+    decides = (confidence >= rule.confidence) & ~unknown
+    decides[rule.last :] = ~unknown[rule.last :]
+    decides[-1] = True
+    return np.asarray(decides.argmax(axis=0))
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
@@ -161,6 +180,7 @@ def certify(
     confidence: NDArray[np.float64],
     wrong: NDArray[np.bool_],
     seconds: NDArray[np.float64],
+    unknown: NDArray[np.bool_],
     level: float = TEST_SHARE * RISK,
 ) -> list[StoppingRule]:
     """The rules that no other rule beats in both certified error and mean time, the safest first.
@@ -169,12 +189,13 @@ def certify(
         confidence: (points, n) that the labels are right.
         wrong: (points, n) whether deciding there is an error.
         seconds: (points,) windows.
+        unknown: (points, n) whether contacts wait for the full window.
         level: of the tests; see the module.
     """
     n = wrong.shape[1]
 
     def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:
-        at = stops(confidence, rule)
+        at = stops(confidence, rule, unknown)
         limit = upper_limit(int(wrong[at, np.arange(n)].sum()), n, level)
         mean = float(seconds[at].mean())
         return StoppingRule(max(limit, before), mean, rule.confidence, rule.last)
@@ -201,13 +222,10 @@ def novelty(task: str, distances: NDArray[np.float64]) -> Novelty:
     return Novelty(task, NOVELTY_RATES, tuple(map(tuple, limits)))
 
 
-def withheld(novelty: Novelty, task: str, distances: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(points, n) whether a task names nothing (`unknown`), from its nearest distances."""
-    unknown = [
-        [novelty.withholds(task, novelty.rate(point, distance)) for distance in row]
-        for point, row in enumerate(distances.tolist())
-    ]
-    return np.array(unknown, dtype=bool)
+def unlike(novelty: Novelty, distances: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(points, n) whether contacts are unknown, from their nearest distances (points, n)."""
+    limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
+    return np.asarray(distances > limits[:, None])
 
 
 def folds_of(n: int) -> NDArray[np.int64]:
@@ -293,6 +311,15 @@ class SequentialClassifier:
         self.n_features_in_ = len(self.columns_)
         work = (delayed(self._fold)(X, y, folds == k, chosen[k], own) for k in range(count))
         by_fold = Parallel(n_jobs=self.jobs)(work)
+        most = finest({task: y[task] for task in self.choices})
+        nearest = np.empty(X.shape[:2])
+        for k, answers_of in enumerate(by_fold):
+            nearest[:, folds == k] = answers_of[most][2]
+        unknown = np.zeros(nearest.shape, dtype=bool)
+        for k in range(count):
+            others = (folds >= 0) & (folds != k) & (y[most] != "")
+            limits = novelty(most, nearest[:, others])
+            unknown[:, folds == k] = unlike(limits, nearest[:, folds == k])
         self.held_out_ = {}
         for task in self.choices:
             named = np.empty(X.shape[:2], dtype=y[task].dtype)
@@ -303,12 +330,13 @@ class SequentialClassifier:
             tested = (folds >= 0) & (y[task] != "")
             right = named == y[task]
             self.held_out_[task] = HeldOut(
-                right[:, tested], margins[:, tested], distances[:, tested]
+                right[:, tested], margins[:, tested], distances[:, tested], unknown[:, tested]
             )
-        most = finest({task: y[task] for task in self.choices})
         self.novelty_ = novelty(most, self.held_out_[most].distances)
         self.stopping_ = {
-            task: self._calibrated(task, held_out, folds[(folds >= 0) & (y[task] != "")])
+            task: self._calibrated(
+                held_out, folds[(folds >= 0) & (y[task] != "")], withheld=task == most
+            )
             for task, held_out in self.held_out_.items()
         }
         return self
@@ -327,15 +355,16 @@ class SequentialClassifier:
         with threadpool_limits(1):
             return {task: answers(models, task, X[:, left_out]) for task in choices}
 
-    def _calibrated(self, task: str, held_out: HeldOut, folds: NDArray[np.int64]) -> Stopping:
+    def _calibrated(
+        self,
+        held_out: HeldOut,
+        folds: NDArray[np.int64],
+        *,
+        withheld: bool,
+    ) -> Stopping:
         confidence = calibrated(held_out, folds)
-        wrong = ~held_out.right
-        if task == self.novelty_.task:
-            for fold in range(int(folds.max()) + 1):
-                own = folds == fold
-                others = novelty(task, held_out.distances[:, ~own])
-                wrong[:, own] |= withheld(others, task, held_out.distances[:, own])
-        rules = certify(confidence, wrong, np.array(self.decision_points_s))
+        wrong = ~held_out.right | held_out.unknown if withheld else ~held_out.right
+        rules = certify(confidence, wrong, np.array(self.decision_points_s), held_out.unknown)
         slopes, intercepts = zip(*map(logistic, held_out.margins, held_out.right), strict=True)
         return Stopping(slopes, intercepts, tuple(rules), len(folds), int(wrong[-1].sum()), RISK)
 

@@ -53,6 +53,8 @@ def margin(distances: Sequence[float], label: int) -> float:
 class StoppingRule:
     """Decide at the first decision point that is sure enough, and at the last one in any case.
 
+    A contact that is unknown there waits until it no longer is, or for the full window.
+
     Attributes:
         error: certified: decisions are wrong at most this often.
         mean_s: mean seconds from onset to decision, on the calibration trials.
@@ -162,7 +164,8 @@ class Novelty:
     of all tasks' spaces it keeps most of what distinguishes objects.
 
     Attributes:
-        task: whose space it is.
+        task: whose space it is. It names no label for an unknown contact: a new object can still
+            be called soft or movable.
         rates: shares of trained contacts that lie farther than the limits, falling.
         limits: (decision points, rates) distances.
     """
@@ -178,13 +181,6 @@ class Novelty:
             if distance > limit:
                 smallest = rate
         return smallest
-
-    def withholds(self, task: str, rate: float, asked: float = NOVELTY_RATE) -> bool:
-        """Whether a task gives no label, for a contact that counts as unknown from `rate` on.
-
-        A new object can still be called soft or movable; only the object itself has no name.
-        """
-        return task == self.task and rate <= asked
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Novelty:

@@ -117,21 +117,32 @@ def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch)
     assert flags == {"category": False, "object": True}
 
 
-def test_a_touch_unlike_all_others_names_no_object_but_still_says_what_it_is_like(
-    early, make_touch
+def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is_like(
+    early, make_touch, monkeypatch
 ):
     model, _ = early
+    for task, stopping in model.info.stopping.items():
+        hasty = replace(stopping.rules[0], confidence=0.0)
+        monkeypatch.setitem(model.info.stopping, task, replace(stopping, rules=(hasty,)))
     known = make_touch(kind="hard", seed=50)
     strange = replace(known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535))
-    error = model.info.stopping["category"].smallest_error
+    error = max(stopping.smallest_error for stopping in model.info.stopping.values())
     decided = {
         name: {
             e.task: e
-            for e in Classifier(model, error=error).classify(touch)
+            for e in Classifier(model, error=asked).classify(touch)
             if isinstance(e, Decided)
         }
-        for name, touch in {"known": known, "strange": strange}.items()
+        for name, touch, asked in (
+            ("known", known, error),
+            ("strange", strange, error),
+            ("waited", strange, None),
+        )
     }
+    at = {name: {e.window_s for e in by_task.values()} for name, by_task in decided.items()}
+    assert at == {"known": {0.3}, "strange": {1.2}, "waited": {1.2}}
+    assert all("unknown" in e.flags for e in decided["waited"].values())
+    assert decided["waited"]["object"].label != "unknown"
     assert model.info.novelty.task == "object"
     assert {e.task: "unknown" in e.flags for e in decided["strange"].values()} == {
         "category": True,

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from edge.errors import InputError
-from edge.model.stopping import NOVELTY_RATE, TEST_SHARE, Novelty, StoppingRule
+from edge.model.stopping import NOVELTY_RATE, TEST_SHARE, StoppingRule
 from train.pipeline import Choice
 from train.stopping import (
     NEVER,
@@ -17,8 +17,8 @@ from train.stopping import (
     folds_of,
     logistic,
     stops,
+    unlike,
     upper_limit,
-    withheld,
 )
 
 
@@ -32,15 +32,21 @@ def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
 class TestStops:
     CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
 
-    def stop(self, **rule):
+    def stop(self, unknown=(), **rule):
         given = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "last": 2}
-        return stops(self.CONFIDENCE, StoppingRule(**{**given, **rule})).tolist()
+        waits = np.zeros((3, 3), dtype=bool)
+        waits[tuple(np.array(unknown, dtype=int).reshape(-1, 2).T)] = True
+        return stops(self.CONFIDENCE, StoppingRule(**{**given, **rule}), waits).tolist()
 
     def test_at_the_first_decision_point_that_is_sure(self):
         assert self.stop() == [0, 1, 0]
 
     def test_a_fixed_window_waits_for_it_and_no_longer(self):
         assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
+
+    def test_what_is_unknown_waits_until_it_is_known_or_for_the_full_window(self):
+        assert self.stop(unknown=[(0, 0), (1, 1), (2, 1)]) == [1, 2, 0]
+        assert self.stop(unknown=[(0, 1), (1, 1)], confidence=NEVER, last=0) == [0, 2, 0]
 
 
 class TestLogistic:
@@ -74,6 +80,11 @@ class TestLogistic:
 SECONDS = np.array([0.4, 0.8, 1.2])
 
 
+def known(like):
+    """No contact is unknown."""
+    return np.zeros(like.shape, dtype=bool)
+
+
 def drawn(n, rng):
     """Confidences that are the probability of being right, and outcomes drawn with them."""
     final = rng.beta(8.0, 1.0, n)
@@ -84,7 +95,7 @@ def drawn(n, rng):
 
 def test_the_first_rule_is_the_full_window_at_the_whole_level():
     confidence, right = drawn(140, np.random.default_rng(1))
-    rules = certify(confidence, ~right, SECONDS)
+    rules = certify(confidence, ~right, SECONDS, known(right))
     wrong = int((~right[-1]).sum())
     assert rules[0].error == pytest.approx(upper_limit(wrong, 140, TEST_SHARE * RISK))
 
@@ -94,7 +105,7 @@ def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
     tested first, has 20 of 100 wrong."""
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[-1, :20] = True
-    rules = certify(np.full((3, 100), 0.9), wrong, SECONDS)
+    rules = certify(np.full((3, 100), 0.9), wrong, SECONDS, known(wrong))
     assert [rule.error for rule in rules] == [
         pytest.approx(upper_limit(20, 100, TEST_SHARE * RISK))
     ]
@@ -107,9 +118,13 @@ def test_certificates_fail_no_oftener_than_they_say():
     failed = 0
     for _ in range(300):
         confidence, right = drawn(100, rng)
-        able = [rule for rule in certify(confidence, ~right, SECONDS) if rule.error <= error]
+        able = [
+            rule
+            for rule in certify(confidence, ~right, SECONDS, known(right))
+            if rule.error <= error
+        ]
         if able:
-            at = stops(world_confidence, able[-1])
+            at = stops(world_confidence, able[-1], known(world))
             failed += 1.0 - world[at, np.arange(20_000)].mean() > error
     assert failed <= binom.ppf(0.99, 300, TEST_SHARE * RISK)
 
@@ -128,7 +143,7 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     choices = {"t": Choice("none", 3, 3)}
     model = SequentialClassifier(choices, SECONDS, ("max_force",)).fit(X, {"t": labels})
     rule = model.stopping_["t"].rule(0.1)
-    assert rule.mean_s <= 0.81
+    assert rule.mean_s <= 0.83
     new, truth = touches(300, seed=1)
     named, _, _ = answers(model.decision_points_, "t", new)
     assert (named[1:] == truth).all()
@@ -175,14 +190,14 @@ def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothi
     assert model.stopping_["thing"].wrong >= int((~right["thing"] | far).sum())
 
 
-def test_only_the_task_of_the_novelty_names_nothing_and_only_beyond_the_limit():
-    limits = Novelty("thing", (0.5, NOVELTY_RATE), ((1.0, 3.0), (2.0, 4.0)))
-    distances = np.array([[2.0, 3.0, 3.5], [3.5, 4.5, 4.0]])
-    assert withheld(limits, "thing", distances).tolist() == [
-        [False, False, True],
-        [False, True, False],
-    ]
-    assert not withheld(limits, "kind", distances).any()
+def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
+    X, labels = touches(60)
+    model = SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS, ("max_force",))
+    novelty = model.fit(X, {"t": labels}).novelty_
+    distances = np.array([row[-2] for row in novelty.limits])[:, None] + [0.0, 1e-9]
+    assert novelty.rates[-2] == NOVELTY_RATE
+    assert unlike(novelty, distances).tolist() == [[False, True]] * 3
+    assert novelty.rate(1, float(distances[1, 1])) <= NOVELTY_RATE
 
 
 def test_what_no_task_takes_is_there_for_the_folds_alone():

@@ -14,7 +14,7 @@ from train.evaluate import Result, stratified_folds
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
-from train.stopping import NEVER, THRESHOLDS, answers, confidences, finest, stops, withheld
+from train.stopping import NEVER, THRESHOLDS, answers, confidences, finest, stops, unlike
 from train.tradeoff.choices import some
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
@@ -69,12 +69,14 @@ class StoppingComparison:
         decision_points_s: windows.
         right: (decision points, n) whether each fixed window's decision is right.
         confidence: (decision points, n) calibrated.
+        unknown: (decision points, n) whether the contact is unlike all trained ones.
         certified: one entry for each asked error.
     """
 
     decision_points_s: tuple[float, ...]
     right: NDArray[np.bool_]
     confidence: NDArray[np.float64]
+    unknown: NDArray[np.bool_]
     certified: list[Certified]
 
     @property
@@ -93,7 +95,7 @@ class StoppingComparison:
         curve = []
         for threshold in (NEVER, *THRESHOLDS.tolist()):
             rule = StoppingRule(1.0, 0.0, threshold, len(seconds) - 1)
-            at = stops(self.confidence, rule)
+            at = stops(self.confidence, rule, self.unknown)
             wrong = 1.0 - float(self.right[at, np.arange(self.trials)].mean())
             curve.append((threshold, float(seconds[at].mean()), wrong))
         return curve
@@ -114,7 +116,7 @@ class _Fold:
     test: NDArray[np.int64]
     named: dict[str, NDArray[np.str_]]
     confidence: dict[str, NDArray[np.float64]]
-    unknown: dict[str, NDArray[np.bool_]]
+    unknown: NDArray[np.bool_]
     rules: dict[str, dict[float, StoppingRule | None]]
 
 
@@ -123,12 +125,15 @@ def compare_stopping(
 ) -> dict[str, StoppingComparison]:
     """{task: comparison}. Folds are held out in turn; a quick export of the others answers them."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    folds = stratified_folds(y[finest(y)], FOLDS)
+    most = finest(y)
+    folds = stratified_folds(y[most], FOLDS)
     tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
     cases = [(dataset, test, decision_points_s) for test in tests]
     held_out: list[_Fold] = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
-    comparisons = {}
+    comparisons, unknown = {}, np.empty(shape, dtype=bool)
+    for fold in held_out:
+        unknown[:, fold.test] = fold.unknown
     for task, labels in y.items():
         named = np.empty(shape, dtype=labels.dtype)
         confidence = np.empty(shape)
@@ -140,7 +145,11 @@ def compare_stopping(
             tuple(decision_points_s),
             right,
             confidence,
-            [_certified(error, task, held_out, right, decision_points_s) for error in ERRORS],
+            unknown,
+            [
+                _certified(error, task, held_out, right, decision_points_s, withheld=task == most)
+                for error in ERRORS
+            ],
         )
     return comparisons
 
@@ -154,12 +163,14 @@ def _held_out(
     assert model is not None
     names = fitted.dataset.names
     new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])
-    named, confidence, unknown = {}, {}, {}
+    named, confidence = {}, {}
+    unknown = np.empty(new.shape[:2], dtype=bool)
     for task in model.choices:
         named[task], margins, distances = answers(model.decision_points_, task, new)
         stopping = model.stopping_[task]
         confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
-        unknown[task] = withheld(model.novelty_, task, distances)
+        if task == model.novelty_.task:
+            unknown = unlike(model.novelty_, distances)
     rules = {
         task: {error: stopping.rule(error) for error in ERRORS}
         for task, stopping in model.stopping_.items()
@@ -173,6 +184,8 @@ def _certified(
     folds: Sequence[_Fold],
     right: NDArray[np.bool_],
     decision_points_s: Sequence[float],
+    *,
+    withheld: bool,
 ) -> Certified:
     """The decisions at one asked error."""
     seconds = np.array(decision_points_s)
@@ -181,8 +194,8 @@ def _certified(
         rule = fold.rules[task][error]
         if rule is None:
             continue
-        at, every = stops(fold.confidence[task], rule), np.arange(len(fold.test))
-        unknown = fold.unknown[task]
+        at, every = stops(fold.confidence[task], rule, fold.unknown), np.arange(len(fold.test))
+        unknown = fold.unknown & withheld
         named = right[:, fold.test] & ~unknown
         rows.append([named[at, every], named[-1], unknown[at, every],
                      at < len(seconds) - 1, seconds[at]])  # fmt: skip
