@@ -210,13 +210,13 @@ class TestEarly:
         folds = [
             early._Fold(
                 np.arange(4) + 4 * k, {}, {"t": np.full((2, 4), 0.5)},
-                {"t": np.array([[False] * 4, [True, False, False, False]])},
+                np.array([[False] * 4, [True, False, False, False]]),
                 {"t": {0.1: rule if k else None}},
             )
             for k in range(2)
         ]  # fmt: skip
         right = np.array([[False] * 5 + [True] * 3, [True] * 8])
-        found = early._certified(0.1, "t", folds, right, (0.6, 1.2))
+        found = early._certified(0.1, "t", folds, right, (0.6, 1.2), withheld=True)
         assert (found.folds, found.result.right, found.result.total) == (1, 3, 4)
         # At the full window one more is right and one names nothing.
         assert found.gain[0] == 0.0
