@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import classification_report
 
-from edge.model.explanation import Explanation, Space, explain
+from edge.model.explanation import Explanation, Near, Space, explain
 from edge.model.model import Model
 from export.api import names, warnings
-from train.choose import TRIAL, Chosen
-from train.dataset import DataSet
+from train.choose import TRIAL
 from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted
@@ -25,38 +24,49 @@ from train.pipeline import Choice, ContactClassifier, vote
 from train.report import page
 from train.report.figures import confusion, lines, picture
 from train.report.score import interval, percent
-from train.report.section import Row, Section, Table, counted
+from train.report.section import Figure, Row, Section, Table, counted
 from train.report.work import Workers
 
 PARTS = 4
 """The learning curve is fitted to so many parts of the trials, one after another."""
-DRAWN = 1
-"""Trials told wrong that are drawn for each task; a picture takes as long as hundreds of fits."""
 EXPLAINED = 60
 """Trials over which the features' pulls are averaged."""
 UNFELT = "(no contact)"
 
 
 @dataclass(frozen=True)
-class _Answers:
+class Answers:
     """A task's answers to left-out trials.
 
     Attributes:
+        classes: its labels, sorted.
         truth: (n,) labels.
         said: (parts, n) answers of fits to a part of the other trials, the last to all.
-        explained: {trial: why it was answered so by the last} of some trials.
-        labels: {trial: the labels that its explanation counts by}.
+        explained: {trial: why the last answered so}, of those told wrong and some others.
     """
 
+    classes: list[str]
     truth: NDArray[np.str_]
     said: NDArray[np.str_]
     explained: dict[int, Explanation]
-    labels: dict[int, Sequence[str]]
 
     @property
     def wrong(self) -> list[int]:
         """The trials that are told wrong."""
-        return np.flatnonzero(self.said[-1] != self.truth).tolist()
+        return [int(i) for i in np.flatnonzero(self.said[-1] != self.truth)]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What the sections tell of: a fit, its answers {task: Answers}, its file, and its prices.
+
+    The prices are those of `export.api.measure`.
+    """
+
+    fitted: Fitted
+    answers: dict[str, Answers]
+    model: Model
+    prices: Sequence[tuple[float, float]]
 
 
 def _left_out(
@@ -67,8 +77,9 @@ def _left_out(
     features: Sequence[str],
     widths: Sequence[int],
     test: NDArray[np.int64],
-) -> tuple[NDArray[np.str_], dict[int, Explanation], list[str]]:
-    """(parts, test) answers, and explanations of the wrong ones and of some others."""
+) -> tuple[list[NDArray[np.str_]], dict[int, Explanation]]:
+    """[part] (test,) answers, and explanations of the wrong ones and of some others."""
+    classes, index = np.unique(y[task], return_inverse=True)
     others = np.delete(np.arange(len(X)), test)
     part_of, said = stratified_folds(y[task][others], PARTS), []
     for part in range(PARTS):
@@ -76,53 +87,48 @@ def _left_out(
         fewer = replace(choice, k=min(choice.k, len(train)))
         model = ContactClassifier({task: fewer}, features, widths)
         model.fit(X[train], {name: labels[train] for name, labels in y.items()})
-        _, rows = model.neighbours(task, X[test])
-        labels = model.classes_[task]
-        said.append(labels[vote(model.labels_[task][rows], len(labels))[0]])
+        rows = model.neighbours(task, X[test])[1]
+        said.append(classes[vote(index[train][rows], len(classes))[0]])
     key, c = model.spaces_[task], model.components_[task]
-    p = model.projections_[key]
-    space = Space(
-        model.columns_[key], p.mean_, p.gain_, p.weights_[:, :c], model.rows_[key][:, :c],
-        model.labels_[task],
-    )  # fmt: skip
-    known, explained = labels.tolist(), {}
-    for i, trial in enumerate(test.tolist()):
-        truth = y[task][trial]
-        if said[-1][i] != truth or trial % max(len(X) // EXPLAINED, 1) == 0:
-            right = known.index(truth) if truth in known else None
-            answer = known.index(said[-1][i])
-            why = explain(space, X[trial], rows[i].tolist(), answer, features, widths, right)
-            near = [n._replace(row=int(train[n.row])) for n in why.voters]
-            rival = why.rival and why.rival._replace(row=int(train[why.rival.row]))
-            explained[trial] = why._replace(voters=tuple(near), rival=rival)
-    return np.array(said), explained, known
+    p, known = model.projections_[key], model.rows_[key][:, :c]
+    weights = p.weights_[:, :c]
+    space = Space(model.columns_[key], p.mean_, p.gain_, weights, known, index[train])
+
+    def renumbered(near: Near) -> Near:
+        return near._replace(row=int(train[near.row]))
+
+    explained = {}
+    for trial, near, answer in zip(test.tolist(), rows.tolist(), said[-1], strict=True):
+        if answer != y[task][trial] or trial % max(len(X) // EXPLAINED, 1) == 0:
+            label, truth = int(np.searchsorted(classes, answer)), int(index[trial])
+            why = explain(space, X[trial], near, label, features, widths, truth)
+            voters, rival = tuple(map(renumbered, why.voters)), why.rival
+            rival = None if rival is None else renumbered(rival)
+            explained[trial] = why._replace(voters=voters, rival=rival)
+    return said, explained
 
 
-def _answers(fitted: Fitted, jobs: int) -> dict[str, _Answers]:
+def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     """{task: the answers that its nested accuracy counts}."""
-    every = fitted.measured
-    used = {
-        name for chosen in fitted.chosen.values() for c in chosen.by_fold for name in c.features
-    }
-    dataset = every.of([name for name in every.names if name in used])
+    choices = [choice for chosen in fitted.chosen.values() for choice in chosen.by_fold]
+    dataset = fitted.measured.of([name for choice in choices for name in choice.features])
     X = dataset.features(fitted.window_s, fitted.samples)
     form = dataset.names, dataset.widths(fitted.samples)
-    targets = {t for chosen in fitted.chosen.values() for c in chosen.by_fold for t in c.targets}
-    y = {task: dataset.labels(task) for task in {*fitted.chosen, *targets}}
+    tasks = {*fitted.chosen, *(target for choice in choices for target in choice.targets)}
+    y = {task: dataset.labels(task) for task in tasks}
     cases = [
         (X, y, task, choice, *form, np.flatnonzero(chosen.folds == fold))
         for task, chosen in fitted.chosen.items()
         for fold, choice in enumerate(chosen.by_fold)
     ]
+    answers = {}
+    for task in fitted.chosen:
+        said = np.tile(y[task], (PARTS, 1))
+        answers[task] = Answers(np.unique(y[task]).tolist(), y[task], said, {})
     results = Workers(jobs, progress=False).map("report", _left_out, cases)
-    answers = {
-        task: _Answers(y[task], np.full((PARTS, len(X)), "", dtype=object), {}, {})
-        for task in fitted.chosen
-    }
-    for (_, _, task, *_, test), (said, explained, labels) in zip(cases, results, strict=True):
+    for (_, _, task, *_, test), (said, explained) in zip(cases, results, strict=True):
         answers[task].said[:, test] = said
         answers[task].explained.update(explained)
-        answers[task].labels.update(dict.fromkeys(explained, labels))
     return answers
 
 
@@ -138,17 +144,9 @@ def write(
         prices: of the candidates, by `export.api.measure`.
         jobs: processes.
     """
-    answers = _answers(fitted, jobs)
-    sections = [
-        *(
-            _accuracy(task, chosen, answers[task], fitted.dataset.untouched_labels(task))
-            for task, chosen in fitted.chosen.items()
-        ),
-        _wrong(fitted, answers),
-        _features(fitted, answers),
-        _learning(fitted, answers),
-        _sizes(fitted, model, prices),
-    ]
+    exported = Exported(fitted, answers_of(fitted, jobs), model, prices)
+    accuracies = [_accuracy(exported, task) for task in fitted.chosen]
+    sections = [*accuracies, *(section(exported) for section in SECTIONS)]
     lead = [
         f"{counted(model.info.rows, 'trial')}, decided {model.info.window_s:g} s after onset. "
         f"Version {model.version}, data {model.info.data_digest[:16]}.",
@@ -157,15 +155,17 @@ def write(
     return page.write(out, f"Model {model.info.name}", lead, sections)
 
 
-def _accuracy(task: str, chosen: Chosen, answer: _Answers, untouched: Sequence[str]) -> Section:
-    """A task's recall and confusions; `untouched` are labels of recordings without contact."""
+def _accuracy(exported: Exported, task: str) -> Section:
+    """A task's confusions, and the recall of its classes."""
+    answer, chosen = exported.answers[task], exported.fitted.chosen[task]
+    untouched = exported.fitted.dataset.untouched_labels(task)
     unfelt = [label if label == NO_CONTACT else UNFELT for label in untouched]
     truth = np.array([*answer.truth, *untouched], dtype=str)
     said = np.array([*answer.said[-1], *unfelt], dtype=str)
     whose = "alone" if chosen.left_out == TRIAL else f"with its entire {chosen.left_out}"
     missed = f", {counted(len(untouched), 'recording')} without a contact among them"
     text = (
-        f"{percent((said == truth).mean()):.1f} % (95 % interval {interval(chosen.accuracy)}) of "
+        f"{100 * chosen.accuracy.accuracy:.1f} % (95 % interval {interval(chosen.accuracy)}) of "
         f"{counted(len(truth), 'trial')} are told right by a model that was chosen and fitted "
         f"without them{missed if untouched else ''}. Each was left out {whose}."
     )
@@ -173,22 +173,18 @@ def _accuracy(task: str, chosen: Chosen, answer: _Answers, untouched: Sequence[s
     rows: list[Row] = []
     for label in sorted(set(truth)):
         own = truth == label
-        rows.append(
-            {
-                task: label,
-                "recall %": percent(scores[label]["recall"]),
-                "95 % interval": interval(Result(int((said[own] == label).sum()), int(own.sum()))),
-                "precision %": percent(scores[label]["precision"]),
-                "F1 %": percent(scores[label]["f1-score"]),
-                "trials": int(own.sum()),
-            }
-        )
-    title = f"{task}: left-out trials"
+        hits = Result(int((said[own] == label).sum()), int(own.sum()))
+        shares = {
+            f"{name} %": percent(scores[label][key])
+            for name, key in (("precision", "precision"), ("F1", "f1-score"))
+        }
+        recall = {"recall %": percent(hits.accuracy), "95 % interval": interval(hits)}
+        rows.append({task: label, **recall, **shares, "trials": hits.total})
     return Section(
         f"How often it is right: {task}",
         [text],
         [Table(f"recall_{_file(task)}", "Recall of each class", rows)],
-        [confusion(f"confusion_{_file(task)}", title, truth, said)],
+        [confusion(f"confusion_{_file(task)}", f"{task}: left-out trials", truth, said)],
     )
 
 
@@ -197,33 +193,26 @@ def _file(task: str) -> str:
     return re.sub(r"\W+", "_", task)
 
 
-def _wrong(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
-    dataset, figures, rows = fitted.measured, [], []
-    trials = names(dataset)[1]
-    for task, answer in answers.items():
-        for order, trial in enumerate(answer.wrong):
-            why, labels = answer.explained[trial], answer.labels[trial]
-            nearest = why.voters[0]
+def _wrong(exported: Exported) -> Section:
+    """The trials told wrong, and a picture of one for each task."""
+    fitted, figures, rows = exported.fitted, [], []
+    trials = names(fitted.measured)[1]
+    for task, answer in exported.answers.items():
+        for trial in answer.wrong:
+            why = answer.explained[trial]
             rows.append(
                 {
                     "trial": trials[trial],
                     "task": task,
                     "label": answer.truth[trial],
                     "said": answer.said[-1][trial],
-                    "nearest trial": trials[nearest.row],
-                    "distance": nearest.distance,
-                    "to the nearest of its label": why.rival.distance if why.rival else "",
+                    "nearest trial": trials[why.voters[0].row],
+                    "distance": why.voters[0].distance,
+                    "distance of its label": why.rival.distance if why.rival else "",
                     "pulled by": next(iter(why.pulls), ""),
                 }
             )
-            if order < DRAWN:
-                case = _case(dataset, trials, trial, task, answer, why, labels)
-
-                def draw(canvas: Any, phone: bool, case: Case = case) -> None:
-                    draw_case(canvas, case, dataset.layout, fitted.window_s, phone)
-
-                name = f"wrong_{_file(task)}_{order + 1}"
-                figures.append(picture(name, case.title, draw, (4.8, 8.4)))
+        figures += [_picture(fitted, trials, task, answer) for _ in answer.wrong[:1]]
     text = [
         "Each of these trials was told wrong by a model that had not seen it. The last column "
         "names the feature that tells most between the wrong answer and the nearest trial of the "
@@ -231,49 +220,39 @@ def _wrong(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
         "task is drawn; `edge-classify explain` and `python -m train show` say the same of any "
         "recording."
     ]
-    return Section("Trials told wrong", text if rows else ["None."], [
-        Table("wrong", "Trials told wrong", rows, narrow=4)
-    ], figures)  # fmt: skip
+    tables = [Table("wrong", "Trials told wrong", rows)]
+    return Section("Trials told wrong", text if rows else ["None."], tables, figures)
 
 
-def _case(
-    dataset: DataSet,
-    trials: Sequence[str],
-    trial: int,
-    task: str,
-    answer: _Answers,
-    why: Explanation,
-    labels: Sequence[str],
-) -> Case:
-    """The picture of a trial told wrong."""
-    said = str(answer.said[-1][trial])
-    near = [*why.voters[:MOST_NEAR], *([why.rival] if why.rival else [])]
-    entries = [
-        (
-            f"{trials[n.row]}: {labels[n.label]}, {n.distance:.3g} away",
-            dataset.trials[n.row].series,
-            labels[n.label] == said,
-        )
-        for n in near
-    ]
+def _picture(fitted: Fitted, trials: Sequence[str], task: str, answer: Answers) -> Figure:
+    """The first trial told wrong, over the trials that told it."""
+    trial, measured = answer.wrong[0], fitted.measured
+    why, said = answer.explained[trial], str(answer.said[-1][trial])
+    near = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
+    entries = []
+    for n in near:
+        label, series = answer.classes[n.label], measured.trials[n.row].series
+        entries.append((f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == said))
     title = f"{trials[trial]}: {said}, but labelled {answer.truth[trial]}"
-    rival = labels[why.rival.label] if why.rival else "others"
-    return Case(title, dataset.trials[trial].series, entries, why.pulls, rival)
+    rival = answer.classes[near[-1].label]
+    case = Case(title, measured.trials[trial].series, entries, why.pulls, rival)
+
+    def draw(canvas: Any, phone: bool) -> None:
+        draw_case(canvas, case, measured.layout, fitted.window_s, phone)
+
+    return picture(f"wrong_{_file(task)}", title, draw, (4.8, 8.4))
 
 
-def _features(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
-    dataset = fitted.dataset
+def _features(exported: Exported) -> Section:
+    fitted = exported.fitted
+    dataset, rows = fitted.dataset, []
     widths = dict(zip(dataset.names, dataset.widths(fitted.samples), strict=True))
-    rows = []
     for name, unit in dataset.units.items():
         row: Row = {"feature": name, "unit": "" if unit == "1" else unit, "values": widths[name]}
-        for task, answer in answers.items():
-            shares = [
-                abs(why.pulls.get(name, 0.0)) / (sum(map(abs, why.pulls.values())) or 1.0)
-                for why in answer.explained.values()
-            ]
-            taken = name in (fitted.chosen[task].choice.features or dataset.names)
-            row[f"{task}, % of pull"] = percent(float(np.mean(shares))) if taken else ""
+        for task, answer in exported.answers.items():
+            pulls = [why.pulls for why in answer.explained.values() if why.pulls]
+            shares = [abs(p.get(name, 0.0)) / (sum(map(abs, p.values())) or 1.0) for p in pulls]
+            row[f"{task}, % of pull"] = percent(float(np.mean(shares or [0.0])))
         rows.append(row)
     text = [
         "A feature's pull is by how much it brings a touch nearer to the nearest trial of its "
@@ -283,25 +262,23 @@ def _features(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
     return Section("Features", text, [Table("features", "Features of the model", rows)])
 
 
-def _learning(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
-    n = len(fitted.dataset.trials)
-    sizes = [
-        round(float(np.mean([part * (n - (c.folds == fold).sum()) / PARTS for fold in
-                             range(len(c.by_fold))])))
-        for c in list(fitted.chosen.values())[:1] for part in range(1, PARTS + 1)
-    ]  # fmt: skip
+def _learning(exported: Exported) -> Section:
+    n = len(exported.fitted.dataset.trials)
+    folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
+    sizes = [round(n * (1.0 - 1.0 / folds) * part / PARTS) for part in range(1, PARTS + 1)]
     results = {
         task: [Result(int((said == answer.truth).sum()), n) for said in answer.said]
-        for task, answer in answers.items()
+        for task, answer in exported.answers.items()
     }
     rows: list[Row] = [
         {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}
         for i, size in enumerate(sizes)
     ]
+    half = PARTS // 2 - 1
     text = [
-        f"{task}: twice the trials, {sizes[-1]} in place of {sizes[PARTS // 2 - 1]}, brought "
-        f"{100 * (row[-1].accuracy - row[PARTS // 2 - 1].accuracy):+.1f} points. The next doubling "
-        "usually brings less than the last one did."
+        f"{task}: twice the trials, {sizes[-1]} in place of {sizes[half]}, brought "
+        f"{100 * (row[-1].accuracy - row[half].accuracy):+.1f} points. The next doubling usually "
+        "brings less."
         for task, row in results.items()
     ]
     text.append(
@@ -311,29 +288,23 @@ def _learning(fitted: Fitted, answers: Mapping[str, _Answers]) -> Section:
     )
     title = "Right answers by the number of trials"
     drawn = lines("learning", title, sizes, results, label="trials to learn from")
-    tables = [Table("learning", title, rows)]
-    return Section("What more recordings would buy", text, tables, [drawn])
+    return Section(
+        "What more recordings would buy", text, [Table("learning", title, rows)], [drawn]
+    )
 
 
-def _sizes(fitted: Fitted, model: Model, prices: Sequence[tuple[float, float]]) -> Section:
-    def chosen_by(i: int, chosen: Chosen) -> str:
-        grids = {(g.features, g.projection) for g in fitted.candidates[i].grids}
-        return "*" if (chosen.choice.features, chosen.choice.projection) in grids else ""
-
-    rows: list[Row] = [
-        {
-            "features": candidate.name,
-            "how": candidate.projection,
-            **{
-                f"{task} %": f"{percent(chosen.candidates[i].accuracy):.1f}{chosen_by(i, chosen)}"
-                for task, chosen in fitted.chosen.items()
-            },
-            "us a decision": round(prices[i][0], 1),
-            "kB": round(prices[i][1], 1),
-        }
-        for i, candidate in enumerate(fitted.candidates)
-    ]
-    size = Path(model.path).stat().st_size / 1024
+def _sizes(exported: Exported) -> Section:
+    rows: list[Row] = []
+    chosen = exported.fitted.chosen
+    for i, candidate in enumerate(exported.fitted.candidates):
+        own = {(grid.features, grid.projection) for grid in candidate.grids}
+        row: Row = {"features": candidate.name, "how": candidate.projection}
+        for task, settings in chosen.items():
+            star = "*" * ((settings.choice.features, settings.choice.projection) in own)
+            row[f"{task} %"] = f"{100 * settings.candidates[i].accuracy:.1f}{star}"
+        us, kilobytes = exported.prices[i]
+        rows.append({**row, "us a decision": round(us, 1), "kB": round(kilobytes, 1)})
+    size = Path(exported.model.path).stat().st_size / 1024
     text = [
         f"The model file has {size:.0f} kB. The times are those of features and decision together "
         "on this machine; `edge-classify bench` measures a board's. * marks what was chosen for "
@@ -341,3 +312,7 @@ def _sizes(fitted: Fitted, model: Model, prices: Sequence[tuple[float, float]]) 
     ]
     table = Table("candidates", "Candidates", rows, ("us a decision",), narrow=3)
     return Section("Sizes and times", text, [table])
+
+
+SECTIONS: tuple[Callable[[Exported], Section], ...] = (_wrong, _features, _learning, _sizes)
+"""The sections after those of each task's accuracy."""

@@ -160,7 +160,8 @@ def explain(
     nearest, own = tuple(map(near, voters)), space.labels == label
     if own.all():
         return Explanation(nearest)
-    others = ~own if truth in (None, label) else space.labels == truth
+    others = space.labels == truth
+    others = others if truth != label and others.any() else ~own
     a, b = (int(np.where(those, squares, np.inf).argmin()) for those in (own, others))
     apart = space.rows[a] - space.rows[b]
     changes = []

@@ -1,0 +1,117 @@
+"""CONTRIBUTING.md: its table is true, and a toy of each kind is added as it says.
+
+`tests/edge/skin/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an effect.
+"""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import edge.commands
+import train
+import train.importers
+from edge import cli
+from edge.recording import load
+from edge.touch.feature_sets import SETS
+from train.__main__ import main
+from train.report.section import Section, Table
+from train.study import run as study
+
+ROOT = Path(__file__).parents[1]
+TABLE = re.findall(r"^\| (an? .*|another .*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M)
+
+
+@pytest.mark.parametrize("row", TABLE, ids=lambda row: row.split(" | ")[0])
+def test_what_the_table_names_is_there(row):
+    for path in re.findall(r"`([\w/]+\.py)`", row):
+        assert (ROOT / path.replace("NAME", "__init__")).exists(), path
+    files = [ROOT / path for path in re.findall(r"`([\w/]+\.py)`", row) if "NAME" not in path]
+    for name in re.findall(r"`([A-Z]{4,}|[A-Z_]{6,}|Section)`", row):
+        assert any(name in file.read_text() for file in files), name
+
+
+def test_the_table_has_each_kind():
+    kinds = ("chip", "feature set", "lab's data", "message", "effect", "subcommand", "section")
+    assert [kind for kind, row in zip(kinds, TABLE, strict=True) if kind in row] == list(kinds)
+
+
+def test_a_feature_set_is_an_entry_of_the_list(recordings, monkeypatch):
+    monkeypatch.setitem(SETS, "toy", ("max_force@3", "log_contact_area@2"))
+    fitted = train.fit(str(recordings), features=["toy"], quick=True, jobs=1)
+    assert fitted.dataset.names == SETS["toy"]
+    assert fitted.X.shape == (16, 5)
+
+
+def module(package, monkeypatch, folder, text):
+    """A module `toy` in a package."""
+    (folder / "toy.py").write_text(text)
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
+    monkeypatch.delitem(__import__("sys").modules, f"{package.__name__}.toy", raising=False)
+
+
+IMPORTER = '''"""Pictures of a toy, one trial a line."""
+import numpy as np
+from edge.recording import Recording
+
+def add_options(parser):
+    parser.add_argument("--times", type=int, default=1)
+
+def trials(path, arm, options):
+    for name, *counts in (line.split() for line in path.read_text().splitlines()):
+        frames = np.array(counts, dtype=np.uint16).reshape(-1, 1, 2) * options.times
+        skin = {"rows": 1, "cols": 2, "threshold_counts": 3}
+        yield name, Recording(0.1 * np.arange(len(frames)), frames, meta={"skin": skin})
+'''
+
+
+def test_an_importer_is_a_module(monkeypatch, tmp_path, capsys):
+    module(train.importers, monkeypatch, tmp_path, IMPORTER)
+    (tmp_path / "a.txt").write_text("first 1 2 3 4\nsecond 5 6\n")
+    words = ["import", "toy", str(tmp_path / "a.txt"), "--out", str(tmp_path / "out")]
+    assert main([*words, "--times", "10"]) == 0
+    assert load(tmp_path / "out" / "first.npz").frames.ravel().tolist() == [10, 20, 30, 40]
+    with pytest.raises(SystemExit):
+        main(["import", "--help"])
+    assert re.search(r"toy +Pictures of a toy, one trial a line", capsys.readouterr().out)
+
+
+COMMAND = '''"""Say a word.
+
+Says it once.
+"""
+from edge.commands.output import Output
+
+def add_options(parser):
+    parser.add_argument("word")
+
+def run(arguments):
+    Output.of(arguments).event({"event": "toy", "word": arguments.word}, arguments.word)
+    return 0
+'''
+
+
+def test_a_subcommand_is_a_module_and_its_name(monkeypatch, tmp_path, capsys):
+    module(edge.commands, monkeypatch, tmp_path, COMMAND)
+    monkeypatch.setattr(cli, "COMMANDS", (*cli.COMMANDS, "toy"))
+    assert cli.main(["toy", "hello"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"event": "toy", "word": "hello"}
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    assert re.search(r"toy +say a word", capsys.readouterr().out)
+
+
+def test_a_section_is_a_function_in_the_list(recordings, monkeypatch, tmp_path):
+    def section(context):
+        rows = [{"task": task, "classes": len(set(y))} for task, y in context.labels.items()]
+        return Section("A toy", ["As it stands."], [Table("toy", "Classes", rows)])
+
+    monkeypatch.setattr(study, "ANALYSES", (section,))
+    monkeypatch.setattr(study, "FEWEST", 16)
+    page = study.study([str(recordings)], tmp_path)
+    assert "<h2>A toy</h2>" in page.read_text()
+    lines = (tmp_path / "toy.csv").read_text().splitlines()
+    assert lines[:2] == ["task,classes", "category,2"]
+    assert np.all([line.endswith((",2", ",4")) for line in lines[1:]])
