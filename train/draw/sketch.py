@@ -15,13 +15,19 @@ from edge.touch.region import largest_region
 
 DEPTH_M, STANDS_M = 0.12, 0.15
 """Depth of an object, and its foot's distance below the contact, where the scene gives none."""
+LEAST_M = 0.02
+"""Least height of an object above the contact."""
 STEMS = 30
 """Most stems of a plant that are drawn."""
 LOST_S = 0.3
 """Seconds without contact after which an object that tips has fallen."""
 
-Place = tuple[np.ndarray, np.ndarray]
-"""Position (3,) of a contact, and the skin's outward normal there (3,)."""
+MOMENTS = (("at onset", 0.0, "0.45", "--", "//"), ("1.2 s on", WINDOW_S, "tab:blue", "-", "\\\\"))
+"""What is drawn: its name, seconds from onset, colour, line and hatching."""
+
+Place = tuple[np.ndarray, np.ndarray, float]
+"""Position (3,) of a contact, the skin's outward normal there (3,), and metres along the skin to
+its first row."""
 
 
 def link_positions(chain: Chain, q: Any) -> np.ndarray:
@@ -43,10 +49,12 @@ def draw_side(
     drawn = simulated if isinstance(simulated, dict) else {}
     first: Place | None = None
     motion = ""
-    for t, style, text in ((onset, "0.6", "at onset"), (onset + WINDOW_S, "tab:blue", "1.2 s on")):
-        k = int(np.clip(np.searchsorted(recording.t, t), 0, len(recording.t) - 1))
+    for text, later, style, line, hatch in MOMENTS:
+        k = int(np.clip(np.searchsorted(recording.t, onset + later), 0, len(recording.t) - 1))
         points = link_positions(chain, joints[k])
-        axis.plot(points[:, 0], points[:, 2], "-o", color=style, label=text, markersize=4)
+        axis.plot(*points[:, [0, 2]].T, line, marker="o", color=style, label=text, markersize=4)
+        if layout.radius_m is not None:
+            axis.fill(*skin_outline(chain.pose(joints[k]), layout).T, facecolor=style, alpha=0.35)
         last = _last_contact(recording, chain, layout, k)
         if last is None:
             continue
@@ -54,9 +62,11 @@ def draw_side(
         first = first or place
         if since == 0.0:
             label = f"contact {text}"
-            axis.plot(place[0][0], place[0][2], "*", color=style, ms=13, ls="none", label=label)
+            axis.plot(
+                *place[0][[0, 2]], "*", color=style, ms=13, mec="white", ls="none", label=label
+            )
         if drawn:
-            motion = _thing(axis, drawn, first, place[0], since, style)
+            motion = _thing(axis, drawn, first, place[0], since, (style, hatch))
     title = "seen from the side"
     if drawn:
         effects, mass = drawn.get("effects"), _size(drawn, "mass_kg")
@@ -65,7 +75,17 @@ def draw_side(
     axis.set_title(title, fontsize=9)
     axis.set(xlabel=f"x in the frame of {chain.base}, metres", ylabel="z, metres")
     axis.set_aspect("equal", adjustable="datalim")
-    axis.legend(fontsize=8)
+    axis.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4)
+
+
+def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
+    """(4, 2) x and z of the corners of a cylinder's skin, seen from the side."""
+    first_m, length_m = layout.row0_z_m, layout.pitch[0] * (layout.rows - 1)
+    ends = pose[:3, 3] + np.outer([first_m, first_m - length_m], pose[:3, 2])
+    (x, z), radius = ends[0, [0, 2]] - ends[1, [0, 2]], layout.radius_m or 0.0
+    across = np.array([z, -x]) * radius / max(math.hypot(x, z), 1e-9)
+    first, last = ends[:, [0, 2]]
+    return np.array([first - across, first + across, last + across, last - across])
 
 
 def _last_contact(
@@ -79,7 +99,8 @@ def _last_contact(
         if region is not None:
             pose, position = chain.pose(joints[i]), layout.position(*region.centroid)
             place = pose[:3, :3] @ position + pose[:3, 3]
-            return float(recording.t[k] - recording.t[i]), (place, pose[:3, :2] @ position[:2])
+            normal, above = pose[:3, :2] @ position[:2], region.centroid[0] * layout.pitch[0]
+            return float(recording.t[k] - recording.t[i]), (place, normal, above)
     return None
 
 
@@ -98,24 +119,35 @@ def _turned(outline: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(outline @ np.array([[c, -s], [s, c]]))
 
 
-def _fill(axis: Any, outline: np.ndarray, style: str) -> None:
-    axis.fill(*outline.T, facecolor=style, edgecolor=style, alpha=0.25, hatch="//")
+def _fill(axis: Any, outline: np.ndarray, style: tuple[str, str]) -> None:
+    color, hatch = style
+    axis.fill(*outline.T, facecolor=color, edgecolor=color, alpha=0.25, hatch=hatch)
 
 
 def _thing(
-    axis: Any, drawn: dict[str, Any], first: Place, now: np.ndarray, since: float, style: str
+    axis: Any,
+    drawn: dict[str, Any],
+    first: Place,
+    now: np.ndarray,
+    since: float,
+    style: tuple[str, str],
 ) -> str:
     """Draw the object where it now stands; its motion in words, for the title.
+
+    Of a face that is larger than the skin the part beside the skin and below it is drawn, as
+    nothing is known of objects beside the upper arm.
 
     Args:
         first: the contact at onset.
         now: (3,) position of the last contact, `since` seconds ago.
+        style: colour and hatching.
     """
     start = first[0][[0, 2]]
     ahead = math.copysign(1.0, first[1][0] or 1.0)
     height = _size(drawn, "height_m") or STANDS_M
     width = _size(drawn, "width_m") or 0.1
-    top, floor = 0.5 * min(width, 1.0), -max(height, 0.5 * min(width, 0.6))
+    top = max(min(0.5 * width, first[2]), LEAST_M)
+    floor = -max(height, 0.5 * min(width, 0.6))
     depth = _size(drawn, "base_m") or DEPTH_M
     z = np.linspace(floor, top, 33)
     face = np.minimum(z * z / (2.0 * (_size(drawn, "radius_m") or math.inf)), depth / 2.0)
@@ -133,7 +165,7 @@ def _thing(
             bent = max(moved - slid - behind, 0.0) * (top - floor) / -floor
             ends = slid + behind + np.array([0.0, bent])
             axis.plot(
-                start[0] + ahead * ends, start[1] + [floor, top], color=style, alpha=0.5, lw=1
+                start[0] + ahead * ends, start[1] + [floor, top], color=style[0], alpha=0.5, lw=1
             )
         return ""
     motion = ""
@@ -156,15 +188,15 @@ def _thing(
 
 
 def _from_above(
-    side: Any, foot: float, aside: float, moved: float, angle: float, style: str
+    side: Any, foot: float, aside: float, moved: float, angle: float, style: tuple[str, str]
 ) -> None:
     """Draw an object from above in a corner, pushed to the right and turned about the contact."""
     if not side.child_axes:
-        corner = side.inset_axes([0.01, 0.6, 0.3, 0.38])
+        corner = side.inset_axes([0.69, 0.6, 0.3, 0.38])
         corner.set_xlabel("from above", fontsize=8, labelpad=2)
         corner.set_aspect("equal", adjustable="datalim")
         corner.set(xticks=[], yticks=[])
     corner = side.child_axes[0]
     corners = np.array([[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]]) * foot - [0.0, aside]
     _fill(corner, _turned(corners, angle) + np.array([moved, 0.0]), style)
-    corner.plot(moved, 0.0, "*", color=style)
+    corner.plot(moved, 0.0, "*", color=style[0])

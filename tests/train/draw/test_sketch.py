@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 
 from train.draw import sketch as sketches
 
-FIRST = np.array([-0.1, 0.0, -0.4]), np.array([1.0, 0.0, 0.0])
+FIRST = np.array([-0.1, 0.0, -0.4]), np.array([1.0, 0.0, 0.0]), 0.08
 
 
 def sketch(effects, moved=0.1, since=0.0, **values):
     axis = Figure().add_subplot()
     drawn = {"effects": effects, "values": values}
     now = FIRST[0] + [moved, 0.0, 0.0]
-    return axis, sketches._thing(axis, drawn, FIRST, now, since, "blue")
+    return axis, sketches._thing(axis, drawn, FIRST, now, since, ("blue", "//"))
 
 
 def outline(axis):
@@ -73,3 +73,13 @@ def test_a_plants_stems_bend_to_where_the_forearm_is():
     pushed, _ = sketch(["stems", "sliding"], 0.1, **values)
     for stem in pushed.lines[1:]:
         assert np.ptp(stem.get_xdata()) == 0.0
+
+
+def test_the_skin_is_seen_as_thick_as_it_is_and_the_object_no_higher_than_it(forearm):
+    upright = np.eye(4)
+    corners = sketches.skin_outline(upright, forearm)
+    assert np.ptp(corners[:, 0]) == pytest.approx(2 * forearm.radius_m)
+    assert corners[:, 1].max() == pytest.approx(forearm.row0_z_m)
+    assert np.ptp(corners[:, 1]) == pytest.approx(15 * forearm.pitch[0])
+    tall = outline(sketch([], width_m=1.0)[0])
+    assert tall[:, 1].max() == pytest.approx(FIRST[0][2] + FIRST[2])
