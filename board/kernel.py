@@ -74,15 +74,11 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
         kernel=next((system / "boot").glob("vmlinuz-*")),
         initrd=_initrd(system, command),
     )
+    command_line = [*qemu.split(), "console=ttyS0 panic=-1 quiet"]
     console = FOLDER / "console.txt"
     with console.open("w") as file:
-        subprocess.run(
-            [*qemu.split(), "console=ttyS0 panic=-1 quiet"],
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-            check=False,
-        )
+        to_file = {"stdin": subprocess.DEVNULL, "stdout": file, "stderr": subprocess.STDOUT}
+        subprocess.run(command_line, check=False, **to_file)
     printed, ended, rest = console.read_text(errors="replace").rpartition(ENDED)
     if not ended:
         raise RuntimeError(f"the guest did not reach its end:\n{rest}")
@@ -91,26 +87,19 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
 
 def _initrd(system: Path, command: Sequence[str]) -> Path:
     """Make the archive that the kernel unpacks into memory and starts from."""
-    root, archive = FOLDER / "initrd.root", FOLDER / "initrd"
+    root, archive, names = FOLDER / "initrd.root", FOLDER / "initrd", MODULES.split()
     shutil.rmtree(root, ignore_errors=True)
     for name in ("bin", "dev", "host", "modules", "proc", "sys"):
         (root / name).mkdir(parents=True)
     busybox = shutil.copy(system / "bin" / "busybox", root / "bin")
-    for name in MODULES.split():
+    for name in names:
         (module,) = (system / "lib" / "modules").rglob(f"{name}.ko")
         shutil.copy(module, root / "modules")
     init = root / "init"
-    modules = " ".join(MODULES.split())
-    init.write_text(INIT.format(modules=modules, command=shlex.join(command), ended=ENDED))
+    init.write_text(INIT.format(modules=" ".join(names), command=shlex.join(command), ended=ENDED))
     init.chmod(0o755)
-    names = "\n".join(str(path.relative_to(root)) for path in sorted(root.rglob("*")))
-    with archive.open("wb") as file:
-        subprocess.run(
-            [busybox, "cpio", "-o", "-H", "newc"],
-            cwd=root,
-            input=names.encode(),
-            stdout=file,
-            stderr=subprocess.DEVNULL,
-            check=True,
-        )
+    files = "\n".join(str(path.relative_to(root)) for path in sorted(root.rglob("*")))
+    pack = [busybox, "cpio", "-o", "-H", "newc"]
+    done = subprocess.run(pack, cwd=root, input=files.encode(), capture_output=True, check=True)
+    archive.write_bytes(done.stdout)
     return archive

@@ -21,26 +21,22 @@ def test_writes_all_eight_registers_of_each_stage_then_the_system_registers():
     assert max(2 + 2 * len(values) for values in rows.values()) <= 61  # a CP2112's buffer
 
 
-def test_parses_big_endian_words():
+def test_parses_big_endian_words_of_which_zeros_are_not_intact():
     data = np.zeros((2, 24), dtype=np.uint8)
     data[0, :4] = 0x12, 0x34, 0x56, 0x78
-    values, whole = ad7147.parse(data)
+    values, intact = ad7147.parse(data)
     assert values[0, :3].tolist() == [0x1234, 0x5678, 0]
-    assert whole[0].tolist() == [True, True] + [False] * 10
-    assert not whole[1].any()
+    assert intact.tolist() == [[True, True] + [False] * 10, [False] * 12]
 
 
-def test_takes_ones_up_to_the_end_for_a_bus_that_nobody_drives_any_more():
+def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_value():
     for driven in range(24):  # bytes that came before the transfer broke off
         data = np.full((1, 24), 0xFF, dtype=np.uint8)
         data[0, :driven] = 0x51
         # A last byte alone may be a value that ends in 0xFF: its chip is read a second time.
-        whole = 12 if driven == 23 else driven // 2
-        assert ad7147.parse(data)[1][0].tolist() == [i < whole for i in range(12)]
-
-
-def test_ones_before_the_end_are_a_value():
-    data = np.full((1, 24), 0x51, dtype=np.uint8)
+        intact = 12 if driven == 23 else driven // 2
+        assert ad7147.parse(data)[1][0].tolist() == [i < intact for i in range(12)]
+    data[:] = 0x51
     data[0, 4:6] = 0xFF
     assert ad7147.parse(data)[1].all()
 
@@ -54,22 +50,13 @@ def test_model_converts_in_its_own_time():
     assert parsed(chip)[0].tolist() == [18432] * 12
 
 
-def test_a_chip_that_has_lost_its_settings_converts_stage_0_alone_and_no_value_is_intact():
-    model = FakeAD7147(sense)
-    bus = FakeBus(chips={0x2C: model})
-    chip = AD7147(bus, 0x2C)
-    list(chip.settings())
-    model.reset()
-    values, intact = parsed(chip)
-    assert values[0] > 0
-    assert not values[1:].any()
-    assert not intact.any()
-
-
-def test_every_row_that_is_read_back_tells_a_reset():
+def test_every_row_that_is_read_back_tells_a_reset_and_no_value_is_intact():
     model = FakeAD7147(sense)
     chip = AD7147(FakeBus(chips={0x2C: model}), 0x2C)
     list(chip.settings())
     assert all(chip.healthy() for _ in range(26))
     model.reset()
     assert not any(chip.healthy() for _ in range(13))
+    values, intact = parsed(chip)
+    assert values[0] > 0  # stage 0 alone converts
+    assert not intact.any()

@@ -22,10 +22,6 @@ def test_of_12_bits_has_the_high_bits_first():
     assert block.pack(np.array([0xABC, 0xDEF], dtype=np.uint16), 12).hex() == "abcdef"
 
 
-def test_crc_is_ccitt_false():
-    assert block.crc16(b"123456789") == 0x29B1
-
-
 def test_tells_every_single_flipped_bit():
     bus = FakeBus(chips={0x28: FakeBlock(sense, taxels=12, bits=16)})
     chip = Block(bus, 0x28, taxels=12)

@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+import re
 
 import numpy as np
 import pytest
@@ -28,46 +29,41 @@ def test_bits_on_the_wire_are_those_of_the_data_sheets(messages, bits):
 
 
 @pytest.mark.parametrize(
-    ("code", "error", "builtin", "retries"),
+    ("code", "error", "builtin"),
     [
-        (errno.EREMOTEIO, bus.BusNack, ConnectionError, 3),
-        (errno.ENXIO, bus.BusNack, ConnectionError, 3),
-        (errno.EIO, bus.BusFault, OSError, 2),
-        (errno.ETIMEDOUT, bus.BusTimeout, TimeoutError, 0),
-        (errno.EAGAIN, bus.BusArbitration, BlockingIOError, 3),
-        (errno.EBUSY, bus.BusBusy, OSError, 0),
-        (errno.EOPNOTSUPP, bus.BusRefused, ValueError, 1),
-        (errno.EINVAL, bus.BusRefused, ValueError, 1),
-        (errno.ENOENT, bus.BusMissing, FileNotFoundError, 0),
-        (errno.EACCES, bus.BusDenied, PermissionError, 0),
-        (errno.ENODEV, bus.BusGone, ConnectionAbortedError, 0),
+        (errno.EREMOTEIO, bus.BusNack, ConnectionError),
+        (errno.ENXIO, bus.BusNack, ConnectionError),
+        (errno.EIO, bus.BusFault, OSError),
+        (errno.EPROTO, bus.BusFault, OSError),  # as any errno that has no name of its own
+        (errno.ETIMEDOUT, bus.BusTimeout, TimeoutError),
+        (errno.EAGAIN, bus.BusArbitration, BlockingIOError),
+        (errno.EBUSY, bus.BusBusy, OSError),
+        (errno.EOPNOTSUPP, bus.BusRefused, ValueError),
+        (errno.EINVAL, bus.BusRefused, ValueError),
+        (errno.ENOENT, bus.BusMissing, FileNotFoundError),
+        (errno.EACCES, bus.BusDenied, PermissionError),
+        (errno.ENODEV, bus.BusGone, ConnectionAbortedError),
     ],
 )
-def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin, retries):
+def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
     raised = bus_error(code, "/dev/i2c-1", 0x2C)
     assert type(raised) is error
     assert isinstance(raised, EdgeError)
     assert isinstance(raised, builtin)
     assert (raised.errno, raised.bus, raised.address) == (code, "/dev/i2c-1", 0x2C)
-    assert str(raised).startswith("/dev/i2c-1, address 0x2c: ")
-    assert errno.errorcode[code] in str(raised)
-    assert raised.retries == retries
+    assert re.match(rf"/dev/i2c-1, address 0x2c: .*\({errno.errorcode[code]}\)$", str(raised))
 
 
-def test_an_unknown_errno_is_treated_as_a_transfer_that_broke_off():
-    raised = bus_error(errno.EPROTO, "b")
-    assert type(raised) is bus.BusFault
-    assert "EPROTO" in str(raised)
+def test_a_hung_transfer_is_not_sent_again_and_a_broken_one_is():
+    retries = [e.retries for e in (bus.BusTimeout, bus.BusGone, bus.BusFault, bus.BusNack)]
+    assert retries == [0, 0, 2, 3]
 
 
-def test_a_missing_bus_is_named_with_the_mend():
+def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
     with pytest.raises(bus.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"):
         LinuxBus("/dev/i2c-no-such")
-
-
-def test_a_file_that_is_no_bus_is_refused(tmp_path):
     path = tmp_path / "i2c"
-    path.write_text("")
+    path.touch()
     with pytest.raises(bus.BusError, match=str(path)):
         LinuxBus(str(path))
 
@@ -88,23 +84,23 @@ def test_the_process_that_holds_a_lock_is_named(tmp_path):
         assert bus.lock_holder(wanted.fileno()).endswith(f" ({os.getpid()})")
 
 
-def adapters(folder, **names):
-    """A stand-in for /sys/class/i2c-dev with these adapters."""
-    for device, name in names.items():
-        entry = folder / device.replace("_", "-")
+@pytest.fixture
+def adapters(tmp_path):
+    """A stand-in for /sys/class/i2c-dev."""
+    names = ["bcm2835 (i2c@7e804000)", "bcm2835 (i2c@7e805000)", "CP2112 on hidraw0"]
+    for number, name in enumerate(names):
+        entry = tmp_path / f"i2c-{number}"
         entry.mkdir()
         (entry / "name").write_text(f"{name}\n")
-    return folder
+    return tmp_path
 
 
-def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(tmp_path):
-    folder = adapters(tmp_path, i2c_0="bcm2835 (i2c@7e804000)", i2c_7="CP2112 on hidraw0")
-    assert bus.find_device("CP2112", folder) == "/dev/i2c-7"
-    assert bus.find_device("/dev/i2c-3", folder) == "/dev/i2c-3"
+def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(adapters):
+    assert bus.find_device("CP2112", adapters) == "/dev/i2c-2"
+    assert bus.find_device("/dev/i2c-3", adapters) == "/dev/i2c-3"
 
 
 @pytest.mark.parametrize(("name", "said"), [("i801", "no such bus"), ("bcm", "several adapters")])
-def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(name, said, tmp_path):
-    folder = adapters(tmp_path, i2c_0="bcm2835 (i2c@7e804000)", i2c_1="bcm2835 (i2c@7e805000)")
+def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(name, said, adapters):
     with pytest.raises(bus.BusMissing, match=f"^{name}: {said}"):
-        bus.find_device(name, folder)
+        bus.find_device(name, adapters)

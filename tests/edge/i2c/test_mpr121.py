@@ -34,24 +34,18 @@ def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():
     data = np.zeros((1, 24), dtype=np.uint8)
     data[0, :6] = 0x34, 0x02, 0x34, 0x06, 0xFF, 0x03
     data[0, 6:8] = 0xFE, 0x03
-    values, whole = mpr121.parse(data)
+    values, intact = mpr121.parse(data)
     assert values[0, :4].tolist() == [0x234, 0x634, 1023, 1022]
-    assert whole[0].tolist() == [True, False, False, True] + [False] * 8
+    assert intact[0].tolist() == [True, False, False, True] + [False] * 8
 
 
-def test_over_current_is_named_with_its_resistor():
+def test_over_current_is_named_with_its_resistor_and_later_shows_as_lost_settings():
     """It forbids ECR, so that the chip cannot start."""
-    model = FakeMPR121(sense)
-    model.over_current = True
-    chip = MPR121(FakeBus(chips={0x5A: model}), 0x5A)
-    with pytest.raises(WrongChip, match="over-current; check the resistor at its pin REXT"):
-        list(chip.settings())
-
-
-def test_over_current_while_it_runs_shows_as_lost_settings():
     model = FakeMPR121(sense)
     chip = MPR121(FakeBus(chips={0x5A: model}), 0x5A)
     list(chip.settings())
     model.over_current = True
     model.write(b"\x00", 0.0)
     assert not chip.healthy()
+    with pytest.raises(WrongChip, match="over-current; check the resistor at its pin REXT"):
+        list(chip.settings())

@@ -1,6 +1,7 @@
 """The mux: each channel is a bus, and no two muxes are open at once."""
 
 import errno
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from edge.fake.bus import FakeBus
 from edge.fake.faults import Fault
 from edge.i2c.ad7147 import AD7147, FakeAD7147
 from edge.i2c.bus import BusFault
-from edge.i2c.tca9548a import TCA9548A, FakeTCA9548A
+from edge.i2c.tca9548a import LEAVE_ATTEMPTS, TCA9548A, FakeTCA9548A
 from tests.edge.i2c.chips import parsed
 
 
@@ -31,12 +32,17 @@ def test_each_channel_is_a_bus_with_its_own_chip():
         assert parsed(chips[n])[0].tolist() == [1000 + n] * 12
 
 
-def test_two_muxes_on_one_bus_are_never_open_at_once():
-    bus, muxes = muxed()[0], []
+def beside(bus):
+    """Both muxes of a bus, which know of each other."""
+    muxes = []
     for address in (0x70, 0x71):
         muxes.append(TCA9548A(bus, address, beside=muxes))
-    first, second = muxes
-    chips = [AD7147(mux.channel(2), 0x2C) for mux in (first, second)]
+    return muxes
+
+
+def test_two_muxes_on_one_bus_are_never_open_at_once():
+    bus, _ = muxed()
+    chips = [AD7147(mux.channel(2), 0x2C) for mux in beside(bus)]
     for chip in chips:
         list(chip.settings())
     for i in (0, 1, 0, 1):
@@ -44,27 +50,32 @@ def test_two_muxes_on_one_bus_are_never_open_at_once():
         assert [m.connected for m in bus.chips.values()].count([2]) == 1
 
 
-def test_a_channel_that_is_connected_is_not_selected_again():
-    bus, mux = muxed(verify=False)
-    chip = AD7147(mux.channel(5), 0x2C)
-    before = bus.bits
-    bus.transfer(chip.frame)
-    assert bus.bits - before == 255
+@pytest.mark.parametrize(("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)])
+def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(absent, opens):
+    """One that has gone must not cost the chips of this one."""
+    bus, _ = muxed()
+    first, second = beside(bus)
+    second.select(5)
+    bus.inject([Fault(address=0x71, at=range(absent))])
+    first.select(3)
+    assert first.control == 1 << 3
+    assert bus.script.met == absent
+    assert (bus.chips[0x71].connected == []) == opens
 
 
 @pytest.mark.parametrize(("verify", "bits"), [(True, 40), (False, 20)])
-def test_reading_the_control_byte_back_costs_20_bits(verify, bits):
+def test_a_selection_takes_20_bits_reading_it_back_20_more_and_the_same_again_none(verify, bits):
     bus, mux = muxed(verify=verify)
-    before = bus.bits
-    mux.select(6)
-    assert bus.bits - before == bits
+    for spent in (bits, 0):
+        before = bus.bits
+        mux.select(6)
+        assert bus.bits - before == spent
 
 
 def test_after_an_error_the_channel_is_selected_again():
     bus, mux = muxed()
     channel = mux.channel(4)
     chip = AD7147(channel, 0x2C)
-    assert mux.control == 1 << 4
     bus.inject([Fault(code=errno.EIO, at=[0])])
     with pytest.raises(BusFault):
         channel.transfer(chip.frame)
@@ -74,23 +85,9 @@ def test_after_an_error_the_channel_is_selected_again():
 
 
 def test_a_wrong_channel_is_caught_by_reading_back_and_only_by_it():
-    bus, mux = muxed()
-    bus.inject([Fault(kind="misroute", at=[0])])
-    with pytest.raises(BusFault):
-        mux.select(1)
-    assert mux.control is None
-    bus, mux = muxed(verify=False)
-    bus.inject([Fault(kind="misroute", at=[0])])
-    mux.select(1)
-    assert bus.chips[0x70].connected == [2]
-
-
-def test_a_mux_beside_that_has_gone_does_not_cost_this_one():
-    bus, muxes = muxed()[0], []
-    for address in (0x70, 0x71):
-        muxes.append(TCA9548A(bus, address, beside=muxes))
-    first, second = muxes
-    second.select(0)
-    del bus.chips[0x71]
-    first.select(3)
-    assert first.control == 1 << 3
+    for verify in (True, False):
+        bus, mux = muxed(verify=verify)
+        bus.inject([Fault(kind="misroute", at=[0])])
+        with pytest.raises(BusFault) if verify else nullcontext():
+            mux.select(1)
+        assert (mux.control, bus.chips[0x70].connected) == (None if verify else 2, [2])

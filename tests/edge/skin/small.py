@@ -1,4 +1,9 @@
-"""A skin of 24 taxels on two chips, for tests to change."""
+"""A skin of 24 taxels on two chips, for tests to change, and the sentence for a mistake in one."""
+
+import pytest
+
+from edge.errors import InputError
+from edge.skin import file as skinfile
 
 SMALL = """
 [skin]
@@ -18,3 +23,13 @@ chips = [
   { channel = 0, address = 0x2D, first = [0, 3] },
 ]
 """
+
+
+def mistake(text):
+    """The one sentence that refuses a skin file."""
+    with pytest.raises(InputError) as caught:
+        skinfile.parse(text, "my/skin.toml")
+    sentence = str(caught.value)
+    assert sentence.startswith("my/skin.toml: ")
+    assert "\n" not in sentence.removeprefix("my/skin.toml: not TOML")
+    return sentence

@@ -11,7 +11,7 @@ from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.skin.read_scheduler import ReadScheduler, with_neighbours
-from edge.touch.features import FEATURES, feature_vector
+from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker
 from tests.wires import one_bus
@@ -38,13 +38,10 @@ def chips_at(*places):
     return {i for i, chip in enumerate(ONE.chips) if wanted & set(chip.taxels)}
 
 
-def test_one_400_khz_bus_carries_13_chips_at_100_hz(scheduler):
-    counts = [len(scheduler.plan(None)[0]) for _ in range(50)]
-    assert set(counts) == {13}
-
-
-def test_while_nothing_touches_every_chip_comes_in_turn(scheduler):
+def test_while_nothing_touches_13_chips_come_in_turn(scheduler):
+    """As many as a bus of 400 kHz carries at 100 Hz."""
     read = [set(scheduler.plan(touched(), 200)[0]) for _ in range(9)]
+    assert {len(chips) for chips in read} == {13}
     for k in range(6):
         assert set.union(*read[k : k + 3]) == set(range(32))
 
@@ -128,43 +125,30 @@ def test_masks_grow_across_the_seam_only_where_there_is_one():
 
 
 def felt(file, recording, info):
-    """The features of the first contact, its onset in seconds, and the ticks that were missed."""
+    """The features of the first contact, and its onset in seconds; no tick is left out."""
     playback = Playback(recording)
-    skin = fake_skin(replace(file, layout=recording.layout), playback, timed=True)
-    playback.start = skin.clock.now()
     tracker = ContactTracker(recording.layout, chain=info.chain, horizon_s=info.window_s)
-    with skin:
+    with fake_skin(replace(file, layout=recording.layout), playback, timed=True) as skin:
+        playback.start = skin.clock.now()
         loop = Loop(skin, lasts_s=playback.ends, joints=playback)
-        contact = None
-        for frame in loop.frames():
-            contact = next(iter(tracker.push(frame)), contact)
-            if contact is not None and frame.t > contact.onset_s + info.window_s + 0.05:
-                break
-    vector = feature_vector(contact.series(), info.window_s)
-    return (
-        vector.reshape(len(FEATURES), -1),
-        contact.onset_s - playback.start,
-        loop.schedule.missed_ticks,
+        contacts = [contact for frame in loop.frames() for contact in tracker.push(frame)]
+    assert loop.schedule.missed_ticks == 0
+    vector = feature_vector(contacts[0].series(), info.window_s)
+    return vector, contacts[0].onset_s - playback.start
+
+
+@pytest.mark.parametrize("name", ["hard_0", "soft_2"])
+def test_features_and_decisions_agree_with_full_reading(recordings, exported, name):
+    model, trial = Model(exported / "model.onnx"), load(recordings / f"{name}.npz")
+    (full, full_onset_s), (near, onset_s) = (felt(f, trial, model.info) for f in (CODY, SCHEDULED))
+    # While nothing touches, all chips are read once in three frames.
+    assert abs(onset_s - full_onset_s) < 0.03
+    force, area, motion = (
+        np.abs(near - full).reshape(3, -1) / np.ptp(full.reshape(3, -1), axis=1)[:, None]
     )
-
-
-def test_features_and_decisions_agree_with_full_reading(recordings, exported):
-    model = Model(exported / "model.onnx")
-    errors, same = [], 0
-    for name in ("hard_0", "hard_5", "soft_2", "soft_7"):
-        trial = load(recordings / f"{name}.npz")
-        full, onset_s, _ = felt(CODY, trial, model.info)
-        near, near_onset_s, missed = felt(SCHEDULED, trial, model.info)
-        assert missed == 0
-        # While nothing touches, all chips are read once in three frames.
-        assert abs(near_onset_s - onset_s) < 0.03
-        span = full.max(axis=1) - full.min(axis=1)
-        errors.append(np.sqrt(((near - full) ** 2).mean(axis=1)) / span)
-        decisions = [model.decide(vector.ravel()) for vector in (full, near)]
-        same += all(decisions[0][task].label == decisions[1][task].label for task in decisions[0])
-    # The onset may be that late, so force and motion are within 2.5 % of their range. Area rises
-    # in steps, which may come 10 ms early or late: one of the 40 samples may differ by the range.
-    force, area, motion = np.transpose(errors)
-    assert max(force.max(), motion.max()) < 0.025
-    assert np.median(area) <= np.sqrt(1 / 40) + 1e-9
-    assert same >= 3
+    # With an onset as late as that, force and motion are within 5 % of their range. Area rises in
+    # steps, which may come 10 ms early or late.
+    assert max(force.mean(), motion.mean()) < 0.025
+    assert area.mean() < 0.05
+    labels = [{t: d.label for t, d in model.decide(v).items()} for v in (full, near)]
+    assert labels[0] == labels[1]
