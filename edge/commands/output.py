@@ -99,6 +99,8 @@ def event_text(line: Mapping[str, Any]) -> str:
             "" if line["complete"] else "; incomplete, as reading stopped before the contact's end"
         )
         return f"{line['file']}: {line['seconds']:g} s, {line['frames']} frames, {labels}{cut}"
+    if kind == "unknown_touches":
+        return f"{line['unknown']} of the last {line['touches']} touches are unknown to the model"
     if kind == "deleted":
         return f"{line['file']} is deleted"
     return "no contact" if kind == "no_contact" else json_line(line)

@@ -8,17 +8,24 @@ ready and that it is alive.
 from __future__ import annotations
 
 import argparse
+import logging
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from edge.classifier import Classifier
 from edge.commands.options import add_error, add_reading, check_error
 from edge.commands.source import reading
+from edge.events import Decided, Event
 from edge.model.model import Model
 from edge.runtime.systemd import Notifier
 from edge.runtime.touch_map import map_writer
 from edge.skin.loop import Schedule
 from edge.touch.track import MAX_CONTACTS
+
+LOG = logging.getLogger(__name__)
+LAST_TOUCHES, FEWEST_TOUCHES = 20, 8
+"""Touches by which a model is judged to know the things that it meets."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -44,6 +51,40 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="follow several contacts at once, and append each to FILE with its position",
     )
+
+
+class UnknownTouches:
+    """Notices once that most of the last touches are unlike everything in training.
+
+    Args:
+        model: names the model's file in the remedy.
+    """
+
+    def __init__(self, model: str) -> None:
+        self._model = model
+        self._touches: dict[tuple[float, int | None], bool] = {}
+        """Whether each of the last touches was unknown, by onset and number."""
+        self._noticed = False
+
+    def push(self, events: Sequence[Event]) -> dict[str, Any] | None:
+        """Take in events; returns the event of the notice, which is also logged, when it is due."""
+        for event in events:
+            if isinstance(event, Decided):
+                touch = event.onset_s, event.contact
+                unknown = self._touches.pop(touch, False) or "unknown" in event.flags
+                self._touches[touch] = unknown
+        for old in list(self._touches)[:-LAST_TOUCHES]:
+            del self._touches[old]
+        unknown, touches = sum(self._touches.values()), len(self._touches)
+        if self._noticed or touches < FEWEST_TOUCHES or 2 * unknown <= touches:
+            return None
+        self._noticed = True
+        LOG.warning(
+            f"{unknown} of the last {touches} touches are unlike all training trials: the model "
+            "does not know these things. Record some touches of them, and add them with "
+            f"`edge-classify teach --model {self._model} REC...`"
+        )
+        return {"event": "unknown_touches", "unknown": unknown, "touches": touches}
 
 
 def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
@@ -78,11 +119,13 @@ def run(arguments: argparse.Namespace) -> int:
         maps = [] if arguments.map is None else [map_writer(arguments.map, model.info)]
         with live.lines(arguments.udp, maps) as lines:
             notifier.ready(f"reading {live.source}")
-            frames = 0
+            frames, unknown_touches = 0, UnknownTouches(arguments.model)
             for frame, faults in live.frames():
                 frames += 1
                 notifier.alive()
                 decided = classifier.push(frame)
+                notice = unknown_touches.push(decided)
+                faults += [] if notice is None else [notice]
                 lines.write([*faults, *(event.to_dict() for event in decided)])
                 live.show(frame, faults, decided)
                 if lines.unheard:
