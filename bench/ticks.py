@@ -105,7 +105,9 @@ def main() -> None:
         measure(f"{name}, two busy loops", prefix, busy=2)
     os.sched_setaffinity(0, cores)
     for pages in (0, 5):
-        measure(f"nice 0, {pages} pages open", pages=pages)
+        measure(
+            f"fifo 10, {pages} pages open", POLICIES["fifo 10, as in real-time.conf"], pages=pages
+        )
 
 
 if __name__ == "__main__":

@@ -71,8 +71,7 @@ class UnknownTouches:
         for event in events:
             if isinstance(event, Decided):
                 touch = event.onset_s, event.contact
-                unknown = self._touches.pop(touch, False) or "unknown" in event.flags
-                self._touches[touch] = unknown
+                self._touches[touch] = self._touches.get(touch, False) or "unknown" in event.flags
         for old in list(self._touches)[:-LAST_TOUCHES]:
             del self._touches[old]
         unknown, touches = sum(self._touches.values()), len(self._touches)

@@ -6,6 +6,7 @@ import json
 import pytest
 
 from edge.cli import main
+from edge.commands import bench
 from edge.commands.bench import summary, touch
 from edge.model.model import Model
 from edge.skin.file import shipped
@@ -15,7 +16,7 @@ from edge.touch.track import ContactTracker, first_contact
 @pytest.fixture(scope="module")
 def board(exported, tmp_path_factory):
     out = tmp_path_factory.mktemp("bench") / "board.json"
-    given = ["--rounds", "40", "--skin", str(shipped("cody")), "--out", str(out)]
+    given = ["--rounds", "100", "--skin", str(shipped("cody")), "--out", str(out)]
     assert main(["bench", "--model", str(exported / "model.onnx"), *given]) == 0
     return json.loads(out.read_text())
 
@@ -25,7 +26,20 @@ def test_every_stage_has_a_median_and_a_99th_percentile(board):
     assert list(board["stages"]) == stages
     for stage in board["stages"].values():
         assert 0.0 < stage["median_us"] <= stage["p99_us"]
-        assert stage["n"] >= 20
+        assert stage["n"] >= 4
+
+
+def test_a_busy_machine_is_named_and_the_fastest_round_counts(exported, monkeypatch, caplog):
+    """The process gets a quarter of the time; each of its rounds is slower than the one before."""
+    rounds = iter(range(1, 6))
+    monkeypatch.setattr(bench.time, "process_time", iter((0.0, 0.25)).__next__)
+    monkeypatch.setattr(bench.time, "perf_counter", iter((0.0, 1.0)).__next__)
+    monkeypatch.setattr(bench, "time_stages", lambda *_: {"answer": {"median_us": next(rounds)}})
+    monkeypatch.setattr(bench, "cold_start_ms", lambda _: 100.0)
+    board = bench.measure(Model(exported / "model.onnx"), 100, None)
+    assert board["stages"] == {"answer": {"median_us": 1}}
+    assert board["load"]["waited"] == 0.75
+    assert "this machine is busy: bench waited 75% of the time" in caplog.text
 
 
 def test_memory_cold_start_and_machine_are_named(board):
