@@ -158,4 +158,4 @@ def paired(before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[float, 
 
 def points(gain: tuple[float, float, float]) -> str:
     """A paired difference in words, as in `+3 (-1 to +7)`."""
-    return "{:+.0f} ({:+.0f} to {:+.0f})".format(*gain)
+    return "{:+d} ({:+d} to {:+d})".format(*map(round, gain))

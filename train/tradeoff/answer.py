@@ -43,10 +43,10 @@ def answers(measured: Measured, task: str) -> list[Row]:
         if window in SHOWN_S
     ]  # fmt: skip
     for rule in distinct(measured.comparisons[task]):
-        how = f"as soon as sure, at most {100 * rule.asked:g} % wrong"
+        how = f"at most {100 * rule.asked:g} % wrong"
         command = f"`{EARLY}`, then `edge-classify run --error {rule.asked:g}`"
         rows.append(row(how, rule.mean_s + after_s, rule.result, command=command))
-    return [*rows, row("always the most frequent label", 0.0, majority(measured.y[task]))]
+    return [*rows, row("most frequent label", 0.0, majority(measured.y[task]))]
 
 
 def distinct(compared: StoppingComparison) -> list[Certified]:
@@ -91,7 +91,7 @@ def early(measured: Measured) -> Section:
         [
             f"{FOLDS} folds are held out in turn; the others choose, train and calibrate. An error "
             "rate is certified where the calibration trials show, with 90 % confidence, that "
-            f"decisions are wrong at most this often. {finest(measured.y)} names nothing where a "
+            f"decisions are wrong at most this often. No {finest(measured.y)} is named where a "
             "contact is unlike all trained ones, which counts as wrong; the other tasks are always "
             "decided. Rates that no fold certifies have no row. Some rows hold in some folds only, "
             "so rows of different rates are of different contacts.",
@@ -155,7 +155,7 @@ def reasons(measured: Measured) -> Section:
         "that the trials cannot certify, and names the smallest one that they can. Leave a margin "
         "above that. Early decisions were not measured on objects never met.",
     ]
-    rows: list[Row] = [{"object": name, "moves after s": round(at, 2)} for name, at in slow]
+    rows: list[Row] = [{"object": name, "moves after, s": round(at, 2)} for name, at in slow]
     table = Table("breakaway", "When each object that can move does", rows)
     return Section("Why, and how to have it", notes, [table])
 

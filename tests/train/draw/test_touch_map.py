@@ -17,16 +17,14 @@ HEAD = {"event": "map", "frame": "torso_lift_link", "unit": "metre", "tasks": ["
 
 
 def touch(n, place, label, confidence=1.0):
-    return {
+    known = {
         "event": "decision",
         "task": "category",
+        "flags": [],
         "contact": n,
         "onset_s": float(n),
-        "place": place,
-        "label": label,
-        "confidence": confidence,
-        "flags": [],
     }
+    return known | {"place": place, "label": label, "confidence": confidence}
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import csv
 import io
 
-import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from tests import browser
@@ -80,17 +79,11 @@ def test_a_table_without_rows_is_left_out(tmp_path):
     assert "Nothing" not in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("count", "words"), [(1, "1 recording"), (2, "2 recordings"), (1120, "1,120 recordings")]
-)
-def test_counts_agree_with_their_nouns(count, words):
-    assert counted(count, "recording") == words
-
-
 def test_words_are_explained_and_code_is_set_as_code():
     text = page("Title", ["take `make <x>`"], [Section("Words", terms={"k": "a & b"})])
     assert "<code>make &lt;x&gt;</code>" in text
     assert "<dt>k</dt><dd>a &amp; b</dd>" in text
+    assert (counted(1, "trial"), counted(1120, "trial")) == ("1 trial", "1,120 trials")
 
 
 def test_in_a_browser_nothing_overflows_and_no_link_leads_nowhere(tmp_path):

@@ -153,17 +153,11 @@ class TestCosts:
         assert cases["50 frames a second"].cost == "AD7147, 2 buses at 400 kHz are enough"
 
 
-@pytest.mark.parametrize(
-    ("text", "prices"),
-    [("wrong=10,second=1", (10.0, 1.0)), ("second=0,wrong=2.5", (2.5, 0.0)), ("wrong=10", None),
-     ("wrong=-1,second=1", None), ("wrong=inf,second=1", None), ("wrong=1,second=1,x=1", None)],
-)  # fmt: skip
-def test_prices_are_two_numbers(text, prices):
-    if prices is None:
+def test_prices_are_two_numbers():
+    assert cost("second=0,wrong=2.5") == (2.5, 0.0)
+    for text in ("wrong=10", "wrong=-1,second=1", "wrong=inf,second=1", "wrong=1,second=1,x=1"):
         with pytest.raises(argparse.ArgumentTypeError, match="like wrong=10,second=1"):
             cost(text)
-    else:
-        assert cost(text) == prices
 
 
 def test_the_dearer_an_error_the_longer_it_pays_to_wait():
@@ -249,17 +243,8 @@ class TestBoard:
         path = board_file(tmp_path / "board.json", "0" * 64)
         whole = path.read_text()
         assert board.read(path).memory_mb == 61.5
-        for wrong in (
-            "",
-            "{}",
-            "[]",
-            "[" * 100_000,
-            whole[: len(whole) // 2],
-            whole.replace("decision", "something"),
-            whole.replace("cold_start_ms", "start"),
-            whole.replace('"median_us": 100.0', '"median_us": NaN'),
-            whole.replace('"median_us": 100.0', '"median_us": "soon"'),
-        ):
+        changes = ("decision", "something"), ("cold_start_ms", "start"), ("100.0", "NaN")
+        for wrong in ("[" * 100_000, whole[:50], *(whole.replace(*change) for change in changes)):
             path.write_text(wrong)
             with pytest.raises(InputError, match="not a board file: .*; make one with"):
                 board.read(path)
@@ -308,7 +293,7 @@ def test_report_pictures_tables_and_front_are_written(make_touch, tmp_path, monk
     out = tmp_path / "out"
     report = tradeoff([str(tmp_path / "data")], out, str(path), scene_path=str(SCENE))
     text = report.read_text()
-    assert "http" not in text.replace("http-equiv", "")
+    assert "http" not in text
     assert "62 MB of memory, and 812 ms from starting Python" in text
     assert not browser.available() or browser.faults(report) == []
     assert (out / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
