@@ -89,12 +89,12 @@ def early(measured: Measured) -> Section:
     return Section(
         "As soon as it is sure",
         [
-            f"{FOLDS} folds are held out in turn; the others choose, train and calibrate. An error "
-            "rate is certified where the calibration trials show, with 90 % confidence, that "
-            f"decisions are wrong at most this often. No {finest(measured.y)} is named where a "
-            "contact is unlike all trained ones, which counts as wrong; the other tasks are always "
-            "decided. Rates that no fold certifies have no row. Some rows hold in some folds only, "
-            "so rows of different rates are of different contacts.",
+            f"Each of {FOLDS} folds is held out once; the others choose, train and calibrate. An "
+            "error rate is certified where the calibration trials show, with 90 % confidence, that "
+            "decisions are wrong at most this often. A contact unlike all trained ones waits for "
+            f"the full window. No {finest(measured.y)} is named for it, which counts as wrong. "
+            "Rates that no fold certifies have no row. Some rates are certified in some folds "
+            "only, so their rows are of fewer contacts.",
             f"Each decision point is one run of the same graph, {decision_us:.0f} us of features "
             f"and decision on {board.name}. All {count} together take "
             f"{1e-3 * count * decision_us:.1f} ms of arithmetic for a contact, while the program "
@@ -125,7 +125,7 @@ def prices(measured: Measured) -> Section:
         [
             f"A wrong decision costs {measured.wrong:g} here, and a second {measured.second:g}. "
             'Your own prices give other windows: `make tradeoff TRADEOFF="--cost '
-            'wrong=10,second=1"`.'
+            'wrong=10,second=1"`. The best of several windows looks a little better than it is.'
         ],
         [Table("price", "The window at which a decision costs least on average", rows)],
     )
