@@ -24,7 +24,6 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.stats import binom
-from threadpoolctl import threadpool_limits
 
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
@@ -33,9 +32,9 @@ from train.dataset import DataSet, load_trials
 from train.fitting import fit
 from train.pipeline import columns_of
 from train.progress import bar
+from train.rules import RISK
 from train.simulate import scene as scenes
 from train.simulate.run import write
-from train.stopping import RISK, answers, confidences, stops, unlike
 
 SCENE = Path(__file__).parents[1] / "train" / "scenes" / "cody18.toml"
 POINTS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
@@ -77,21 +76,16 @@ def realised(
     model = fitted.sequential
     assert model is not None
     X = X[:, rows[:, None], columns_of(fitted.dataset.names, drawn.names, drawn.widths())]
-    every, seconds = np.arange(X.shape[1]), np.array(POINTS_S)
+    seconds = np.array(POINTS_S)
     outcomes = np.full((len(drawn.tasks), 1 + len(ERRORS), 4), np.nan)
-    with threadpool_limits(1):
-        answered = {task: answers(model.decision_points_, task, X) for task in drawn.tasks}
-    unknown = unlike(model.novelty_, answered[model.novelty_.task][2])
-    for task, right, out in zip(drawn.tasks, labels, outcomes, strict=True):
-        named, margins, _ = answered[task]
+    _, _, courses = model.judged(X, dict(zip(drawn.tasks, labels, strict=True)))
+    for task, out in zip(drawn.tasks, outcomes, strict=True):
         stopping = model.stopping_[task]
-        confidence = confidences(stopping.slopes, stopping.intercepts, margins)
-        wrong = (named != right) | (unknown & (task == model.novelty_.task))
         for place, error in zip(out, (stopping.smallest_error, *ERRORS), strict=True):
             rule = stopping.rule(error)
             if rule is not None:
-                at = stops(confidence, rule, unknown)
-                place[:] = error, wrong[at, every].mean(), rule.mean_s, seconds[at].mean()
+                at, wrong = courses[task].under(rule)
+                place[:] = error, wrong.mean(), rule.mean_s, seconds[at].mean()
     return outcomes
 
 

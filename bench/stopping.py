@@ -25,7 +25,8 @@ from edge.touch.feature_sets import expand
 from edge.touch.features import FEATURES, SAMPLES
 from train.dataset import read
 from train.evaluate import stratified_folds
-from train.stopping import THRESHOLDS, finest
+from train.rules import THRESHOLDS
+from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed, some
 from train.tradeoff.early import FOLDS, compare_stopping

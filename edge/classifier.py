@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset, Release
+from edge.model.agreement import product_label
 from edge.model.model import Decision, Model, require_joints
 from edge.model.stopping import NOVELTY_RATE, UNKNOWN, StoppingRule, check_rate
 from edge.recording import Recording
@@ -44,6 +45,8 @@ class _Waiting:
     decision_point: int
     """Index of the next of the model's decision points."""
     tasks: list[str]
+    """Those that wait; a task follows those of which it is the product."""
+    decided: dict[str, Decided] = field(default_factory=dict)
 
 
 class Classifier:
@@ -65,9 +68,11 @@ class Classifier:
     With an error rate, each task follows the fastest stopping rule that the model holds certified
     for that rate: it is decided at the first decision point that is sure enough, and at the rule's
     last in any case (see `edge.model.stopping`). A task for which no rule is certified is decided
-    at the full window, flagged `uncertified`. An unknown contact waits for the full window, and the
-    label of the task with the most labels, such as the object, is then "unknown". `unsure` flags
-    that the window ended before the confidence was reached.
+    at the full window, flagged `uncertified`. A task that is the product of two others, as category
+    is of softness and mobility, never contradicts them: it is decided when both are, by their
+    labels, and they follow its rule where it has one. An unknown contact waits for the full window,
+    and the label of the task with the most labels, such as the object, is then "unknown". `unsure`
+    flags that the window ended before the confidence was reached.
 
     Flags of a decision: `unknown` (the contact is unlike everything in training; only a model with
     decision points can tell), `tie` (another label had as many votes), `short` (the stream ended
@@ -152,7 +157,8 @@ class Classifier:
                 number = self._begun
                 self._numbers[contact] = number
                 first = 0 if self.error is not None else len(self.model.decision_points_s) - 1
-                tasks = list(self.model.info.tasks)
+                info = self.model.info
+                tasks = sorted(info.tasks, key=info.products.__contains__)
                 self._waiting.append(_Waiting(contact, number, first, tasks))
                 events.append(Onset(contact.onset_s, self._named(number)))
             if contact.ended:
@@ -282,8 +288,11 @@ class Classifier:
             answers = [replace(answer, flags=(*flags, OUT_OF_RANGE)) for answer in answers]
         else:
             novel = self._novel(decision_point, decisions)
-            judged = [self._answer(waiting, a, decisions[a.task], novel) for a in answers]
-            answers = [answer for answer in judged if answer is not None]
+            for blank in answers:
+                answer = self._answer(waiting, blank, decisions[blank.task], novel)
+                if answer is not None:
+                    waiting.decided[answer.task] = answer
+            answers = [waiting.decided[t] for t in waiting.tasks if t in waiting.decided]
         waiting.decision_point += 1
         for answer in answers:
             waiting.tasks.remove(answer.task)
@@ -321,16 +330,27 @@ class Classifier:
             return replace(
                 blank, label=label, confidence=confidence, flags=flags, decision=decision
             )
-        assert decision.label_distances is not None
         info, at, rule = self.model.info, waiting.decision_point, self._rules[blank.task]
-        confidence = info.stopping[blank.task].confidence(
-            at, decision.label_distances.tolist(), info.tasks[blank.task].labels.index(label)
-        )
-        sure = rule is not None and confidence >= rule.confidence
-        full = len(self.model.decision_points_s) - 1
-        last = full if rule is None or unknown else rule.last
-        if at < last and (unknown or not sure):
-            return None
+        task = info.tasks[blank.task]
+        if task.factors:
+            if not waiting.decided.keys() >= task.factors.keys():
+                return None
+            parts = {factor: waiting.decided[factor] for factor in task.factors}
+            indices = {f: info.tasks[f].labels.index(str(p.label)) for f, p in parts.items()}
+            label = task.labels[product_label(task.factors, indices)]
+            confidence = math.prod(part.confidence for part in parts.values())
+            sure = all(part.stopped_by == "confidence" for part in parts.values())
+            decision = decision._replace(label=label)
+        else:
+            assert decision.label_distances is not None
+            confidence = info.stopping[blank.task].confidence(
+                at, decision.label_distances.tolist(), task.labels.index(label)
+            )
+            sure = rule is not None and confidence >= rule.confidence
+            full = len(self.model.decision_points_s) - 1
+            last = full if rule is None or unknown else rule.last
+            if at < last and (unknown or not sure):
+                return None
         if unknown and info.novelty is not None and blank.task == info.novelty.task:
             label, confidence = UNKNOWN, 1.0 - novel
         elif rule is not None and not sure and not rule.fixed:

@@ -98,6 +98,7 @@ def describe(
                 features=choice.features,
                 left_out=chosen[task].left_out if task in chosen else TRIAL,
                 no_contact=NO_CONTACT if NO_CONTACT in _labels(dataset, task) else None,
+                factors=classifier.products_.get(task, {}),
             )
             for task, choice in classifier.choices.items()
         },

@@ -122,7 +122,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     bounds = {
         key: bound
         for key, bound in BOUNDS.items()
-        if info.decision_points_s or key != "label_distances"
+        if info.has_label_distances or key != "label_distances"
     }
     meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays, meta, compress=True)

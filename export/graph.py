@@ -137,7 +137,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         labels, classes = last.labels_[task], len(last.classes_[task])
         nearest = values, places, length
         _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])
-        if early:
+        if early or last.products_:
             all_squares = build.node("Add", [squares, length])
             areas = build.by_decision_point([unit**2 for unit in units])
             sums = _label_sums(build, all_squares, labels, classes)
@@ -174,7 +174,7 @@ def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str,
             (f"{task}_distances", DoubleTensorType([None, choice.k])),
             (f"{task}_neighbours", Int64TensorType([None, choice.k])),
         ]
-        if isinstance(model, SequentialClassifier):
+        if isinstance(model, SequentialClassifier) or model.products_:
             outputs.append((f"{task}_label_distances", DoubleTensorType([None, classes])))
     outputs.append(("out_of_range", DoubleTensorType([None])))
     return outputs

@@ -6,13 +6,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.recording import Recording
 from edge.touch.feature_sets import expand
+from train.agreement import products
 from train.dataset import DataSet
 from train.evaluate import (
     NEIGHBOURS,
@@ -166,31 +166,6 @@ def candidates(
             ]
             tried.append(Candidate(tuple(sets), kind, tuple(scaled)))
     return tried
-
-
-def products(y: Labels) -> dict[str, tuple[str, str]]:
-    """{task: two other tasks whose labels together determine its own, and follow from it}.
-
-    Neither of the two determines the task alone.
-    """
-    pairs: dict[str, tuple[str, str]] = {}
-    for task, labels in y.items():
-        factors = [
-            other
-            for other in y
-            if other != task and _determines(labels, y[other]) and not _determines(y[other], labels)
-        ]
-        for a, b in combinations(factors, 2):
-            joined = np.char.add(np.char.add(y[a], "\0"), y[b])
-            if task not in pairs and _determines(joined, labels):
-                pairs[task] = (a, b)
-    return pairs
-
-
-def _determines(a: NDArray[np.str_], b: NDArray[np.str_]) -> bool:
-    """Whether the labels b follow from the labels a."""
-    pairs = {(x, z) for x, z in zip(a.tolist(), b.tolist(), strict=True) if x and z}
-    return len(pairs) == len({x for x, _ in pairs})
 
 
 def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:

@@ -17,6 +17,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
+from train.agreement import factors_of
 from train.projection import Projection
 from train.scaling import widths_of
 
@@ -175,6 +176,7 @@ class ContactClassifier:
         rows_: {space: (m, c)} these trials, projected.
         classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
         components_: {task: components kept}, at most as many as there are.
+        products_: {task: its factors} of the tasks decided together; see `edge.model.agreement`.
     """
 
     def __init__(
@@ -227,6 +229,8 @@ class ContactClassifier:
         }
         self.members_ = {space: np.flatnonzero(each) for space, each in counts.items()}
         self.rows_ = {s: self.project(s, X[members]) for s, members in self.members_.items()}
+        used = {t: np.where(counts[space] > 0, y[t], "") for t, space in self.spaces_.items()}
+        self.products_ = factors_of(used)
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""Deciding as soon as it is sure: calibrated confidence, and rules certified by learn-then-test.
+"""Deciding as soon as it is sure: a calibrated confidence at each decision point.
 
 A model decides at several decision points, each with a window, a projection and training rows of
 its own. Confidence, rules and novelty limits are made from trials that the deciding model did not
@@ -12,51 +12,29 @@ machines, 1999). A label's distance is that of its nearest twentieth
 (`train.pipeline.label_distances`). So it is the same for the folds' models, which have fewer
 trials, as for the exported one.
 
-**Rules.** A rule decides at the first decision point whose confidence reaches a threshold, or
-always at one window. Its error rate is bounded by learn-then-test (Angelopoulos, Bates, Candès,
-Jordan and Lei, 2021). The hypothesis that a rule errs more often than `error` is rejected by the
-exact binomial test on the calibration trials, at a level of `TEST_SHARE` times `RISK`. The first
-hypothesis is that of the full window. If it is rejected, its level passes in equal parts to the two
-families of rules. Each family is walked from the most careful rule to the boldest until a test
-fails (fixed-sequence testing within a graph: Bretz, Maurer, Brannath and Posch, 2009). The tests
-are monotone in `error`. So a rule's certified error is the largest upper confidence limit met on
-the way to it, and one table of rules serves every `error`. The confidences for the tests of a
-fold's trials come from a logistic regression on the other folds.
+**Rules** are certified by `train.rules`.
 
 A touch that is unlike the training data at a decision point waits, for the full window if it stays
 so: rules are tested with this wait, at `NOVELTY_RATE` and with the other folds' limits for a fold's
 distances. An error is a wrong label. The task with most labels then names nothing, so an `unknown`
 for a trained object is an error of it too.
-
-The tests are exact for the average of the folds' models. The exported model is fitted on all
-trials, a tenth (or a fifth) more, with its own choice of settings. On average it errs a little less
-often, in a single case more or less often. On 200 data sets of 140 trials the two differ by a
-quarter to a third more than the binomial distribution explains. With the full risk for the tests,
-the smallest certified error was exceeded in 14 to 22 of 100 sets instead of ten, so they take half
-of it. `make risk` counts it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.special import expit
-from scipy.stats import beta
 from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
-from edge.model.stopping import (
-    NOVELTY_RATE,
-    TEST_SHARE,
-    Novelty,
-    Stopping,
-    StoppingRule,
-    margin,
-)
+from edge.model.agreement import agreed
+from edge.model.stopping import NOVELTY_RATE, Novelty, Stopping, margin
 from edge.touch.features import FEATURES
 from train.pipeline import (
     Choice,
@@ -66,6 +44,7 @@ from train.pipeline import (
     types_of,
     vote,
 )
+from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
 
 FOLDS = 10
@@ -74,12 +53,6 @@ MANY_TRIALS = 400
 """With so many trials `FEWER_FOLDS` are enough, as four fifths of the trials fit a good model."""
 FEWEST = 20
 """Trials that calibration needs."""
-RISK = 0.1
-"""Probability that a certificate is wrong."""
-THRESHOLDS = np.round(expit(np.arange(8.0, -1.05, -0.1)), 4)
-"""Confidences at which rules stop, evenly spaced in the logarithm of their odds."""
-NEVER = 2.0
-"""A confidence that is never reached."""
 PULL = 0.5
 """Weight of the prior of a logistic regression, a slope of 1 a standard deviation."""
 LEAST_SLOPE = 1e-3
@@ -95,30 +68,49 @@ class HeldOut:
         right: (decision points, n) whether the named labels are right.
         margins: (decision points, n) their margins.
         distances: (decision points, n) to the nearest training trial.
-        unknown: (decision points, n) whether the trial is unlike all trained ones.
     """
 
     right: NDArray[np.bool_]
     margins: NDArray[np.float64]
     distances: NDArray[np.float64]
-    unknown: NDArray[np.bool_]
 
 
-def answers(
-    models: Sequence[ContactClassifier], task: str, X: NDArray[np.float64]
-) -> tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]:
-    """Labels, margins and nearest distances (decision points, m) of vectors (points, m, p)."""
-    labels, margins, distances = [], [], []
-    for model, x in zip(models, X, strict=True):
+Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]]
+"""{task: labels, margins and nearest distances, (decision points, m) each}."""
+
+
+def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answers:
+    """What models, one for each decision point, answer to vectors (points, m, p)."""
+    points = [_answers(model, x) for model, x in zip(models, X, strict=True)]
+    by_task = {task: zip(*(point[task] for point in points), strict=True) for task in points[0]}
+    return {
+        task: (np.array(labels), np.array(margins), np.array(distances))
+        for task, (labels, margins, distances) in by_task.items()
+    }
+
+
+def _answers(model: ContactClassifier, x: NDArray[np.float64]) -> dict[str, tuple[Any, ...]]:
+    """{task: labels, margins and nearest distances} of vectors (m, p)."""
+    labels, to_labels, nearest = {}, {}, {}
+    for task, choice in model.choices.items():
         squares = model.squares(task, x)
-        rows = np.argsort(squares, axis=1, kind="stable")[:, : model.choices[task].k]
+        rows = np.argsort(squares, axis=1, kind="stable")[:, : choice.k]
         classes = len(model.classes_[task])
-        named, _ = vote(model.labels_[task][rows], classes)
-        to_labels = label_distances(squares, model.labels_[task], classes).tolist()
-        labels.append(model.classes_[task][named])
-        margins.append([margin(d, int(c)) for d, c in zip(to_labels, named, strict=True)])
-        distances.append(np.sqrt(squares.min(axis=1)))
-    return np.array(labels), np.array(margins), np.array(distances)
+        labels[task], _ = vote(model.labels_[task][rows], classes)
+        to_labels[task] = label_distances(squares, model.labels_[task], classes)
+        nearest[task] = np.sqrt(squares.min(axis=1))
+    for task, factors in model.products_.items():
+        together, distances = agreed(task, factors, to_labels)
+        labels |= together
+        to_labels |= distances
+    margins = {
+        task: [margin(d, int(c)) for d, c in zip(to_labels[task].tolist(), named, strict=True)]
+        for task, named in labels.items()
+    }
+    return {
+        task: (model.classes_[task][named], margins[task], nearest[task])
+        for task, named in labels.items()
+    }
 
 
 def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[float, float]:
@@ -145,75 +137,6 @@ def confidences(
 ) -> NDArray[np.float64]:
     """(points, m) probabilities that labels with these margins (points, m) are right."""
     return np.asarray(expit(np.array(slopes)[:, None] * margins + np.array(intercepts)[:, None]))
-
-
-def upper_limit(wrong: int, trials: int, level: float) -> float:
-    """The largest error rate that `wrong` of `trials` does not reject at a level (exact)."""
-    return 1.0 if wrong >= trials else float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
-
-
-def stops(
-    confidence: NDArray[np.float64], rule: StoppingRule, unknown: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """(n,) the decision point at which a rule decides, as `edge.Classifier` does.
-
-    Args:
-        confidence: (points, n) that the labels are right.
-        rule: the rule.
-        unknown: (points, n) whether the contact is unlike all trained ones, and so waits.
-    """
-    decides = (confidence >= rule.confidence) & ~unknown
-    decides[rule.last :] = ~unknown[rule.last :]
-    decides[-1] = True
-    return np.asarray(decides.argmax(axis=0))
-
-
-def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
-    """The full window's rule, and two families, each from the most careful to the boldest."""
-    full = StoppingRule(1.0, 0.0, NEVER, points - 1)
-    sure = [StoppingRule(1.0, 0.0, float(c), points - 1) for c in THRESHOLDS]
-    fixed = [StoppingRule(1.0, 0.0, NEVER, last) for last in range(points - 2, -1, -1)]
-    return full, [sure, fixed]
-
-
-def certify(
-    confidence: NDArray[np.float64],
-    wrong: NDArray[np.bool_],
-    seconds: NDArray[np.float64],
-    unknown: NDArray[np.bool_],
-    level: float = TEST_SHARE * RISK,
-) -> list[StoppingRule]:
-    """The rules that no other rule beats in both certified error and mean time, the safest first.
-
-    Args:
-        confidence: (points, n) that the labels are right.
-        wrong: (points, n) whether deciding there is an error.
-        seconds: (points,) windows.
-        unknown: (points, n) whether contacts wait for the full window.
-        level: of the tests; see the module.
-    """
-    n = wrong.shape[1]
-
-    def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:
-        at = stops(confidence, rule, unknown)
-        limit = upper_limit(int(wrong[at, np.arange(n)].sum()), n, level)
-        mean = float(seconds[at].mean())
-        return StoppingRule(max(limit, before), mean, rule.confidence, rule.last)
-
-    full, families = candidates(len(seconds))
-    passed = [tested(full, level, 0.0)]
-    for family in families:
-        before = passed[0].error
-        for rule in family:
-            passed.append(tested(rule, level / len(families), before))
-            before = passed[-1].error
-    # Among equal rules the fixed window comes first, as it needs no confidence.
-    passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))
-    kept: list[StoppingRule] = []
-    for rule in passed:
-        if rule.error < 1.0 and (not kept or rule.mean_s < kept[-1].mean_s - 1e-9):
-            kept.append(rule)
-    return kept or [passed[0]]
 
 
 def novelty(task: str, distances: NDArray[np.float64]) -> Novelty:
@@ -327,18 +250,29 @@ class SequentialClassifier:
             for k, answers_of in enumerate(by_fold):
                 left_out = folds == k
                 named[:, left_out], margins[:, left_out], distances[:, left_out] = answers_of[task]
-            tested = (folds >= 0) & (y[task] != "")
-            right = named == y[task]
-            self.held_out_[task] = HeldOut(
-                right[:, tested], margins[:, tested], distances[:, tested], unknown[:, tested]
-            )
-        self.novelty_ = novelty(most, self.held_out_[most].distances)
-        self.stopping_ = {
-            task: self._calibrated(
-                held_out, folds[(folds >= 0) & (y[task] != "")], withheld=task == most
-            )
+            self.held_out_[task] = HeldOut(named == y[task], margins, distances)
+        tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
+        self.novelty_ = novelty(most, nearest[:, tested[most]])
+        confidence = {
+            task: calibrated(held_out, folds, tested[task])
             for task, held_out in self.held_out_.items()
         }
+        right = {task: held_out.right for task, held_out in self.held_out_.items()}
+        courses = self._courses(confidence, right, unknown, tested)
+        seconds = np.array(self.decision_points_s)
+        rules = {task: certify(course, seconds) for task, course in courses.items()}
+        for task, factors in self.products_.items():
+            for factor in factors:
+                rules[factor] = following(rules[factor], rules[task], courses[factor], seconds)
+        self.stopping_ = {}
+        for task, held_out in self.held_out_.items():
+            tests = tested[task]
+            curves = map(logistic, held_out.margins[:, tests], held_out.right[:, tests])
+            slopes, intercepts = zip(*curves, strict=True)
+            _, wrong = courses[task].under(candidates(len(seconds))[0])
+            self.stopping_[task] = Stopping(
+                slopes, intercepts, tuple(rules[task]), len(wrong), int(wrong.sum()), RISK
+            )
         return self
 
     def _fold(
@@ -348,25 +282,58 @@ class SequentialClassifier:
         left_out: NDArray[np.bool_],
         choices: Mapping[str, Choice],
         own: NDArray[np.bool_] | None,
-    ) -> dict[str, tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]]:
+    ) -> Answers:
         others = {task: y[task][~left_out] for task in y}
         owned = None if own is None else own[~left_out]
         models = _models(X[:, ~left_out], others, choices, self.features, self.widths, owned)
         with threadpool_limits(1):
-            return {task: answers(models, task, X[:, left_out]) for task in choices}
+            return answers(models, X[:, left_out])
 
-    def _calibrated(
+    @property
+    def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:
+        """{task: its factors} of the tasks decided together."""
+        return self.decision_points_[-1].products_
+
+    def judged(
+        self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
+    ) -> tuple[dict[str, NDArray[np.str_]], dict[str, NDArray[np.float64]], dict[str, Course]]:
+        """Labels and confidences (points, m) and course of each task, for trials that are new.
+
+        Args:
+            X: (points, m, p).
+            y: {task: (m,) labels}.
+        """
+        with threadpool_limits(1):
+            answered = answers(self.decision_points_, X)
+        confidence = {
+            task: confidences(self.stopping_[task].slopes, self.stopping_[task].intercepts, margins)
+            for task, (_, margins, _) in answered.items()
+        }
+        named = {task: labels for task, (labels, *_) in answered.items()}
+        right = {task: labels == y[task] for task, labels in named.items()}
+        unknown = unlike(self.novelty_, answered[self.novelty_.task][2])
+        tested = {task: y[task] != "" for task in named}
+        return named, confidence, self._courses(confidence, right, unknown, tested)
+
+    def _courses(
         self,
-        held_out: HeldOut,
-        folds: NDArray[np.int64],
-        *,
-        withheld: bool,
-    ) -> Stopping:
-        confidence = calibrated(held_out, folds)
-        wrong = ~held_out.right | held_out.unknown if withheld else ~held_out.right
-        rules = certify(confidence, wrong, np.array(self.decision_points_s), held_out.unknown)
-        slopes, intercepts = zip(*map(logistic, held_out.margins, held_out.right), strict=True)
-        return Stopping(slopes, intercepts, tuple(rules), len(folds), int(wrong[-1].sum()), RISK)
+        confidence: Mapping[str, NDArray[np.float64]],
+        right: Mapping[str, NDArray[np.bool_]],
+        unknown: NDArray[np.bool_],
+        tested: Mapping[str, NDArray[np.bool_]],
+    ) -> dict[str, Course]:
+        """{task: its course}, from each task's own answers (points, n).
+
+        The trials `tested` (n,) count; for a product, those that count for its factors too.
+        """
+        courses = {}
+        for task in self.choices:
+            parts = tuple(self.products_.get(task, (task,)))
+            own = np.all([tested[t] for t in (task, *parts)], axis=0)
+            said = [confidence[part][:, own] for part in parts]
+            wrong = [~right[part][:, own] for part in parts]
+            courses[task] = Course(said, wrong, unknown[:, own], task == self.novelty_.task)
+        return courses
 
 
 def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
@@ -388,12 +355,14 @@ def _models(
         return [ContactClassifier(choices, features, widths).fit(x, y, own) for x in X]
 
 
-def calibrated(held_out: HeldOut, folds: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(points, n) confidences, each fold's by a logistic regression on the other folds."""
-    out = np.empty(held_out.right.shape)
+def calibrated(
+    held_out: HeldOut, folds: NDArray[np.int64], tested: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """(points, n) confidences, each fold's by a logistic regression on the other folds' tested."""
+    out = np.zeros(held_out.right.shape)
     for fold in range(int(folds.max()) + 1):
-        own = folds == fold
-        others = map(logistic, held_out.margins[:, ~own], held_out.right[:, ~own])
-        slopes, intercepts = zip(*others, strict=True)
+        own, others = folds == fold, tested & (folds != fold)
+        curves = map(logistic, held_out.margins[:, others], held_out.right[:, others])
+        slopes, intercepts = zip(*curves, strict=True)
         out[:, own] = confidences(slopes, intercepts, held_out.margins[:, own])
     return out

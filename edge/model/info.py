@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class Task:
         features: the features that it takes, in the model's order; empty for all.
         left_out: the groups left out to score the accuracy: "trial", or a label such as "object".
         no_contact: the answer for a recording that ends without a contact, or None.
+        factors: of a task that is decided together with two others; see `edge.model.agreement`.
     """
 
     labels: tuple[str, ...]
@@ -50,6 +52,7 @@ class Task:
     features: tuple[str, ...] = ()
     left_out: str = "trial"
     no_contact: str | None = None
+    factors: Mapping[str, Sequence[int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,16 @@ class ModelInfo:
         return feature_vector(series, window_s, self.samples, self.features, self.kernels)
 
     @property
+    def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
+        """{task: its factors} of the tasks that are decided together with two others."""
+        return {name: task.factors for name, task in self.tasks.items() if task.factors}
+
+    @property
+    def has_label_distances(self) -> bool:
+        """Whether the graph gives the distances of the labels."""
+        return bool(self.decision_points_s or self.products)
+
+    @property
     def dof(self) -> int | None:
         """Number of joint angles that a frame must have; None if the model needs none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
@@ -144,7 +157,7 @@ class ModelInfo:
             {
                 **calibration,
                 "format": FORMAT,
-                "tasks": {name: vars(task) for name, task in self.tasks.items()},
+                "tasks": {name: _to_dict(task) for name, task in self.tasks.items()},
                 "skin": self.layout.to_dict(),
                 "tracking": vars(self.tracking),
                 "window_s": self.window_s,
@@ -249,6 +262,12 @@ class ModelInfo:
                 or self.novelty.task not in self.tasks
             ):
                 raise InputError(f"{name}: its decision points are impossible; export it again")
+        for task, factors in self.products.items():
+            places = [range(len(self.tasks[f].labels)) for f in factors if f in self.tasks]
+            fit = {len(self.tasks[task].labels)} == {len(indices) for indices in factors.values()}
+            pairs = sorted(zip(*factors.values(), strict=fit))
+            if not fit or len(places) != 2 or pairs != list(product(*places)):
+                raise InputError(f"{name}: the factors of {task} are impossible; export it again")
         if len(self.trials) not in (0, self.rows):
             raise InputError(
                 f"{name}: names {len(self.trials)} of {self.rows} trials; export it again"
@@ -257,10 +276,15 @@ class ModelInfo:
             raise InputError(f"{name}: its motion frame contradicts its arm; export it again")
 
 
+def _to_dict(task: Task) -> dict[str, Any]:
+    return {key: value for key, value in vars(task).items() if key != "factors" or value}
+
+
 def _task(table: ConfigTable) -> Task:
     labels = table.texts("labels")
     if not labels:
         raise table.fail("labels", "a list of at least one text")
+    factors = table.table("factors", {})
     task = Task(
         labels,
         k=table.whole("k", allowed=range(1, 1 << 31)),
@@ -271,6 +295,7 @@ def _task(table: ConfigTable) -> Task:
         features=table.texts("features"),
         left_out=table.text("left_out"),
         no_contact=table.text("no_contact") if table.has("no_contact") else None,
+        factors={f: factors.wholes(f) for f in factors.raw},
     )
     table.done()
     return task

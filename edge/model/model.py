@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from edge.errors import EdgeError, InputError
 from edge.files import open_regular, parsing
 from edge.model import onnx_file
+from edge.model.agreement import agreed
 from edge.model.info import METADATA_KEY, ModelInfo
 
 LARGEST_BYTES = 1 << 30
@@ -28,14 +29,16 @@ class Decision(NamedTuple):
     (2, True)
 
     Attributes:
-        label: what was touched.
+        label: what was touched. A task that is decided together with others (see
+            `edge.model.agreement`) may have another label than most votes.
         confidence: the label's share of the votes, 0 to 1.
         scores: (labels,) share of the votes of each label.
         distances: (k,) of the neighbours, nearest first, in PCA space.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) mean squared distance to the nearest (up to three) training
-            trials of each label, of a model with decision points; see `edge.model.stopping`.
+            trials of each label, of a model with decision points or with tasks that are decided
+            together: the distance of the nearest answer with this label in which they agree.
         out_of_range: the features lie so far outside those of the training trials that the model
             cut them off; see `train.projection.Grid`.
     """
@@ -132,7 +135,7 @@ class Model:
                 outputs[f"{task}_scores"][0],
                 outputs[f"{task}_distances"][0],
                 outputs[f"{task}_neighbours"][0],
-                outputs[f"{task}_label_distances"][0] if self.info.decision_points_s else None,
+                outputs[f"{task}_label_distances"][0] if self.info.has_label_distances else None,
             )
             for task, entry in self.info.tasks.items()
         ]
@@ -161,7 +164,7 @@ class Model:
         for task, entry in self.info.tasks.items():
             widths |= {f"{task}_label": [], f"{task}_scores": [len(entry.labels)]}
             widths |= {f"{task}_distances": [entry.k], f"{task}_neighbours": [entry.k]}
-            if self.info.decision_points_s:
+            if self.info.has_label_distances:
                 widths[f"{task}_label_distances"] = [len(entry.labels)]
         for output, width in widths.items():
             if output not in outputs or outputs[output][1:] != width:
@@ -223,12 +226,21 @@ class Model:
         except Exception as error:  # an index past its tensor, a shape that came out otherwise
             raise self._broken(str(error)) from None
         out_of_range = self._out_of_range.item() > 0.0
+        labels: dict[str, Any] = {answer.task: answer.label[0] for answer in self._answers}
+        if min(labels.values()) < 0:
+            raise self._refusal(x)
+        distances = {
+            answer.task: answer.label_distances.copy()
+            for answer in self._answers
+            if answer.label_distances is not None
+        }
+        for task, factors in self.info.products.items():
+            together, nearest = agreed(task, factors, distances)
+            labels |= together
+            distances |= nearest
         decisions: dict[str, Decision] = {}
         for answer in self._answers:
-            index = int(answer.label[0])
-            if index < 0:
-                raise self._refusal(x)
-            shares = answer.scores.tolist()
+            index, shares = int(labels[answer.task]), answer.scores.tolist()
             if index >= len(answer.labels) or not 0.0 <= shares[index] <= 1.0:
                 raise self._broken(
                     f"{answer.task} is answered by label {index} of {len(answer.labels)}"
@@ -239,8 +251,8 @@ class Model:
                 answer.scores.copy(),
                 answer.distances.copy(),
                 answer.neighbours.copy(),
-                shares.count(shares[index]) > 1,
-                None if answer.label_distances is None else answer.label_distances.copy(),
+                shares.count(max(shares)) > 1,
+                distances.get(answer.task),
                 out_of_range,
             )
         return decisions

@@ -81,7 +81,8 @@ class Stopping:
     Attributes:
         slopes, intercepts: of each decision point: the probability that the label is right is the
             logistic function of slope * `margin` + intercept.
-        rules: rising in error, falling in mean time.
+        rules: rising in error. Mean times fall, but from a factor's own rules to those that it
+            shares with its product (see `edge.model.agreement`).
         trials: number of trials that certify the rules.
         wrong: number of these that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.

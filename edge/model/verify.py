@@ -10,7 +10,7 @@
 | `series_counts` | int64 (s, c) | `FeatureSeries.integers` |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
-| `<task>_label_distances` | float64 (v, labels) | likewise, of a model with decision points |
+| `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
 | `meta` | JSON text | `skin`, `bounds` {`scores`, `label_distances`, `features`, `time_s`} |
@@ -191,7 +191,7 @@ def _graph(
 
 def parts(model: Model) -> tuple[str, ...]:
     """Outputs of a model for a task."""
-    return (*PARTS, "label_distances") if model.info.decision_points_s else PARTS
+    return (*PARTS, "label_distances") if model.info.has_label_distances else PARTS
 
 
 def outputs(

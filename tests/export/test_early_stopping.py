@@ -1,20 +1,23 @@
 """The graph's distances to each label, and the board's stopping, against the estimators."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import onnxruntime
 import pytest
 
+import train
 from edge.classifier import Classifier, stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.info import Task
 from edge.model.model import Model
-from edge.model.verify import verify
+from edge.model.verify import first_series, verify
 from edge.recording import save
 from edge.touch.features import FEATURES
 from export.__main__ import main as export
+from export.api import save as save_model
 from export.graph import to_onnx
 from train.dataset import load_trials
 from train.pipeline import Choice
@@ -173,3 +176,61 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early)
         assert {name: values.tolist() for name, values in seen.items()} == {
             name: values.tolist() for name, values in expected.items()
         }
+
+
+def pressed(make_touch, seeds):
+    """Touches whose category is the product of softness and of how hard they are pressed."""
+    for kind, press, seed in itertools.product(("hard", "soft"), (4, 5), seeds):
+        given = make_touch(kind=kind, seed=seed)
+        labels = {"softness": kind, "mobility": f"by {press}", "category": f"{kind}-by {press}"}
+        meta = {**given.meta, "labels": labels}
+        frames = (given.frames * (press / 4)).astype(np.uint16)
+        yield replace(given, frames=frames, meta=meta)
+
+
+@pytest.fixture(scope="module")
+def agreeing(make_touch, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("agreement")
+    for i, recording in enumerate(pressed(make_touch, range(8))):
+        save(folder / f"{i:02d}.npz", recording)
+    fitted = train.fit(
+        folder, features=["paper"], decision_points_s=(0.3, 0.6, 1.2), quick=True, jobs=1
+    )
+    save_model(folder / "model.onnx", fitted)
+    return fitted, Model(folder / "model.onnx")
+
+
+@pytest.mark.parametrize("asked", [None, 0.3, 0.5, 0.9])
+def test_no_decision_contradicts_another(agreeing, make_touch, asked):
+    _, model = agreeing
+    assert model.info.products.keys() == {"category"}
+    for recording in pressed(make_touch, range(50, 55)):
+        events = Classifier(model, error=asked).classify(recording)
+        decided = {event.task: event for event in events if isinstance(event, Decided)}
+        parts = [decided[task] for task in ("softness", "mobility")]
+        category = decided["category"]
+        assert category.label == "-".join(part.label for part in parts)
+        assert category.decision.label == category.label
+        assert category.window_s == max(part.window_s for part in parts)
+
+
+def test_the_board_decides_as_the_trials_that_certified_its_rules_were(agreeing, make_touch):
+    fitted, model = agreeing
+    recordings = list(pressed(make_touch, range(60, 65)))
+    vectors = [
+        [model.info.vector(first_series(r, model)[1], s) for r in recordings]
+        for s in model.decision_points_s
+    ]
+    truth = {
+        task: np.array([recording.labels[task] for recording in recordings])
+        for task in model.info.tasks
+    }
+    _, _, courses = fitted.sequential.judged(np.array(vectors), truth)
+    error = model.info.stopping["category"].smallest_error
+    for task, course in courses.items():
+        at, wrong = course.under(model.info.stopping[task].rule(error))
+        for i, recording in enumerate(recordings):
+            events = Classifier(model, error=error).classify(recording)
+            (event,) = (e for e in events if isinstance(e, Decided) and e.task == task)
+            assert event.window_s == model.decision_points_s[at[i]]
+            assert (event.label != truth[task][i]) == wrong[i]

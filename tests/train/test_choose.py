@@ -16,7 +16,6 @@ from train.choose import (
     costs,
     groupable,
     kinds_of,
-    products,
     without_folds,
 )
 from train.evaluate import AnswerTable
@@ -28,12 +27,6 @@ TASKS = {
     "object": np.array(["wall", "box", "pillow", "ball"]),
     "softness": np.array(["rigid", "rigid", "soft", "soft"]),
 }
-
-
-def test_a_task_is_the_product_of_two_others_where_their_labels_say_so():
-    assert products(TASKS)["category"] == ("mobility", "softness")
-    assert "mobility" not in products(TASKS)
-    assert products({task: TASKS[task] for task in ("category", "mobility")}) == {}
 
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():

@@ -1,52 +1,19 @@
-"""Learn-then-test: exact limits, walks that stop at the first failure, certificates that hold."""
+"""Calibrated confidences: logistic curves, folds, novelty, and the trials of each task."""
 
 import numpy as np
 import pytest
-from scipy.stats import binom
 
 from edge.errors import InputError
-from edge.model.stopping import NOVELTY_RATE, TEST_SHARE, StoppingRule
+from edge.model.stopping import NOVELTY_RATE
 from train.pipeline import Choice
 from train.stopping import (
-    NEVER,
-    RISK,
     SequentialClassifier,
     answers,
-    certify,
     confidences,
     folds_of,
     logistic,
-    stops,
     unlike,
-    upper_limit,
 )
-
-
-@pytest.mark.parametrize(("wrong", "trials"), [(0, 20), (3, 140), (139, 140), (140, 140)])
-def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
-    limit = upper_limit(wrong, trials, 0.1)
-    assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
-    assert binom.cdf(wrong, trials, limit - 1e-6) > 0.1
-
-
-class TestStops:
-    CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
-
-    def stop(self, unknown=(), **rule):
-        given = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "last": 2}
-        waits = np.zeros((3, 3), dtype=bool)
-        waits[tuple(np.array(unknown, dtype=int).reshape(-1, 2).T)] = True
-        return stops(self.CONFIDENCE, StoppingRule(**{**given, **rule}), waits).tolist()
-
-    def test_at_the_first_decision_point_that_is_sure(self):
-        assert self.stop() == [0, 1, 0]
-
-    def test_a_fixed_window_waits_for_it_and_no_longer(self):
-        assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
-
-    def test_what_is_unknown_waits_until_it_is_known_or_for_the_full_window(self):
-        assert self.stop(unknown=[(0, 0), (1, 1), (2, 1)]) == [1, 2, 0]
-        assert self.stop(unknown=[(0, 1), (1, 1)], confidence=NEVER, last=0) == [0, 2, 0]
 
 
 class TestLogistic:
@@ -80,55 +47,6 @@ class TestLogistic:
 SECONDS = np.array([0.4, 0.8, 1.2])
 
 
-def known(like):
-    """No contact is unknown."""
-    return np.zeros(like.shape, dtype=bool)
-
-
-def drawn(n, rng):
-    """Confidences that are the probability of being right, and outcomes drawn with them."""
-    final = rng.beta(8.0, 1.0, n)
-    confidence = np.stack([0.4 + 0.2 * final, 0.2 + 0.7 * final, final])
-    right = rng.random(n) < confidence
-    return confidence, right
-
-
-def test_the_first_rule_is_the_full_window_at_the_whole_level():
-    confidence, right = drawn(140, np.random.default_rng(1))
-    rules = certify(confidence, ~right, SECONDS, known(right))
-    wrong = int((~right[-1]).sum())
-    assert rules[0].error == pytest.approx(upper_limit(wrong, 140, TEST_SHARE * RISK))
-
-
-def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
-    """What the first decision point gets right counts for nothing once the full window, which is
-    tested first, has 20 of 100 wrong."""
-    wrong = np.zeros((3, 100), dtype=bool)
-    wrong[-1, :20] = True
-    rules = certify(np.full((3, 100), 0.9), wrong, SECONDS, known(wrong))
-    assert [rule.error for rule in rules] == [
-        pytest.approx(upper_limit(20, 100, TEST_SHARE * RISK))
-    ]
-
-
-def test_certificates_fail_no_oftener_than_they_say():
-    """Of 300 calibrations the share whose rule errs more often than certified; at most a tenth."""
-    error, rng = 0.2, np.random.default_rng(2)
-    world_confidence, world = drawn(20_000, rng)
-    failed = 0
-    for _ in range(300):
-        confidence, right = drawn(100, rng)
-        able = [
-            rule
-            for rule in certify(confidence, ~right, SECONDS, known(right))
-            if rule.error <= error
-        ]
-        if able:
-            at = stops(world_confidence, able[-1], known(world))
-            failed += 1.0 - world[at, np.arange(20_000)].mean() > error
-    assert failed <= binom.ppf(0.99, 300, TEST_SHARE * RISK)
-
-
 def touches(n, seed=0):
     """At the first decision point the labels look alike; from the second on they do not."""
     rng = np.random.default_rng(seed)
@@ -145,7 +63,7 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     rule = model.stopping_["t"].rule(0.1)
     assert rule.mean_s <= 0.83
     new, truth = touches(300, seed=1)
-    named, _, _ = answers(model.decision_points_, "t", new)
+    named, _, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
 
 
@@ -171,7 +89,7 @@ def test_a_held_out_trial_is_never_its_own_neighbour():
     model = SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS, ("max_force",))
     model.fit(X, {"t": labels})
     assert (model.held_out_["t"].distances > 0.0).all()
-    _, _, own = answers(model.decision_points_, "t", X)
+    _, _, own = answers(model.decision_points_, X)["t"]
     assert (own == 0.0).all()
 
 
@@ -214,7 +132,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.held_out_["t"].right[-1].all()
-    _, _, distances = answers(model.decision_points_, "t", X[..., model.columns_])
+    _, _, distances = answers(model.decision_points_, X[..., model.columns_])["t"]
     assert (distances == 0.0).all()
 
 

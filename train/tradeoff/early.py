@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from train.evaluate import Result, stratified_folds
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
-from train.stopping import NEVER, THRESHOLDS, answers, confidences, finest, stops, unlike
+from train.rules import NEVER, THRESHOLDS, Course, candidates
+from train.stopping import finest
 from train.tradeoff.choices import some
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
@@ -71,6 +72,7 @@ class StoppingComparison:
         confidence: (decision points, n) calibrated.
         unknown: (decision points, n) whether the contact is unlike all trained ones.
         certified: one entry for each asked error.
+        factors: of a task that is decided when these are; see `edge.model.agreement`.
     """
 
     decision_points_s: tuple[float, ...]
@@ -78,6 +80,7 @@ class StoppingComparison:
     confidence: NDArray[np.float64]
     unknown: NDArray[np.bool_]
     certified: list[Certified]
+    factors: tuple[StoppingComparison, ...] = ()
 
     @property
     def trials(self) -> int:
@@ -92,12 +95,13 @@ class StoppingComparison:
     def when_sure(self) -> list[tuple[float, float, float]]:
         """(confidence asked for, mean seconds, share wrong) of stopping at each threshold."""
         seconds = np.array(self.decision_points_s)
+        parts = self.factors or (self,)
+        course = Course([p.confidence for p in parts], [~p.right for p in parts], self.unknown)
         curve = []
         for threshold in (NEVER, *THRESHOLDS.tolist()):
             rule = StoppingRule(1.0, 0.0, threshold, len(seconds) - 1)
-            at = stops(self.confidence, rule, self.unknown)
-            wrong = 1.0 - float(self.right[at, np.arange(self.trials)].mean())
-            curve.append((threshold, float(seconds[at].mean()), wrong))
+            at, wrong = course.under(rule)
+            curve.append((threshold, float(seconds[at].mean()), float(wrong.mean())))
         return curve
 
     @property
@@ -116,8 +120,9 @@ class _Fold:
     test: NDArray[np.int64]
     named: dict[str, NDArray[np.str_]]
     confidence: dict[str, NDArray[np.float64]]
-    unknown: NDArray[np.bool_]
+    courses: dict[str, Course]
     rules: dict[str, dict[float, StoppingRule | None]]
+    products: Mapping[str, Iterable[str]]
 
 
 def compare_stopping(
@@ -125,15 +130,14 @@ def compare_stopping(
 ) -> dict[str, StoppingComparison]:
     """{task: comparison}. Folds are held out in turn; a quick export of the others answers them."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    most = finest(y)
-    folds = stratified_folds(y[most], FOLDS)
+    folds = stratified_folds(y[finest(y)], FOLDS)
     tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
     cases = [(dataset, test, decision_points_s) for test in tests]
     held_out: list[_Fold] = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
     comparisons, unknown = {}, np.empty(shape, dtype=bool)
     for fold in held_out:
-        unknown[:, fold.test] = fold.unknown
+        unknown[:, fold.test] = fold.courses[finest(y)].unknown
     for task, labels in y.items():
         named = np.empty(shape, dtype=labels.dtype)
         confidence = np.empty(shape)
@@ -146,11 +150,11 @@ def compare_stopping(
             right,
             confidence,
             unknown,
-            [
-                _certified(error, task, held_out, right, decision_points_s, withheld=task == most)
-                for error in ERRORS
-            ],
+            [_certified(error, task, held_out, decision_points_s) for error in ERRORS],
         )
+    for task, factors in held_out[0].products.items():
+        parts = tuple(comparisons[factor] for factor in factors)
+        comparisons[task] = replace(comparisons[task], factors=parts)
     return comparisons
 
 
@@ -163,42 +167,33 @@ def _held_out(
     assert model is not None
     names = fitted.dataset.names
     new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])
-    named, confidence = {}, {}
-    unknown = np.empty(new.shape[:2], dtype=bool)
-    for task in model.choices:
-        named[task], margins, distances = answers(model.decision_points_, task, new)
-        stopping = model.stopping_[task]
-        confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
-        if task == model.novelty_.task:
-            unknown = unlike(model.novelty_, distances)
+    truth = {task: others.labels(task) for task in model.choices}
+    named, confidence, courses = model.judged(new, truth)
     rules = {
         task: {error: stopping.rule(error) for error in ERRORS}
         for task, stopping in model.stopping_.items()
     }
-    return _Fold(test, named, confidence, unknown, rules)
+    return _Fold(test, named, confidence, courses, rules, model.products_)
 
 
 def _certified(
     error: float,
     task: str,
     folds: Sequence[_Fold],
-    right: NDArray[np.bool_],
     decision_points_s: Sequence[float],
-    *,
-    withheld: bool,
 ) -> Certified:
     """The decisions at one asked error."""
     seconds = np.array(decision_points_s)
+    waiting, _ = candidates(len(seconds))
     rows = []
     for fold in folds:
         rule = fold.rules[task][error]
         if rule is None:
             continue
-        at, every = stops(fold.confidence[task], rule, fold.unknown), np.arange(len(fold.test))
-        unknown = fold.unknown & withheld
-        named = right[:, fold.test] & ~unknown
-        rows.append([named[at, every], named[-1], unknown[at, every],
-                     at < len(seconds) - 1, seconds[at]])  # fmt: skip
+        course = fold.courses[task]
+        (at, wrong), (_, late) = course.under(rule), course.under(waiting)
+        unknown = course.unknown[at, np.arange(len(at))] & course.withheld
+        rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])
     decided, waited, *shares = (
         map(np.concatenate, zip(*rows, strict=True)) if rows else np.empty((5, 0))
     )

@@ -24,6 +24,7 @@ from train.commands.tradeoff import cost
 from train.dataset import read
 from train.evaluate import Result
 from train.pipeline import Choice
+from train.rules import Course
 from train.tradeoff import answer, board, costs, early
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
@@ -201,16 +202,14 @@ class TestEarly:
 
     def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(self):
         rule = StoppingRule(0.1, 0.0, 0.5, 1)
+        wrong = np.array([[True, False, False, False], [False] * 4])
+        unknown = np.array([[False] * 4, [True, False, False, False]])
+        course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
         folds = [
-            early._Fold(
-                np.arange(4) + 4 * k, {}, {"t": np.full((2, 4), 0.5)},
-                np.array([[False] * 4, [True, False, False, False]]),
-                {"t": {0.1: rule if k else None}},
-            )
-            for k in range(2)
-        ]  # fmt: skip
-        right = np.array([[False] * 5 + [True] * 3, [True] * 8])
-        found = early._certified(0.1, "t", folds, right, (0.6, 1.2), withheld=True)
+            early._Fold(np.arange(4), {}, {}, {"t": course}, {"t": {0.1: given}}, {})
+            for given in (None, rule)
+        ]
+        found = early._certified(0.1, "t", folds, (0.6, 1.2))
         assert (found.folds, found.result.right, found.result.total) == (1, 3, 4)
         # At the full window one more is right and one names nothing.
         assert found.gain[0] == 0.0

@@ -1,0 +1,46 @@
+"""Tasks that agree: one whose labels are the pairs of two others' labels is decided with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Factors = Mapping[str, Sequence[int]]
+"""{factor: the index of its label for each label of the product}. A product, such as category, has
+one label for each pair of its two factors' labels, such as mobility and softness."""
+
+
+def agreed(
+    task: str, factors: Factors, distances: Mapping[str, NDArray[Any]]
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """The nearest answer in which a product and its factors agree.
+
+    An answer's distance is the sum of its three labels' distances.
+
+    Args:
+        task: the product.
+        factors: of the product.
+        distances: {task: (..., labels) mean squared distances} of the three tasks at least.
+
+    Returns:
+        {task: (...) indices of the answer's labels}, and {task: (..., labels) distance of the
+        nearest answer with each label}, of the three tasks.
+    """
+    columns = {factor: np.array(indices) for factor, indices in factors.items()}
+    totals = sum((distances[f][..., indices] for f, indices in columns.items()), distances[task])
+    best = np.asarray(totals.argmin(axis=-1))
+    labels, nearest = {task: best}, {task: totals}
+    for factor, indices in columns.items():
+        labels[factor] = indices[best]
+        with_label = [totals[..., indices == i].min(axis=-1) for i in range(indices.max() + 1)]
+        nearest[factor] = np.stack(with_label, axis=-1)
+    return labels, nearest
+
+
+def product_label(factors: Factors, indices: Mapping[str, int]) -> int:
+    """The index of the product's label for the factors' labels (indices)."""
+    pairs = list(zip(*factors.values(), strict=True))
+    return pairs.index(tuple(indices[factor] for factor in factors))

@@ -1,0 +1,41 @@
+"""The nearest consistent answer, beside every one of them written out."""
+
+import itertools
+
+import numpy as np
+
+from edge.model.agreement import agreed, product_label
+
+FACTORS = {"mobility": (0, 1, 0, 1), "softness": (0, 0, 1, 1)}
+
+
+def test_the_answer_has_the_smallest_sum_of_all_that_agree():
+    rng = np.random.default_rng(0)
+    category, mobility, softness = rng.integers(0, 9, (3, 200, 4))
+    distances = {"category": category, "mobility": mobility[:, :2], "softness": softness[:, :2]}
+    labels, nearest = agreed("category", FACTORS, distances)
+    for i in range(200):
+        sums = {
+            (m, s): category[i, 2 * s + m] + mobility[i, m] + softness[i, s]
+            for m, s in itertools.product((0, 1), repeat=2)
+        }
+        m, s = labels["mobility"][i], labels["softness"][i]
+        assert sums[m, s] == min(sums.values())
+        assert labels["category"][i] == 2 * s + m
+        assert nearest["softness"][i].tolist() == [min(sums[0, s], sums[1, s]) for s in (0, 1)]
+
+
+def test_a_single_touch_is_answered_as_in_a_batch():
+    distances = {"category": [4.0, 0.0, 1.0, 1.0], "mobility": [0.0, 2.0], "softness": [3.0, 0.0]}
+    arrays = {task: np.array(values) for task, values in distances.items()}
+    labels, nearest = agreed("category", FACTORS, arrays)
+    assert {task: int(index) for task, index in labels.items()} == {
+        "category": 2, "mobility": 0, "softness": 1,
+    }  # fmt: skip
+    assert nearest["category"].tolist() == [7.0, 5.0, 1.0, 3.0]
+    assert nearest["mobility"].tolist() == [1.0, 3.0]
+
+
+def test_two_labels_decided_apart_name_the_label_of_their_product():
+    assert product_label(FACTORS, {"mobility": 1, "softness": 0}) == 1
+    assert product_label(FACTORS, {"softness": 1, "mobility": 0}) == 2
