@@ -23,6 +23,8 @@ from train.dataset import load_trials
 CHECKOUT = Path(__file__).resolve().parents[1]
 TOUCHES = ("cardboard-box-fixed", "cardboard-box-movable", "foam-block-fixed", "pillow-movable")
 META = ("arm", "labels", "skin", "source", "trial")
+COUNT_STEP = 8
+"""Counts are multiples of this, as of a coarser converter: their noise is most of the files."""
 ENCODER_STEPS = 2**17
 """Steps of a radian: an encoder of 20 bits a turn is about as fine, and such angles pack well."""
 
@@ -40,7 +42,8 @@ def main(folder: Path) -> None:
         assert contact is not None, f"{touch} touches nothing"
         short = golden.trimmed(replace(recording, valid=None), contact[0], model)
         # Every other frame takes half the bytes; features are sampled in time.
-        arrays = {"t": (short.t - short.t[0])[::2], "frames": short.frames[::2]}
+        frames = short.frames[::2] // COUNT_STEP * COUNT_STEP
+        arrays = {"t": (short.t - short.t[0])[::2], "frames": frames}
         if short.joints is not None:
             arrays["joints"] = np.rint(short.joints[::2] * ENCODER_STEPS) / ENCODER_STEPS
         meta = {key: short.meta[key] for key in META if key in short.meta}
