@@ -107,7 +107,7 @@ def confusion(name: str, title: str, truth: NDArray[np.str_], said: NDArray[np.s
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
-        axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
+        axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
         small = {"fontsize": 6} if phone and n > 6 else {}
         axes.set_xticks(range(n), range(1, n + 1), **small)
         axes.set_yticks(range(n), numbered, **small)

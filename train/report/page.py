@@ -15,7 +15,7 @@ from edge.files import write_whole
 from train.report.section import Figure, Section, Table
 
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
-LONGEST = 32
+LONGEST = 20
 """Rows that a table may have before it is folded."""
 CODE = re.compile(r"`([^`]+)`")
 KEYS = 1
