@@ -1,4 +1,4 @@
-"""The study's findings: how well each method tells a new contact, with known and new objects."""
+"""The study's findings: each method's accuracy on new contacts, with known and new objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a change of speed, arm or sensor costs; of simulated data sets only."""
+"""The cost of another speed, arm or sensor, for simulated data sets."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def rows(column: str, results: Results, table: str = "") -> list[Row]:
 
 
 def confusion(context: Context) -> Section:
-    """Figs. 6 to 8."""
+    """What each thing touched is taken for (Figs. 6 to 8)."""
     best: list[Row] = []
     cells: list[Row] = []
     pictures = []
@@ -90,7 +90,7 @@ def confusion(context: Context) -> Section:
 
 
 def window(context: Context) -> Section:
-    """Fig. 10."""
+    """Accuracy at each time window (Fig. 10)."""
     cases = [(context.vectors(seconds), context.labels) for seconds in WINDOWS_S]
     answers = context.workers.map("time window", grid_search, cases)
     results = dict(zip(WINDOWS_S, answers, strict=True))
@@ -117,7 +117,7 @@ def window(context: Context) -> Section:
 
 
 def scaling(context: Context) -> Section:
-    """Table II."""
+    """Accuracy with each scaling (Table II)."""
     cases = [(context.vectors(), context.labels, method) for method in SCALINGS]
     answers = context.workers.map("feature scaling", grid_search, cases)
     text = (
@@ -135,7 +135,7 @@ def scaling(context: Context) -> Section:
 
 
 def features(context: Context) -> Section:
-    """Table III."""
+    """Accuracy with each combination of features (Table III)."""
     cases = [(context.vectors(names=names), context.labels, "none", names) for names in SUBSETS]
     answers = context.workers.map("features", grid_search, cases)
     results = {" ".join(names): result for names, result in zip(SUBSETS, answers, strict=True)}
@@ -175,7 +175,7 @@ def _through_coarser(
 
 
 def resolution(context: Context) -> Section:
-    """Table I and Fig. 9."""
+    """Accuracy with larger taxels (Table I, Fig. 9)."""
     data, labels = context.dataset, context.labels
     chunks = np.array_split(np.arange(len(data.trials)), 8 * context.workers.jobs)
     cases = [

@@ -21,7 +21,7 @@ TITLED_S = (0.4, 1.2)
 ACROSS = 3
 """Most panels beside each other."""
 EARLY = f"make export EXPORT='--quick --decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1'"
-"""What exports the model that decides early."""
+"""The command that exports the model that decides early."""
 
 
 def answers(measured: Measured, task: str) -> list[Row]:

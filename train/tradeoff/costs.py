@@ -28,9 +28,9 @@ from train.tradeoff.wires import Wire, wires
 
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
-"""Of so many frames one is read."""
+"""Every n-th frame is read, for each n."""
 PARTS = (2, 4)
-"""Parts of the trials of which one is kept."""
+"""One n-th of the trials is kept, for each n."""
 FEWEST = 20
 """Trials below which no choice is made."""
 TIME = "time on this machine"

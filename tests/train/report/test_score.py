@@ -38,8 +38,8 @@ def test_the_best_cell_is_reported_with_what_it_said():
     assert best.right == int((best.said == y).sum())
 
 
-def test_a_changed_trial_is_never_told_by_its_own_twin():
-    """Trials that tell nothing of each other are told by chance, though their twins know."""
+def test_a_changed_trial_is_never_recognised_by_its_own_twin():
+    """Unrelated trials are named by chance, though their twins would recognise them."""
     rng = np.random.default_rng(4)
     X = rng.normal(size=(40, 9))
     y = {"t": rng.permutation(np.repeat(["a", "b"], 20))}

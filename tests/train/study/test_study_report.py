@@ -34,7 +34,7 @@ def test_the_papers_numbers_are_46_and_whole_trials_of_140():
     assert headline == {"category": 80.0, "mobility": 91.43, "object": 72.14}
 
 
-def test_numbers_that_a_scene_was_held_to_are_told_apart_from_predictions():
+def test_predictions_are_counted_without_the_numbers_that_a_scene_was_fitted_to():
     """The headlines of section IV-A stand in the tables eight times."""
     headlines = [e for e in entries() if e.headline]
     assert Counter(e.task for e in headlines) == {"category": 3, "mobility": 2, "object": 3}
@@ -60,7 +60,7 @@ def test_a_perfect_copy_differs_by_the_chance_of_both_samples():
     assert mean_of([{("I", "1", "t"): 80.0}, {("I", "1", "t"): 90.0}]) == {("I", "1", "t"): 85.0}
 
 
-def test_an_order_is_told_with_the_data_sets_that_have_it_and_what_chance_does():
+def test_an_order_stands_beside_the_data_sets_that_have_it_and_its_chance():
     paper = {(e.table, e.setting, e.task): e.percent for e in entries()}
     against = {key: 142.0 - percent for key, percent in paper.items()}
     section = comparison([paper, paper, against], 420)
@@ -125,7 +125,7 @@ def test_equal_scalings_are_equal(studied):
         assert scaled["none", task] == scaled["III", task]
 
 
-def test_easy_touches_are_told_and_the_findings_come_first(studied):
+def test_easy_touches_are_recognised_and_the_findings_come_first(studied):
     text = (studied / "report.html").read_text()
     assert re.findall(r"<h2>([^<]+)", text)[0] == "Findings"
     compared = rows(studied / "methods.csv")

@@ -187,17 +187,17 @@ def share_right(*shares):
 
 class TestEarly:
     def test_confidence_that_says_what_comes_true_has_no_calibration_error(self):
-        found = comparison(share_right(0.5, 0.5, 0.5))
-        assert found.calibration_error == pytest.approx(0.0)
+        compared = comparison(share_right(0.5, 0.5, 0.5))
+        assert compared.calibration_error == pytest.approx(0.0)
         assert comparison(share_right(0.9, 0.9, 0.9)).calibration_error == pytest.approx(0.4)
 
     def test_a_rule_that_serves_two_error_rates_is_listed_once(self):
-        found = comparison(share_right(0.5, 0.7, 0.9))
+        compared = comparison(share_right(0.5, 0.7, 0.9))
         right = np.arange(100) < 90
         rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
         bolder = replace(rule, asked=0.3, right=np.arange(100) < 70, mean_s=0.4)
-        found.certified.extend([rule, replace(rule, asked=0.2), bolder])
-        listed = [rule.asked for rule in answer.distinct(found)]
+        compared.certified.extend([rule, replace(rule, asked=0.2), bolder])
+        listed = [rule.asked for rule in answer.distinct(compared)]
         assert listed == [0.1, 0.3]
 
     def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(self):
@@ -209,19 +209,19 @@ class TestEarly:
             early._Fold(np.arange(4), {}, {}, {"t": course}, {"t": {0.1: given}}, {})
             for given in (None, rule)
         ]
-        found = early._certified(0.1, "t", folds, (0.6, 1.2))
-        assert (found.folds, found.result.right, found.result.total) == (1, 3, 4)
+        decisions = early._certified(0.1, "t", folds, (0.6, 1.2))
+        assert (decisions.folds, decisions.result.right, decisions.result.total) == (1, 3, 4)
         # At the full window one more is right and one names nothing.
-        assert found.gain[0] == 0.0
-        assert (found.mean_s, found.early, found.unknown) == (0.6, 1.0, 0.0)
+        assert decisions.gain[0] == 0.0
+        assert (decisions.mean_s, decisions.early, decisions.unknown) == (0.6, 1.0, 0.0)
 
     def test_what_is_plain_at_the_first_decision_point_is_decided_then(self, make_touch, tmp_path):
         for kind in ("hard", "soft"):
             for seed in range(20):
                 save(tmp_path / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
-        found = early.compare_stopping(followed(read([tmp_path])), (0.6, 1.2))["category"]
-        assert found.right.all()
-        rule = next(certified for certified in found.certified if certified.asked == 0.15)
+        compared = early.compare_stopping(followed(read([tmp_path])), (0.6, 1.2))["category"]
+        assert compared.right.all()
+        rule = next(certified for certified in compared.certified if certified.asked == 0.15)
         assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
