@@ -24,14 +24,13 @@ import numpy as np
 
 from edge import demo
 from edge.classifier import Classifier
-from edge.fake.faults import Fault
-from edge.fake.player import fake_skin
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
 from edge.runtime.touch_map import TouchMap, map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.touch.track import MAX_CONTACTS
+from tests.faulty import Fault, faulty_skin
 
 PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 GROWTH_KB = 2048
@@ -68,7 +67,7 @@ def main() -> int:
         tempfile.TemporaryDirectory() as folder,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener,
         open(os.devnull, "w") as out,
-        fake_skin(file, lambda t: touches[int(t) % 50], timed=True, faults=faults) as skin,
+        faulty_skin(file, lambda t: touches[int(t) % 50], faults, timed=True) as skin,
     ):
         listener.bind(("127.0.0.1", 0))
         listener.setblocking(False)

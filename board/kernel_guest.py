@@ -24,8 +24,7 @@ from smbus2 import SMBus
 
 from edge.cli import main
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import Fault
-from edge.fake.player import Playback, calibrated, fake_buses
+from edge.fake.player import Playback, calibrated
 from edge.fake.usb_adapter import UsbAdapter, plugged
 from edge.i2c.bus import BusBusy, BusDenied, BusFault, BusNack, LinuxBus, fetch
 from edge.recording import Recording, load, save
@@ -33,6 +32,7 @@ from edge.skin import file as skinfile
 from edge.skin.calibration import save_calibration
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
+from tests.faulty import Fault, faulty_buses
 
 SKINS = Path(os.environ["SKINS"])
 PERIOD_S = 0.1
@@ -51,7 +51,7 @@ class Adapter(UsbAdapter):
     def __init__(self, file):
         self._playback, self.short = None, False
         self._chips, self._readings, self._interrupt_s = len(file.chips), 0, math.inf
-        (bus,) = fake_buses(file, lambda t: self._playback(t), VirtualClock())
+        (bus,) = faulty_buses(file, lambda t: self._playback(t), VirtualClock())
         super().__init__(bus)
 
     def feel(self, recording, *, loop=False, interrupt=False):

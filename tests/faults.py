@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import Fault
-from edge.fake.player import calibrated, fake_buses
+from edge.fake.player import calibrated
 from edge.i2c import block
 from edge.i2c.chip import ChipSpec
 from edge.skin import file as skinfile
 from edge.skin.loop import Schedule
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
+from tests.faulty import Fault, faulty_buses
 from tests.wires import one_bus
 
 OVERHEADS_US = (0.0, 50.0, 100.0)
@@ -126,7 +126,7 @@ class Watched:
 
     def __init__(self, file, *, faults=(), overhead_s=0.0, seed=0):
         clock, self.feels = VirtualClock(), Pattern(file)
-        self.buses = fake_buses(
+        self.buses = faulty_buses(
             file, self.feels, clock, timed=True, overhead_s=overhead_s, faults=faults, seed=seed
         )
         self.skin = Skin(file, self.buses, clock=clock)
@@ -171,7 +171,7 @@ def run(name, file, faults, *, touched=None, end_s=END_S, seconds=LASTS_S, overh
         schedule = Schedule(skin.clock, skin.period_s)
         while schedule.wait() - start < seconds:
             watched.read()
-    met = sum(bus.script.met for bus in watched.buses)
+    met = sum(bus.met for bus in watched.buses)
     return watched.outcome(name, met, start + end_s, schedule)
 
 
@@ -209,7 +209,7 @@ def _one_fault(file, fault, set_up, overhead_s):
         for k in range(1, 1000):
             skin.clock.sleep_until(start + k * skin.period_s)
             t = watched.read().t
-            if not any(bus.script.met for bus in watched.buses):
+            if not any(bus.met for bus in watched.buses):
                 end = t
             if k > 4 and t - max(end, watched.back_at) > INTACT_FRAMES * skin.period_s:
                 break

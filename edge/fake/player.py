@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import NO_FAULTS, Fault
 from edge.i2c import block
 from edge.i2c.bus import wire_bits
 from edge.i2c.chip import UNUSED, ChipSpec, Sense
@@ -113,9 +112,9 @@ def fake_buses(
     *,
     timed: bool = False,
     overhead_s: float = 0.0,
-    faults: Sequence[Fault] = NO_FAULTS,
     noise_counts: float = 0.0,
     seed: int = 0,
+    make: type[FakeBus] = FakeBus,
 ) -> list[FakeBus]:
     """Fake chips on fake buses, as the skin's file lays them out.
 
@@ -125,23 +124,21 @@ def fake_buses(
         clock: shared by the buses.
         timed: the clock advances with the bits on the wire, and conversions take their time.
         overhead_s: time of the software for each transaction, where timed.
-        faults: see `edge.fake.faults`.
         noise_counts: standard deviation of the noise on raw values.
-        seed: of the noise, the faults and what power-up leaves undefined.
+        seed: of the noise and what power-up leaves undefined.
+        make: makes a bus.
     """
     rest = calibrated(file).calibration
     assert rest is not None
     buses = []
     for b, spec in enumerate(file.buses):
-        bus = FakeBus(
+        bus = make(
             spec.device,
             clock=clock,
             clock_hz=spec.clock_hz,
             timed=timed,
             timeout_s=file.reading.timeout_s,
             overhead_s=overhead_s,
-            faults=faults,
-            seed=seed,
             count=serial_bits if spec.serial else wire_bits,
         )
         shape = NOISE_FRAMES if noise_counts else 1, rest.baseline.size
@@ -199,20 +196,16 @@ def fake_skin(
     *,
     clock: VirtualClock | None = None,
     timed: bool = False,
-    faults: Sequence[Fault] = NO_FAULTS,
     noise_counts: float = 0.0,
-    seed: int = 0,
     touch_counts: int | None = None,
 ) -> Skin:
-    """A started skin over fake buses; see `fake_buses`. Faults begin after the start."""
+    """A started skin over fake buses; see `fake_buses`."""
     clock = clock or VirtualClock()
     file = calibrated(file, noise_counts)
-    buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts, seed=seed)
+    buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts)
     skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
     skin.start()
     clock.sleep_until(clock.now())
-    for bus in buses:
-        bus.inject(faults, seed)
     return skin
 
 

@@ -112,7 +112,7 @@ class AD7147(Chip):
         address: int,
         *,
         decimation: int = 64,
-        into: NDArray[np.uint8] | None = None,
+        into: NDArray[np.uint8] | int = 2 * STAGES,
     ) -> None:
         """Identify the chip.
 
@@ -120,14 +120,13 @@ class AD7147(Chip):
             bus: a bus or a mux's channel.
             address: 0x2C to 0x2F.
             decimation: 64, 128 or 256; see `REFRESH_S`.
-            into: (24,) bytes that `read` fills; new ones where None.
+            into: (24,) bytes that `read` fills; new ones where it is a number.
 
         Raises:
             WrongChip: the identity register does not read 0x147x.
             BusError: the chip does not answer.
         """
-        buffer = np.zeros(2 * STAGES, dtype=np.uint8) if into is None else into
-        super().__init__(bus, address, words((RESULTS,)), buffer)
+        super().__init__(bus, address, words((RESULTS,)), into)
         self._start = start_rows(decimation)
         self._checks = [
             (register, words(values), bus.prepare(write(address, words((register,))),
@@ -212,14 +211,10 @@ class FakeAD7147(FakeChip):
 
     def write(self, data: bytes, t: float) -> None:
         """Pointer, then words; writes to the read-only registers are lost."""
-        for i in range(0, len(data) - 1, 2):
-            word = int.from_bytes(data[i : i + 2], "big")
-            if i == 0:
-                self._pointer = word & 0x3FF
-                continue
-            if not STATUS <= self._pointer <= DEVICE_ID:
+        for i, word in enumerate(np.frombuffer(data[: len(data) & ~1], dtype=">u2").tolist()):
+            if i and not STATUS <= self._pointer <= DEVICE_ID:
                 self.registers[self._pointer] = word
-            self._pointer = (self._pointer + 1) & 0x3FF
+            self._pointer = (self._pointer + 1 if i else word) & 0x3FF
 
     def read(self, n: int, t: float) -> bytes:
         """Words from the pointer on."""

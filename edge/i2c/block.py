@@ -119,8 +119,8 @@ class Block(Chip):
             WrongChip: it serves something else.
             BusError: it does not answer.
         """
-        buffer = np.zeros(4 + data_bytes(taxels, bits), np.uint8) if into is None else into
-        super().__init__(bus, address, FRAME, buffer)
+        size = 4 + data_bytes(taxels, bits)
+        super().__init__(bus, address, FRAME, size if into is None else into)
         self._expected = identity(taxels, bits)
         self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
         served = fetch(bus, address, IDENTITY, 10)

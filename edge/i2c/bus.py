@@ -214,6 +214,10 @@ class Bus(Protocol):
     def sleep(self, seconds: float) -> None:
         """Wait; some chips need it."""
 
+
+class Adapter(Bus, Protocol):
+    """A bus that can be opened and closed: all but a mux's channel."""
+
     def reopen(self) -> None:
         """Open it anew; prepared transfers stay valid.
 

@@ -43,7 +43,9 @@ class Chip(ABC):
         frame: the prepared transfer `[write pointer][read all taxels]`.
     """
 
-    def __init__(self, bus: Bus, address: int, pointer: bytes, into: NDArray[np.uint8]) -> None:
+    def __init__(
+        self, bus: Bus, address: int, pointer: bytes, into: NDArray[np.uint8] | int
+    ) -> None:
         self.bus, self.address = bus, address
         self.frame = bus.prepare(write(address, pointer), read(address, into))
 

@@ -56,7 +56,9 @@ class MPR121(Chip):
     >>> list(chip.settings()); chip.read()                       # doctest: +SKIP
     """
 
-    def __init__(self, bus: Bus, address: int, *, into: NDArray[np.uint8] | None = None) -> None:
+    def __init__(
+        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * ELECTRODES
+    ) -> None:
         """Identify the chip as far as that is possible without a reset.
 
         It has no identity register. CONFIG2 holds our value where it runs, and its own after a
@@ -65,14 +67,13 @@ class MPR121(Chip):
         Args:
             bus: a bus or a mux's channel.
             address: 0x5A to 0x5D.
-            into: (24,) bytes that `read` fills; new ones where None.
+            into: (24,) bytes that `read` fills; new ones where it is a number.
 
         Raises:
             WrongChip: CONFIG2 holds something else.
             BusError: the chip does not answer.
         """
-        buffer = np.zeros(2 * ELECTRODES, dtype=np.uint8) if into is None else into
-        super().__init__(bus, address, bytes([RESULTS]), buffer)
+        super().__init__(bus, address, bytes([RESULTS]), into)
         self._state = bus.prepare(write(address, [CONFIG2]), read(address, 2))
         config = fetch(bus, address, bytes([CONFIG2]), 1)[0]
         if config not in (RESET_CONFIG2, SET_CONFIG2):

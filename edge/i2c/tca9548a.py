@@ -127,14 +127,6 @@ class Channel:
             self.mux.forget()
             raise
 
-    def reopen(self) -> None:
-        """Open the mux's bus anew."""
-        self.mux.forget()
-        self.mux.bus.reopen()
-
-    def close(self) -> None:
-        """Do nothing: whoever opened the bus closes it."""
-
 
 class FakeTCA9548A(FakeChip):
     """A model of the TCA9548A: the channels written connect at STOP."""

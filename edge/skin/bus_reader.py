@@ -16,7 +16,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.bus import Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout
+from edge.i2c.bus import Adapter, Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout
 from edge.i2c.chip import Chip, ChipSpec
 from edge.i2c.tca9548a import TCA9548A
 from edge.skin.file import Reading
@@ -78,7 +78,7 @@ class BusReader:
     """The chips of one bus, used by one thread at a time."""
 
     def __init__(
-        self, bus: Bus, spec: BusSpec, rows: Sequence[NDArray[np.uint8]], reading: Reading
+        self, bus: Adapter, spec: BusSpec, rows: Sequence[NDArray[np.uint8]], reading: Reading
     ) -> None:
         """Take the bus over; nothing is sent yet.
 
@@ -289,7 +289,8 @@ class BusReader:
         slot.good, slot.at = True, self.bus.now()
 
     def _driver(self, slot: Slot) -> Chip:
-        spec, bus = slot.spec, self.bus
+        spec = slot.spec
+        bus: Bus = self.bus
         if spec.mux is not None and spec.channel is not None:
             if spec.mux not in self._muxes:
                 verify, muxes = self._reading.verify_mux, self._muxes.values()

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator
-from dataclasses import fields
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,16 +19,12 @@ from edge.skin.file import SkinFile, TaxelCalibration, parse
 def calibration_text(calibration: TaxelCalibration) -> str:
     """The `[calibration]` table as TOML, one line for each row of the skin."""
 
-    def rows(values: Iterable[Iterable[object]]) -> Iterator[str]:
-        for row in values:
-            yield f"  [{', '.join(map(str, row))}],\n"
-
     lines = ["[calibration]\n"]
     if calibration.taken is not None:
         lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")
-    lines += ["baseline = [\n", *rows(calibration.baseline.tolist()), "]\n"]
-    noise = [[round(float(x), 3) for x in row] for row in calibration.noise]
-    lines += ["noise = [\n", *rows(noise), "]\n"]
+    for key, values in (("baseline", calibration.baseline), ("noise", calibration.noise.round(3))):
+        rows = "".join(f"  {row},\n" for row in values.tolist())
+        lines.append(f"{key} = [\n{rows}]\n")
     return "".join(lines)
 
 
@@ -46,11 +41,7 @@ def with_calibration(text: str, calibration: TaxelCalibration, where: str = "ski
     rest = table.sub("", text if text.endswith("\n") else text + "\n").rstrip("\n")
     out = f"{rest}\n\n{calibration_text(calibration)}"
     after = parse(out, where)
-    kept = all(
-        getattr(before, f.name) == getattr(after, f.name)
-        for f in fields(SkinFile)
-        if f.name != "calibration"
-    )
+    kept = replace(before, calibration=None) == replace(after, calibration=None)
     if not kept or after.calibration is None:
         raise InputError(f"{where}: write [calibration] as a table of its own, at the end")
     return out

@@ -180,9 +180,8 @@ class Loop:
             while not self._stop.asked:
                 due = self.schedule.wait(self._stop)
                 # A thousandth of a tick allows for rounding.
-                if due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s:
-                    return
-                if self._stop.asked:
+                ended = due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s
+                if ended or self._stop.asked:
                     return
                 frame = self.skin.read()
                 if self.joints is not None:

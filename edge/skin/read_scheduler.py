@@ -61,17 +61,14 @@ class ReadScheduler:
             touch_counts: a taxel above this is touched.
         """
         self._tick += 1
-        felt: NDArray[np.bool_] | None = None
-        if frame is not None:
-            felt = frame.counts.reshape(-1) > touch_counts
-            if not felt.any():
-                felt = None
+        counts = np.zeros(1) if frame is None else frame.counts
+        felt = counts.reshape(-1) > touch_counts
         return [self._plan(b, felt) for b in range(len(self._buses))]
 
-    def _plan(self, b: int, felt: NDArray[np.bool_] | None) -> list[int]:
+    def _plan(self, b: int, felt: NDArray[np.bool_]) -> list[int]:
         bus, read_at = self._buses[b], self._read_at[b]
         bits = MARGIN * bus.clock_hz / self._rate_hz
-        hot = np.zeros(len(bus.chips), dtype=np.bool_) if felt is None else self._near[b] @ felt
+        hot = np.any(self._near[b] & felt, axis=1).tolist()
         oldest_first = np.argsort(read_at, kind="stable").tolist()
         near = [i for i in oldest_first if hot[i]]
         away = [i for i in oldest_first if not hot[i]]

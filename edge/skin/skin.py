@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
-from edge.i2c.bus import Bus, LinuxBus
+from edge.i2c.bus import Adapter, LinuxBus
 from edge.i2c.chip import ChipSpec
 from edge.skin.baseline import Baseline
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, Slot
@@ -61,7 +61,7 @@ class Skin:
     def __init__(
         self,
         file: SkinFile,
-        buses: Sequence[Bus],
+        buses: Sequence[Adapter],
         *,
         clock: Clock | None = None,
         touch_counts: int | None = None,
@@ -137,7 +137,7 @@ class Skin:
                 f"`edge-classify calibrate --skin {file.path}` with nothing touching"
             )
         with ExitStack() as opened:
-            buses: list[Bus] = []
+            buses: list[Adapter] = []
             for spec in file.buses:
                 buses.append(_open(spec, file.reading.timeout_s))
                 opened.callback(buses[-1].close)
@@ -246,13 +246,8 @@ class Skin:
         settled = t - self._touched_at >= self.file.signal.settle_s
         if settled and self.file.calibration is not None:
             self.baseline.follow(self._decoder.values, valid)
-        shape = self.layout.shape
-        self._last = Frame(
-            t=t,
-            counts=counts.reshape(shape),
-            valid=valid.reshape(shape),
-            times=self._decoder.times.reshape(shape),
-        )
+        shape, times = self.layout.shape, self._decoder.times
+        self._last = Frame(t, counts.reshape(shape), valid.reshape(shape), times.reshape(shape))
         return self._last
 
     def close(self) -> None:
@@ -268,7 +263,7 @@ class Skin:
         self.close()
 
 
-def _open(spec: BusSpec, timeout_s: float) -> Bus:
+def _open(spec: BusSpec, timeout_s: float) -> Adapter:
     if spec.serial:
         from edge.i2c.serial_bus import SerialBus  # few skins have one
 

@@ -5,10 +5,9 @@ import errno
 import numpy as np
 import pytest
 
-from edge.fake.bus import FakeBus
-from edge.fake.faults import Fault
 from edge.i2c.bus import BusGone, BusNack, BusRefused, BusTimeout, fetch, read, send, write
 from edge.i2c.tca9548a import FakeTCA9548A
+from tests.faulty import Fault, FaultyBus
 
 
 class Echo:
@@ -31,7 +30,7 @@ class Echo:
 
 
 def bus(**options):
-    return FakeBus(chips={0x10: Echo(), 0x70: FakeTCA9548A()}, **options)
+    return FaultyBus(chips={0x10: Echo(), 0x70: FakeTCA9548A()}, **options)
 
 
 @pytest.mark.parametrize(

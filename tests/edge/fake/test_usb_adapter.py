@@ -7,10 +7,9 @@ import pytest
 
 from edge.errors import EdgeError, InputError
 from edge.fake import usb_adapter
-from edge.fake.bus import FakeBus
-from edge.fake.faults import Fault
 from edge.fake.usb_adapter import UsbAdapter, data_length, free_port, plugged
 from edge.i2c.tca9548a import FakeTCA9548A
+from tests.faulty import Fault, FaultyBus
 
 MUX = 0x70
 READ = 1
@@ -18,7 +17,7 @@ FIRST, LAST = 1, 2  # of a call's messages, added to request 4
 
 
 def adapter(*faults):
-    return UsbAdapter(FakeBus(chips={MUX: FakeTCA9548A()}, faults=faults))
+    return UsbAdapter(FaultyBus(chips={MUX: FakeTCA9548A()}, faults=faults))
 
 
 def submit(kind, request, value=0, index=0, length=0, data=b"", number=7):

@@ -6,16 +6,15 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from edge.fake.bus import FakeBus
-from edge.fake.faults import Fault
 from edge.i2c.ad7147 import AD7147, FakeAD7147
 from edge.i2c.bus import BusFault
 from edge.i2c.tca9548a import LEAVE_ATTEMPTS, TCA9548A, FakeTCA9548A
 from tests.edge.i2c.chips import parsed
+from tests.faulty import Fault, FaultyBus
 
 
 def muxed(**options):
-    bus = FakeBus(chips={0x70: FakeTCA9548A(), 0x71: FakeTCA9548A()})
+    bus = FaultyBus(chips={0x70: FakeTCA9548A(), 0x71: FakeTCA9548A()})
     for m, mux in enumerate((0x70, 0x71)):
         for n in range(8):
             value = np.full(12, 1000 * (m + 1) + n, dtype=np.uint16)
@@ -59,7 +58,7 @@ def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
     bus.inject([Fault(address=0x71, at=range(absent))])
     first.select(3)
     assert first.control == 1 << 3
-    assert bus.script.met == absent
+    assert bus.met == absent
     assert (bus.chips[0x71].connected == []) == opens
 
 

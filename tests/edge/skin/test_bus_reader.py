@@ -11,8 +11,7 @@ import pytest
 from edge.classifier import Classifier
 from edge.events import Decided
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import Fault
-from edge.fake.player import Playback, fake_buses, fake_skin
+from edge.fake.player import Playback
 from edge.i2c.bus import BusRefused, bus_error
 from edge.model.model import Model
 from edge.recording import load
@@ -28,6 +27,7 @@ from edge.skin.bus_reader import (
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
 from tests.faults import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts, sweep
+from tests.faulty import Fault, faulty_buses, faulty_skin
 
 CODY = SKINS["cody"]
 ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
@@ -88,7 +88,7 @@ def test_without_reading_back_a_wrong_channel_gives_wrong_values():
 def test_no_result_depends_on_what_power_up_leaves_undefined():
     def frames(seed):
         clock, feels = VirtualClock(), Pattern(CODY)
-        buses = fake_buses(CODY, feels, clock, timed=True, seed=seed)
+        buses = faulty_buses(CODY, feels, clock, timed=True, seed=seed)
         with Skin(CODY, buses, clock=clock) as skin:
             skin.start()
             skin.readers[0].bus.chips[0x70].channels[1][0x2D].reset()
@@ -101,13 +101,13 @@ def test_a_frame_that_breaks_off_before_its_last_byte_is_read_again():
     """All other bytes are intact, and the rest of the last value might be one."""
     feels = Pattern(CODY)
     met = wrong = 0
-    with fake_skin(CODY, feels, timed=True) as skin:
+    with faulty_skin(CODY, feels, timed=True) as skin:
         bus = skin.readers[0].bus
         for position in range(15):
             bus.inject([replace(KINDS["a frame that breaks off"], at=[position])], 0)
-            bus.script.random = SimpleNamespace(randrange=lambda n: n - 1)
+            bus.random = SimpleNamespace(randrange=lambda n: n - 1)
             wrong += feels.wrong(skin.read())
-            met += bus.script.met
+            met += bus.met
     assert (met, wrong) == (15, 0)
 
 
@@ -118,7 +118,7 @@ def chip_and_slot(skin):
 
 def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn():
     """13 rows of 12 chips, one every 4 frames; the values meanwhile look plausible."""
-    with fake_skin(CODY, Pattern(CODY)) as skin:
+    with faulty_skin(CODY, Pattern(CODY)) as skin:
         model, slot = chip_and_slot(skin)
         model.write(b"\0\x81\x12\x34", 0.0)
         for _ in range(13 * 12 * 4):
@@ -128,7 +128,7 @@ def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn():
 
 
 def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then():
-    with fake_skin(CODY, Pattern(CODY)) as skin:
+    with faulty_skin(CODY, Pattern(CODY)) as skin:
         model, slot = chip_and_slot(skin)
         model._sense = lambda t: np.zeros(12, dtype=np.uint16)
         set_up_in = []
@@ -142,7 +142,7 @@ def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now
 def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_start():
     clock = VirtualClock()
     refused = [Fault(code=errno.EOPNOTSUPP)]
-    buses = fake_buses(CODY, lambda t: QUIET, clock, faults=refused)
+    buses = faulty_buses(CODY, lambda t: QUIET, clock, faults=refused)
     with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
         BusReader(buses[0], CODY.buses[0], [np.zeros(24, np.uint8)] * 12, CODY.reading).start()
 
@@ -155,7 +155,7 @@ def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):
     lost = [Fault(bus=file.buses[0].device, channel=0, address=0x2C, during=(0.5, 1.0))]
     for faults, flagged in (((), False), (lost, True)):
         playback = Playback(trial)
-        with fake_skin(file, playback, faults=faults) as skin:
+        with faulty_skin(file, playback, faults=faults) as skin:
             classifier = Classifier(model, skin.layout)
             loop = Loop(skin, joints=playback, lasts_s=playback.ends)
             events = [event for frame in loop.frames() for event in classifier.push(frame)]
@@ -172,7 +172,7 @@ def changes(skin, seconds):
 
 def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
     lost = Fault(bus=CODY.buses[1].device, channel=1, address=0x2E, during=(0.1, 0.2))
-    with fake_skin(CODY, lambda t: QUIET, faults=[lost]) as skin:
+    with faulty_skin(CODY, lambda t: QUIET, faults=[lost]) as skin:
         (failed_at, down), (back_at, up) = changes(skin, 0.5)
     assert (failed_at, down.state, down.spec.address) == (0.1, "down", 0x2E)
     assert down.error.endswith("check its power, wiring and address (EREMOTEIO)")
@@ -184,7 +184,7 @@ def test_a_chip_that_fails_again_and_again_is_tried_every_0_3_s():
     """A loose wire, ten times a second: the user hears of it less than seven times a second."""
     chip = {"bus": CODY.buses[1].device, "channel": 1, "address": 0x2E}
     loose = [Fault(**chip, during=(0.1 * k, 0.1 * k + 0.05)) for k in range(1, 31)]
-    with fake_skin(CODY, lambda t: QUIET, faults=loose) as skin:
+    with faulty_skin(CODY, lambda t: QUIET, faults=loose) as skin:
         heard = [status.state for _, status in changes(skin, 3.5)]
     assert (heard[0], heard[-1]) == ("down", "running")
     assert len(heard) <= 2 * 3.0 / LONG_PAUSE_S + 2
@@ -192,7 +192,7 @@ def test_a_chip_that_fails_again_and_again_is_tried_every_0_3_s():
 
 def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():
     """An adapter that carries reads of at most 16 bytes: the registers, but not 12 taxels."""
-    with fake_skin(CODY, lambda t: QUIET) as skin:
+    with faulty_skin(CODY, lambda t: QUIET) as skin:
         chip, bus = skin.readers[1].slots[5].chip, skin.readers[1].bus
         transfer = bus.transfer
 
@@ -212,7 +212,7 @@ def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_hea
     name = CODY.buses[1].device
     gone = Fault(code=errno.EIO, bus=name, during=(0.1, 10.0))
     opened, heard = [], []
-    with fake_skin(CODY, lambda t: QUIET, faults=[gone]) as skin:
+    with faulty_skin(CODY, lambda t: QUIET, faults=[gone]) as skin:
         bus = skin.readers[1].bus
         reopen = bus.reopen
         bus.reopen = lambda: (opened.append(bus.now()), reopen())

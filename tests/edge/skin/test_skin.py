@@ -8,8 +8,7 @@ import pytest
 
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
-from edge.fake.faults import Fault
-from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_skin, frame_bits, still
 from edge.i2c import ad7147, mpr121
 from edge.i2c.block import UNCHANGED_FRAMES
 from edge.i2c.bus import BusMissing
@@ -19,6 +18,7 @@ from edge.skin.loop import Loop
 from edge.skin.skin import SILENT_FRAMES, Skin
 from edge.skin.wiring import BusSpec
 from tests.faults import SKINS
+from tests.faulty import Fault, faulty_buses, faulty_skin
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 PAD = skinfile.load(skinfile.shipped("mpr121"))
@@ -128,7 +128,7 @@ def test_what_is_above_the_threshold_touches_and_is_not_followed(above):
 
 def test_a_skin_without_a_single_chip_says_so():
     clock, file = VirtualClock(), calibrated(PAD)
-    buses = fake_buses(file, lambda t: PICTURE, clock, faults=[Fault()])
+    buses = faulty_buses(file, lambda t: PICTURE, clock, faults=[Fault()])
     skin = Skin(file, buses, clock=clock)
     with skin, pytest.raises(EdgeError, match="no chip of the skin 'mpr121 pad' answers: /dev/i2c"):
         skin.start()
@@ -161,7 +161,7 @@ def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
     file = SKINS["block"]
     hangs = Fault("hold", bus=file.buses[1].device, during=(0.1, 1.6))
     heard = []
-    with fake_skin(file, lambda t: PICTURE, faults=[hangs]) as skin:
+    with faulty_skin(file, lambda t: PICTURE, [hangs]) as skin:
         for frame in Loop(skin, lasts_s=2.0).frames():
             silent = skin.silent_changes()
             heard += [] if silent is None else [(round(frame.t, 2), silent)]

@@ -1,0 +1,169 @@
+"""A fake bus on which chosen transactions meet faults, repeatable by seed."""
+
+import errno
+import math
+import random
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from edge.fake.bus import FakeBus
+from edge.fake.clock import VirtualClock
+from edge.fake.player import calibrated, fake_buses
+from edge.i2c.bus import Transfer, bus_error, write
+from edge.i2c.tca9548a import FakeTCA9548A
+from edge.skin.skin import Skin
+
+NACK_BITS = 11
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One kind of fault.
+
+    A transaction meets it where all given conditions hold.
+
+    Attributes:
+        kind: `error` fails it with `code`; `flip` turns one bit of the bytes read; `misroute`
+            makes a write to a mux select another channel; `foreign` is another program that
+            selects another channel first; `reset` resets the chip first; `hold` makes the chip
+            serve its former bytes; `break` lets go of the wire at a random byte of those read,
+            from which on all bits are 1; `none` does nothing.
+        code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
+            bus from being opened again while the fault lasts.
+        at: numbers of transactions on the bus, counted from 0 when the script starts.
+        rate: probability per transaction.
+        during: seconds of the bus's clock, from and until.
+        bus, mux, channel, address: the target of the transaction.
+    """
+
+    kind: Literal["none", "error", "flip", "misroute", "foreign", "reset", "hold", "break"] = (
+        "error"
+    )
+    code: int = errno.EREMOTEIO
+    at: Collection[int] | None = None
+    rate: float = 1.0
+    during: tuple[float, float] = (-math.inf, math.inf)
+    bus: str | None = None
+    address: int | None = None
+    mux: int | None = None
+    channel: int | None = None
+
+
+class Route(NamedTuple):
+    """The target of a transaction: address, and the mux and channel on the way."""
+
+    address: int
+    mux: int | None = None
+    channel: int | None = None
+
+
+class FaultyBus(FakeBus):
+    """A fake bus with a script of faults; `inject` starts one."""
+
+    def __init__(self, *arguments, faults: Sequence[Fault] = (), seed: int = 0, **options):
+        super().__init__(*arguments, **options)
+        self._held = {}
+        self.inject(faults, seed)
+
+    def inject(self, faults: Sequence[Fault], seed: int = 0) -> None:
+        """Start another script, which counts transactions from 0."""
+        self.faults = [fault for fault in faults if fault.bus in (None, self.name)]
+        self.met = 0
+        """Number of transactions that met a fault."""
+        self._first = self.transactions
+        # One stream for each bus, so that its faults do not depend on the other threads.
+        self.random = random.Random(f"faults/{seed}/{self.name}")
+
+    def reopen(self) -> None:
+        """Open it, unless a fault keeps the adapter away."""
+        gone = [f for f in self.faults if (f.kind, f.code, f.at) == ("error", errno.ENODEV, None)]
+        if any(fault.during[0] <= self.now() < fault.during[1] for fault in gone):
+            raise bus_error(errno.ENODEV, self.name)
+        super().reopen()
+
+    def transfer(self, prepared: Transfer) -> None:
+        """Carry the messages, with the fault that is due."""
+        first, into = prepared.messages[0], prepared.messages[-1]
+        route, number = self._route(first.address), self.transactions - self._first
+        fault = self._due(route, number) if self.is_open else Fault("none")
+        if fault.kind == "error":
+            self.transactions += 1
+            self.spend(NACK_BITS if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
+            if fault.code == errno.ETIMEDOUT and self.timed:
+                self.hand.advance(self.timeout_s)
+            self.stop()
+            raise bus_error(fault.code, self.name, first.address)
+        if fault.kind == "foreign":
+            for mux in self._muxes():
+                mux.write(_another(mux.read(1, 0.0)), 0.0)
+                mux.stop()
+        for chip in self.chips_at(first.address) if fault.kind == "reset" else ():
+            chip.reset()
+        to_mux = isinstance(self.chips.get(first.address), FakeTCA9548A)
+        if fault.kind == "misroute" and to_mux and not first.read:
+            first = write(first.address, _another(first.buffer.tobytes()))
+            prepared = Transfer((first, *prepared.messages[1:]))
+        super().transfer(prepared)
+        if not into.read:
+            return
+        n = len(into.buffer)
+        if fault.kind == "flip":
+            bit = self.random.randrange(8 * n)
+            into.buffer[bit // 8] ^= 1 << bit % 8
+        elif fault.kind == "break":
+            into.buffer[self.random.randrange(n) :] = 0xFF
+        if fault.kind == "hold":
+            into.buffer[:] = self._held.get((route, n), into.buffer)
+        elif n > 2:
+            self._held[route, n] = into.buffer.copy()
+
+    def _due(self, route, number):
+        """The first fault that matches a transaction, or one that does nothing."""
+        t = self.now()
+        for fault in self.faults:
+            if (
+                (fault.at is None or number in fault.at)
+                and fault.during[0] <= t < fault.during[1]
+                and fault.address in (None, route.address)
+                and fault.mux in (None, route.mux)
+                and fault.channel in (None, route.channel)
+                and (fault.rate >= 1.0 or self.random.random() < fault.rate)
+            ):
+                self.met += 1
+                return fault
+        return Fault("none")
+
+    def _muxes(self):
+        return [chip for chip in self.chips.values() if isinstance(chip, FakeTCA9548A)]
+
+    def _route(self, address):
+        if address not in self.chips:
+            for mux_address, mux in self.chips.items():
+                for channel in mux.connected if isinstance(mux, FakeTCA9548A) else ():
+                    return Route(address, mux_address, channel)
+        return Route(address)
+
+
+def _another(control: bytes) -> bytes:
+    """A mux's control byte that selects the next channel."""
+    return bytes([control[0] << 1 & 0xFF or 1])
+
+
+def faulty_buses(file, scene, clock, *, faults=(), seed=0, **options):
+    """`fake_buses` that meet faults from the start."""
+    buses = fake_buses(file, scene, clock, make=FaultyBus, seed=seed, **options)
+    for bus in buses:
+        bus.inject(faults, seed)
+    return buses
+
+
+def faulty_skin(file, scene, faults=(), **options):
+    """A started skin over fake buses; the faults begin after the start."""
+    clock, file = VirtualClock(), calibrated(file)
+    skin = Skin(file, faulty_buses(file, scene, clock, **options), clock=clock)
+    skin.start()
+    clock.sleep_until(clock.now())
+    for reader in skin.readers:
+        reader.bus.inject(faults)
+    return skin
