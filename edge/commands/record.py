@@ -47,14 +47,15 @@ _DEBOUNCE = TrackSettings().debounce
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_reading(parser, "; labels are given and corrected there, --label may be left out")
+    add_reading(parser, "; labels are given and corrected there")
     parser.add_argument(
         "--label",
         action="append",
         default=[],
         type=task_label,
         metavar="TASK=LABEL",
-        help="what the skin touches, such as object=box; repeat it for several tasks",
+        help="what the skin touches, such as object=box; repeat it for several tasks, or in a "
+        "terminal for several labels, which are then chosen by key; not needed with --web",
     )
     parser.add_argument(
         "--out",

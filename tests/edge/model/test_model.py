@@ -225,3 +225,17 @@ def test_a_model_that_wants_more_than_the_features_is_refused(altered):
 
     with pytest.raises(InputError, match="its inputs and its decision points disagree"):
         Model(altered(greedy))
+
+
+def test_a_file_that_changes_between_check_and_load_is_refused(exported, tmp_path, monkeypatch):
+    path = tmp_path / "model.onnx"
+    path.write_bytes((exported / "model.onnx").read_bytes())
+    check = onnx_file.check
+
+    def check_and_change(contents, name):
+        check(contents, name)
+        path.write_bytes((exported / "model.onnx").read_bytes())
+
+    monkeypatch.setattr(onnx_file, "check", check_and_change)
+    with pytest.raises(InputError, match="was changed while it was read; start again"):
+        Model(path)

@@ -96,6 +96,22 @@ def test_without_a_manager_no_socket_is_opened(clock, address, monkeypatch):
     assert opened == []
 
 
+def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(tmp_path, clock):
+    address = str(tmp_path / "notify")
+    environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "2000000"}
+    with (
+        Notifier(environment, now=clock) as notifier,
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener,
+    ):
+        notifier.ready()
+        notifier.alive()
+        listener.bind(address)
+        listener.setblocking(False)
+        clock.t += 1.0
+        notifier.alive()
+        assert said(listener) == ["WATCHDOG=1"]
+
+
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, clock):
     listener, address = manager
     with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:

@@ -1,6 +1,8 @@
 """Several contacts at once, each with its own decisions and its place; the map of them."""
 
 import json
+import os
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -33,61 +35,37 @@ def follow(tracks, pictures, t=0.0):
     return out
 
 
-def every_region():
-    return ContactTracker(FLAT, max_contacts=MAX_CONTACTS)
+MERGED, PARTED = ".######", "##.###"
+FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
 
 
-def areas(contact):
-    return contact.series().area.tolist()
-
-
-def test_two_regions_are_two_contacts_with_their_own_onsets():
-    seen = follow(every_region(), ["##", "##", "##.....###", "##.....###", "#......###"])
-    assert [len(contacts) for contacts in seen] == [0, 1, 1, 2, 2]
-    first, second = seen[-1]
-    assert (first.onset_s, second.onset_s) == (0.0, 0.02)
-    assert areas(first) == [2, 2, 2, 2, 1]
-    assert areas(second) == [3, 3, 3]
-
-
-def test_the_larger_region_does_not_take_over_a_contact():
-    """What following the largest region alone would do."""
-    seen = follow(every_region(), ["##", "##", "##....####", "##....####"])
-    assert areas(seen[-1][0]) == [2, 2, 2, 2]
-
-
-def test_a_region_that_moves_by_its_width_goes_on():
-    (contact,) = follow(every_region(), ["#", "#", ".#", "..#", "..#"])[-1]
-    assert areas(contact) == [1] * 5
-
-
-def test_where_two_grow_into_one_the_older_goes_on_and_the_other_ends():
-    apart, one = ".##...##", ".######"
-    seen = follow(every_region(), [".##", apart, apart, *[one] * 5])
-    assert [c.ended for c in seen[-1]] == [False, True]
-    assert areas(seen[-1][0]) == [2, 2, 2, 6, 6, 6, 6, 6]
-    assert areas(seen[-1][1]) == [2, 2, 0, 0, 0, 0, 0]
-
-
-def test_where_one_parts_in_two_the_larger_share_goes_on():
-    seen = follow(every_region(), ["######", "######", "##.###", "##.###"])
-    old, new = seen[-1]
-    assert (areas(old), areas(new)) == ([6, 6, 3, 3], [2, 2])
-
-
-def test_a_region_below_the_onset_count_begins_nothing():
-    assert follow(every_region(), ["++", "++", "++"])[-1] == []
-
-
-def test_a_contact_ends_by_itself_while_another_goes_on():
-    seen = follow(every_region(), ["#....##"] * 2 + [".....##"] * 6)
-    assert [len(contacts) for contacts in seen] == [0, 2, 2, 2, 2, 2, 2, 1]
-    assert [contact.ended for contact in seen[6]] == [False, True]
-
-
-def test_a_skin_that_flickers_has_no_more_than_so_many_contacts():
-    board = "/".join(["#." * 10, ".#" * 10] * 3)
-    assert len(follow(every_region(), [board] * 3)[-1]) == MAX_CONTACTS
+@pytest.mark.parametrize(
+    ("pictures", "areas", "ended"),
+    [
+        # Two regions are two contacts, also where the later one is larger.
+        (["##", "##", *["##....####"] * 2, "#.....####"], [[2, 2, 2, 2, 1], [4, 4, 4]], [0, 0]),
+        # A region that moves by its width goes on.
+        (["#", "#", ".#", "..#", "..#"], [[1] * 5], [0]),
+        # Where two grow into one, the older goes on and the other ends.
+        (
+            [".##", *[".##...##"] * 2, *[MERGED] * 5],
+            [[2, 2, 2, 6, 6, 6, 6, 6], [2, 2, 0, 0, 0, 0, 0]],
+            [0, 1],
+        ),
+        # Where one parts in two, the larger share goes on.
+        (["######", "######", PARTED, PARTED], [[6, 6, 3, 3], [2, 2]], [0, 0]),
+        # A region below the onset count begins nothing.
+        (["++", "++", "++"], [], []),
+        # A contact ends by itself while another goes on.
+        ([*["#....##"] * 2, *[".....##"] * 5], [[2] * 7, [1, 1, 0, 0, 0, 0, 0]], [0, 1]),
+        # A skin that flickers has no more than so many contacts.
+        ([FLICKER] * 3, [[1] * 3] * MAX_CONTACTS, [0] * MAX_CONTACTS),
+    ],
+)
+def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
+    contacts = follow(ContactTracker(FLAT, max_contacts=MAX_CONTACTS), pictures)[-1]
+    assert [contact.series().area.tolist() for contact in contacts] == areas
+    assert [contact.ended for contact in contacts] == ended
 
 
 def test_a_single_contact_is_followed_as_by_the_largest_region():
@@ -264,9 +242,22 @@ def test_a_full_disk_costs_lines_and_not_decisions():
     assert (writer.lost, writer.problem) == (2, "No space left on device")
 
 
-def test_what_is_no_file_is_refused_as_a_map(tmp_path):
-    import os
+def test_only_the_head_of_a_long_map_is_read_before_a_run(tmp_path):
+    path, info = tmp_path / "map.jsonl", Model(demo.MODEL).info
+    write(path, info, [])
+    before = path.stat().st_size
+    os.truncate(path, 1 << 31)  # takes no room
+    tracemalloc.start()
+    try:
+        write(path, info, [])
+        assert touchmap.TouchMap(path).head.frame == info.chain.base
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+    assert path.stat().st_size == (1 << 31) + 1 + before
 
+
+def test_what_is_no_file_is_refused_as_a_map(tmp_path):
     os.mkfifo(tmp_path / "fifo")
     for path in (tmp_path / "fifo", tmp_path, "/dev/null", "a\0b"):
         with pytest.raises(InputError, match="cannot be (read|written)"):
