@@ -76,8 +76,7 @@ def legend(canvas: Any, axes: Any, columns: int) -> None:
     """A legend above the axes, where it hides nothing."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) > 1:
-        place = {"loc": "outside upper center", "ncols": columns, "frameon": False}
-        canvas.legend(handles, labels, **place)
+        canvas.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
 
 
 def spread(results: Sequence[Result]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
 from edge.touch.feature_sets import SETS
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, widths
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.crossval import MAX_COMPONENTS, MAX_K
 from train.evaluate import Labels, Result, SearchGrid, group_folds, stratified_folds
 from train.report import figures
@@ -58,27 +58,27 @@ def taxels(context: Context) -> NDArray[np.float64]:
     return np.stack(rows).reshape(len(rows), -1)
 
 
-def _nested(
-    X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64], form: tuple[Any, ...]
-) -> Answers:
-    grid, names, columns = form
-    return nested(X, y, grid, names, widths=columns, folds=folds)
-
-
-def methods(context: Context) -> dict[str, tuple[Callable[..., Answers], NDArray[Any], Any]]:
-    """{name: function, its X, its further arguments} of every method that is compared."""
+def methods(context: Context) -> dict[str, Callable[..., Answers]]:
+    """{name: its answers for labels `y` and `folds`} of every method that is compared."""
     data = context.dataset
-    compared: dict[str, Any] = {
-        PAPER: (_nested, context.vectors(), ((PAPERS_GRID, FEATURES, None),))
+    compared: dict[str, Callable[..., Answers]] = {
+        PAPER: partial(nested, context.vectors(), grid=PAPERS_GRID, features=FEATURES)
     }
     for name, projection in OURS:
         taken = data.of(SETS[name])
-        columns = widths(taken.names, SAMPLES // 2, data.layout)
-        form = SearchGrid("IV", projection), taken.names, columns
-        method = f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"
-        compared[method] = _nested, taken.features(WINDOW_S, SAMPLES // 2), (form,)
-    compared[f"{TREES} extra trees on every taxel"] = extra_trees, taxels(context), ()
+        compared[f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"] = partial(
+            nested,
+            taken.features(WINDOW_S, SAMPLES // 2),
+            grid=SearchGrid("IV", projection),
+            features=taken.names,
+            widths=taken.widths(SAMPLES // 2),
+        )
+    compared[f"{TREES} extra trees on every taxel"] = partial(extra_trees, taxels(context))
     return compared
+
+
+def _answers(method: Callable[..., Answers], y: Labels, folds: NDArray[np.int64]) -> Answers:
+    return method(y=y, folds=folds)
 
 
 def section(context: Context) -> Section:
@@ -86,11 +86,10 @@ def section(context: Context) -> Section:
     y = context.labels
     others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
     compared = methods(context)
-    cases = [(f, X, y, stratified_folds(y[finest(y)]), *more) for f, X, more in compared.values()]
+    cases = [(method, y, stratified_folds(y[finest(y)])) for method in compared.values()]
     if GROUP_TASK in y and others:
-        folds = group_folds(y[GROUP_TASK])
-        cases += [(f, X, others, folds, *more) for f, X, more in compared.values()]
-    answers = context.workers.map("methods", _call, cases)
+        cases += [(method, others, group_folds(y[GROUP_TASK])) for method in compared.values()]
+    answers = context.workers.map("methods", _answers, cases)
     known = dict(zip(compared, answers, strict=False))
     unseen = dict(zip(compared, answers[len(compared) :], strict=False))
     text = [sentence(task, known, unseen) for task in y]
@@ -134,10 +133,6 @@ def section(context: Context) -> Section:
             )
         ],
     )  # fmt: skip
-
-
-def _call(function: Callable[..., Answers], *arguments: Any) -> Answers:
-    return function(*arguments)
 
 
 def sentence(task: str, known: Mapping[str, Answers], unseen: Mapping[str, Answers]) -> str:

@@ -106,11 +106,9 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     dataset, scene, layout = context.dataset, context.scene, context.dataset.layout
     tasks = ", ".join(f"{task} ({len(set(y))} classes)" for task, y in context.labels.items())
     frame = "skin" if dataset.chain is None else "world"
-    source = (
-        "Recorded, or simulated elsewhere."
-        if scene is None
-        else f"Simulated: scene {scene.name}, seed {scene.seed}."
-    )
+    source = "Recorded, or simulated elsewhere."
+    if scene is not None:
+        source = f"Simulated: scene {scene.name}, seed {scene.seed}."
     lead = [
         f"{counted(len(dataset.trials), 'trial')}, {layout.rows} x {layout.cols} taxels, tasks "
         f"{tasks}; force in {layout.force_unit}s, motion in {layout.length_unit}s in the {frame}'s "

@@ -230,14 +230,12 @@ def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measure
 
 def _split(figure: Any, measured: Measured) -> None:
     """Draw the time of a decision after the full window, and its end magnified."""
-    window, wire_s, arithmetic_s = (
-        max(measured.points), measured.wire_s, measured.board.arithmetic_s
-    )  # fmt: skip
-    after_ms = 1e3 * measured.after_s
+    window, after_ms = max(measured.points), 1e3 * measured.after_s
+    wire_ms, arithmetic_ms = 1e3 * measured.wire_s, 1e3 * measured.board.arithmetic_s
     stages = [
         (f"wait {window:g} s", 1e3 * window),
-        (f"wire {1e3 * wire_s:.0f} ms", 1e3 * wire_s),
-        (f"arithmetic {1e3 * arithmetic_s:.1f} ms", 1e3 * arithmetic_s),
+        (f"wire {wire_ms:.0f} ms", wire_ms),
+        (f"arithmetic {arithmetic_ms:.1f} ms", arithmetic_ms),
     ]
     rows = figure.subplots(2, 1)
     start = 1e3 * window - 0.25 * after_ms
