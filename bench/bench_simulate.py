@@ -1,9 +1,9 @@
 """Trials a second of the simulator and of MuJoCo, in processor time of the same run.
 
-A batch has 20 trials of each object in each condition of a scene, with all effects that they call
-for, and ends with recordings that are not written. MuJoCo steps a forearm with as many taxels
-against a fixed, a movable or a soft box, which has far less physics. Both trials last 2 s and more,
-with frames of 384 taxels at 100 Hz. `edge-train simulate --explain` prints the cost of each effect.
+Trials have all effects that they call for, and end with recordings that are not written. MuJoCo
+steps a forearm with as many taxels against a fixed, a movable or a soft box, which has far less
+physics. Both trials last 2 s and more, with frames of 384 taxels at 100 Hz. `python -m train
+simulate --explain` prints the cost of each effect.
 """
 
 import math
@@ -72,12 +72,13 @@ def peer_of(trial):
 
 @pytest.mark.parametrize("name", ["cody18", "household"])
 def bench_simulate(note, name):
-    scene = load(SCENES / f"{name}.toml", count=20)
-    (trials,) = parts(scene)
+    scene = load(SCENES / f"{name}.toml")
+    batches = parts(scene)
+    trials = [trial for batch in batches for trial in batch]
     peers = {kind: mujoco_trial(*peer) for kind, peer in PEERS.items()}
 
     def ours():
-        assert sum(1 for _ in simulate_trials(scene, trials)) == len(trials)
+        assert sum(1 for batch in batches for _ in simulate_trials(scene, batch)) == len(trials)
 
     ratios, own = [], []
     for _ in range(3):

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tests.hard_cases.cases import Case, Ladder, decades, seeded
-from tests.train.simulate.conftest import Rig
+from tests.train.simulate.scenes import slider
 from tests.train.simulate.test_simulate_stability import (
     SPEED,
     cases,
@@ -26,16 +26,7 @@ def pushed(
     stiffness: np.ndarray, mass: np.ndarray, h: np.ndarray, mu: np.ndarray, steps: int
 ) -> Any:
     """The trace of pushes against springs with friction."""
-    rig = Rig(
-        h=h,
-        speed=SPEED,
-        slopes=stiffness[None],
-        intercepts=np.zeros((1, stiffness.size)),
-        effects=("sliding",),
-        mass_kg=mass,
-        friction_static=mu,
-        friction_kinetic=0.8 * mu,
-    )
+    rig = slider(h, mass, mu, 0.8 * mu, speed=SPEED, slopes=stiffness[None])
     return rig.run(steps)
 
 
@@ -78,7 +69,7 @@ CASES = [
         "cases with a complaint",
         0,
         grid_error,
-        [{"steps": 40}],
+        [{"steps": 120}],
         usual=grid_usual,
     ),
     Case(

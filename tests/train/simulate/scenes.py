@@ -1,20 +1,31 @@
-"""Scenes of one object, for tests that hold the simulator against known answers."""
+"""Scenes of one object, and a rig for its own steps: a joint that pushes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 
 from train.simulate.convergence import kinds
 from train.simulate.engine import PhysicsRun, readings, run_physics
+from train.simulate.plan import STEP, TUNE, plan_of
 from train.simulate.readings import Readings
 from train.simulate.scene import Scene, from_dict
+from train.simulate.scene_model import TrialSpec
+from train.simulate.trials import Trials
 
 
 def one_object(**keys):
     thing = {"name": "thing", "family": "rigid", "conditions": ["fixed"], **keys}
     return [thing]
+
+
+def movable(mass, static, kinetic, **keys):
+    """A movable object, as a list of one."""
+    moves = {"mass_kg": mass, "friction_static": static, "friction_kinetic": kinetic}
+    return one_object(conditions=["movable"], **moves, **keys)
 
 
 def make(objects, *add, **trials) -> Scene:
@@ -50,3 +61,64 @@ def run_batch(scene, specs, **options) -> Batch:
 
 def run(scene, step_s=0.01, **options) -> Batch:
     return run_batch(scene, specs_of(scene, step_s), **options)
+
+
+@dataclass
+class Trace:
+    """What the bench saw: (steps, n) each."""
+
+    t: np.ndarray
+    force: np.ndarray
+    q: np.ndarray
+    target: np.ndarray
+    slide: np.ndarray
+    speed: np.ndarray
+    depth: np.ndarray
+
+    def of(self, i: int) -> Trace:
+        """One pusher's trace."""
+        return Trace(**{name: seen[:, i : i + 1] for name, seen in vars(self).items()})
+
+
+class Rig:
+    """n pushers of stiffness `arm_k` whose ends run at `speed` against beds of springs.
+
+    The step is the simulator's own; only the arm's geometry is left out (one joint of lever 1).
+    All lines of a bed's law are looked at where the gaps of its springs are not given.
+    """
+
+    def __init__(
+        self, *, h, arm_k=115.0, arm_d=0.0, speed=0.15, travel_s=1e9, effects=(),
+        gaps=((-math.inf,),), slopes=((1e4,),), intercepts=((0.0,),), **values,
+    ):  # fmt: skip
+        given = [np.asarray(v, dtype=float) for v in values.values()]
+        law = [np.asarray(part, dtype=float) for part in (gaps, slopes, intercepts)]
+        n = max([v.size for v in (*given, np.asarray(h), law[1][0])])
+        box = {"name": "x", "family": "rigid", "conditions": ["fixed"]}
+        scene = from_dict({"object": [box]})
+        values = {key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)}
+        specs = (TrialSpec(scene.objects[0], "fixed", 0),) * n
+        self.trials = t = Trials(scene, specs, values, plan_of((effects,) * n))
+        t.h = np.broadcast_to(np.asarray(h, float), (n,)).copy()
+        t.rate, t.joint_k, t.damping = np.zeros((5, 1)), np.ones((5, 1)), np.zeros((5, 1))
+        t.rate[0], t.joint_k[0], t.damping[0], t.travel_s[0] = speed, arm_k, arm_d, travel_s
+        t.jacobian[0, 0] = 1.0
+        shape = (len(law[1]), n)
+        t.law_gaps, t.slopes, t.intercepts = (np.broadcast_to(part, shape) for part in law)
+        t.plan.run(("stand", *TUNE), t)
+        t.compliance[0] = t.give[0]
+
+    def run(self, steps: int) -> Trace:
+        t, seen, still = self.trials, [], np.zeros(self.trials.n)
+        for _ in range(steps):
+            t.plan.run(STEP, t)
+            mover = t.own.get("sliding", SimpleNamespace(slide=still, speed=still))
+            now = (t.t, t.loads[0], t.q[0], t.equilibrium(t.t)[0])
+            seen.append(np.array([*now, mover.slide, mover.speed, t.depth[0]]))
+        return Trace(*np.moveaxis(seen, 1, 0))
+
+
+def slider(h, mass, static, kinetic, **rig) -> Rig:
+    """A rig that pushes masses on a floor with friction."""
+    moves = {"mass_kg": mass, "friction_static": static, "friction_kinetic": kinetic}
+    return Rig(h=h, effects=("sliding",), **moves, **rig)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.train.simulate.scenes import make, one_object
+from tests.train.simulate.scenes import make, movable, one_object
 from train.simulate.convergence import kinds, measure
 from train.simulate.engine import run_physics
 
@@ -30,10 +30,7 @@ def test_halving_the_step_halves_the_error(condition, keys, add):
 
 def test_a_light_thing_that_swings_within_a_step_is_not_believed():
     # From three halvings alone, 2.5 ms would err by 5e-5; the thing swings ten times in that.
-    thing = one_object(
-        conditions=["movable"], mass_kg=1e-4, friction_static=0.5, friction_kinetic=0.4
-    )
-    scene = make(thing, lead_s=0.05, after_s=0.15)
+    scene = make(movable(1e-4, 0.5, 0.4), lead_s=0.05, after_s=0.15)
     trials = next(iter(kinds(scene).values()))
     (found,) = measure(scene, [trials])
     assert not found.within
@@ -45,10 +42,7 @@ def test_a_light_thing_that_swings_within_a_step_is_not_believed():
 
 
 def test_the_step_follows_the_tolerance():
-    thing = one_object(
-        conditions=["movable"], mass_kg=1.0, friction_static=0.4, friction_kinetic=0.3
-    )
-    scene = make(thing)
+    scene = make(movable(1.0, 0.4, 0.3))
     chosen = []
     for tolerance in (0.05, 0.004):
         scene.trials["tolerance"] = tolerance

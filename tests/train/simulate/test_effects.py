@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.train.simulate.scenes import make, one_object, run
+from tests.train.simulate.scenes import Rig, make, one_object, run
 from train.simulate import effects, schema
 
 TEXT = (Path(__file__).parents[3] / "CONTRIBUTING.md").read_text()
@@ -31,10 +31,10 @@ def sponge(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("sponge")
-def test_a_sponge_under_a_steady_push_creeps_as_its_law_says(tools):
+def test_a_sponge_under_a_steady_push_creeps_as_its_law_says():
     # F' = K (v - F / eta), so F = eta v (1 - exp(-K t / eta)), with arm and bed in series.
     eta, speed, stiffness = np.array([20.0, 60.0]), 0.15, 1.0 / (1.0 / 115.0 + 1.0 / 1e4)
-    trace = tools.Rig(h=5e-4, speed=speed, effects=("sponge",), sponge_n_s_m=eta).run(2000)
+    trace = Rig(h=5e-4, speed=speed, effects=("sponge",), sponge_n_s_m=eta).run(2000)
     want = eta * speed * (1.0 - np.exp(-stiffness * trace.t / eta))
     np.testing.assert_allclose(trace.force, want, atol=2e-3 * want.max())
 

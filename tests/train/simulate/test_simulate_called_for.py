@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
@@ -13,7 +14,6 @@ import pytest
 
 from edge.errors import InputError
 from tests.train.simulate.scenes import run_batch
-from train.simulate import streams
 from train.simulate.convergence import kinds
 from train.simulate.engine import values_of
 from train.simulate.plan import INSTEAD, STAGES, make_plan, required_effects
@@ -43,16 +43,9 @@ def scene(*add, leave_out=(), objects=None, seed=3, **trials):
 def everything():
     """One object of each family, with every key that calls for an effect."""
     full = {
-        **MOVES,
-        "skin_friction": 0.3,
-        "cover_n_m": 3000.0,
-        "stribeck_m_s": 0.05,
-        "base_m": 0.1,
-        "height_m": 0.3,
-        "foot_m": 0.2,
-        "aside_m": 0.02,
-        "slope_deg": 1.0,
-    }
+        **MOVES, "skin_friction": 0.3, "cover_n_m": 3000.0, "stribeck_m_s": 0.05, "base_m": 0.1,
+        "height_m": 0.3, "foot_m": 0.2, "aside_m": 0.02, "slope_deg": 1.0,
+    }  # fmt: skip
     return [
         {"name": family, "family": family, "conditions": ["fixed", "movable"], **full}
         for family in ("rigid", "foam", "pillow", "bubbles", "foliage")
@@ -136,44 +129,8 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     np.testing.assert_array_equal(first, second)
 
 
-def test_4_streams_go_by_name_not_by_place():
-    draw = streams.stream(3, "noise", "box-fixed", 0).random(4)
-    streams.stream(3, "drift", "box-fixed", 0).random(9)
-    np.testing.assert_array_equal(draw, streams.stream(3, "noise", "box-fixed", 0).random(4))
-    for other in (
-        streams.stream(4, "noise", "box-fixed", 0),
-        streams.stream(3, "drift", "box-fixed", 0),
-        streams.stream(3, "noise", "box-movable", 0),
-        streams.stream(3, "noise", "box-fixed", 1),
-        streams.stream(3, "noise", "box-fixed"),
-    ):
-        assert (other.random(4) != draw).all()
-    # The same on every machine and in every version: the first words of the name's hash.
-    assert streams.key("noise") == (3232097007, 3611913630)
-
-
-HOOKS = {
-    "base": {"swing", "place", "lay", "law", "tune", "locate", "predict", "press", "answer",
-             "settle", "bear", "image"},
-    "foundation": {"soften"},
-    "lateral": {"widen", "fill", "image"},
-    "bottoming": {"fill"},
-    "cover": {"soften", "pass_on"},
-    "pop": {"lay", "law", "stand", "image", "pass_on"},
-    "stems": {"lay", "law", "tune", "settle", "bear", "image"},
-    "tilt": {"law", "locate", "answer", "settle", "bear"},
-    "viscous": {"stand", "tune", "settle"},
-    "relaxation": {"stand"},
-    "inertia": {"swing", "stand", "pace", "tune", "predict", "settle"},
-    "friction": {"stand", "reach_along", "predict", "drag", "settle", "lean"},
-    "sliding": {"stand", "predict", "drag", "give_way", "move"},
-    "slope": {"stand"},
-    "turning": {"stand", "pass_on"},
-    "stribeck": {"drag"},
-    "tipping": {"stand", "drag"},
-    "jitter": {"clock"},
-    "dropped_frames": {"clock"},
-}  # fmt: skip
+def module(name):
+    return importlib.import_module(f"train.simulate.{'' if name == 'base' else 'effects.'}{name}")
 
 
 def test_5_each_trial_runs_its_own_hooks_and_no_other():
@@ -186,7 +143,7 @@ def test_5_each_trial_runs_its_own_hooks_and_no_other():
         owners = ["base", *shared, *effects]
         for stage in STAGES:
             ran = [call.owner for call in plan.stages[stage] if call.which[i]]
-            have = [name for name in owners if stage in HOOKS.get(name, {"sensor"})]
+            have = [name for name in owners if hasattr(module(name), stage)]
             assert ran == (have[-1:] if stage in INSTEAD else have), (effects, stage)
         seen |= set(effects)
     assert seen == set(EFFECTS)
@@ -223,11 +180,7 @@ def test_who_called_is_told():
     assert called["noise"] == "effects.add"
     assert "sliding" not in required_effects(one, foam, "fixed")
     assert "stribeck" not in required_effects(one, foam, "fixed")
-
-
-def test_leaving_out_what_is_implied():
     one = scene(leave_out=["relaxation"], objects=everything())
-    foam = next(o for o in one.objects if o.family == "foam")
     assert "relaxation" not in required_effects(one, foam, "fixed")
     assert "foundation" in required_effects(one, foam, "fixed")
 

@@ -13,11 +13,7 @@ from edge.errors import InputError
 from edge.recording import load
 from train.__main__ import main
 from train.simulate import scene as scenes
-from train.simulate.run import (
-    simulate,
-    total_trials,
-    write,
-)
+from train.simulate.run import simulate, total_trials, write
 from train.simulate.scene import from_dict
 
 DEMO = Path(__file__).parents[3] / "train" / "scenes" / "demo.toml"
@@ -70,14 +66,8 @@ def test_the_same_bytes_whatever_the_batch_or_the_cores(demo, written, tmp_path,
 
 def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=False,
-        dashboard_address=None,
-        protocol="tcp",
-        host="127.0.0.1",
-    ) as cluster:
+    where = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None}
+    with distributed.LocalCluster(2, threads_per_worker=1, processes=False, **where) as cluster:
         write(demo, tmp_path, address=cluster.scheduler_address)
     assert digests(tmp_path) == digests(written[0])
 
@@ -173,46 +163,6 @@ class TestCommand:
         (tmp_path / "file").write_text("")
         with pytest.raises(InputError, match="cannot be written"):
             write(demo, tmp_path / "file" / "folder")
-
-    def test_show_draws_a_picture(self, written, tmp_path, capsys):
-        out = tmp_path / "picture.png"
-        trial = written[0] / "foam-block-movable-00.npz"
-        assert main(["show", str(trial), "--scene", "--out", str(out)]) == 0
-        assert out.read_bytes().startswith(b"\x89PNG")
-        assert capsys.readouterr().out.strip() == str(out)
-
-    @pytest.mark.parametrize(
-        "told",
-        [
-            {"values": {"width_m": "wide", "mass_kg": "x", "radius_m": [1]}, "effects": 5},
-            {"values": [1], "effects": [1, 2], "family": 3},
-            {"values": {"width_m": -1, "mass_kg": 1e300}},
-            {"values": {"stem_count": -3, "stem_spread_m": -1}, "effects": ["stems"]},
-            {"values": {"aside_m": 0.1, "foot_m": -2}, "effects": ["turning", "sliding"]},
-            "a scene",
-        ],
-    )
-    def test_show_draws_what_makes_sense_of_a_scene(self, written, tmp_path, told):
-        from dataclasses import replace
-
-        from edge.recording import save
-
-        trial = load(written[0] / "foam-block-movable-00.npz")
-        save(tmp_path / "odd.npz", replace(trial, meta={**trial.meta, "simulation": told}))
-        assert main(["show", str(tmp_path / "odd.npz"), "--scene"]) == 0
-        assert (tmp_path / "odd.png").read_bytes().startswith(b"\x89PNG")
-
-    def test_show_without_an_arm(self, written, tmp_path, capsys):
-        from dataclasses import replace
-
-        from edge.recording import save
-
-        bare = replace(load(written[0] / "foam-block-movable-00.npz"), joints=None)
-        save(tmp_path / "bare.npz", bare)
-        assert main(["show", str(tmp_path / "bare.npz")]) == 0
-        assert (tmp_path / "bare.png").exists()
-        assert main(["show", str(tmp_path / "bare.npz"), "--scene"]) == 2
-        assert "no joint angles" in capsys.readouterr().err
 
 
 def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):

@@ -25,6 +25,8 @@ GOOD = {
     "trials": {"count": 2, "lead_s": [0.1, 0.2]},
     "step_s": {"base": 0.01, "sliding": 0.005},
     "skin": {"taxel_n_m": 8000.0},
+    "arm": {},
+    "motion": {},
     "spread": {"yaw_deg": 2.0},
     "effects": {"add": ["tilt"], "noise": {"counts": 4.0}},
     "object": [
@@ -40,12 +42,13 @@ GOOD = {
 }
 
 
-def broken(path, value):
+def changed(path, value):
+    """The good scene with another value, at a path like `object.0.name`."""
     table = copy.deepcopy(GOOD)
-    place = table
-    for key in path[:-1]:
+    place, (*keys, last) = table, [int(key) if key.isdigit() else key for key in path.split(".")]
+    for key in keys:
         place = place[key]
-    place[path[-1]] = value
+    place[last] = value
     return table
 
 
@@ -65,135 +68,61 @@ def test_values_ranges_and_defaults():
     assert scene.skin.shape == (16, 24)
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "says"),
-    [
-        (("colour",), 1, "unknown key colour; allowed: seed, trials, arm"),
-        (("trials", "cuont"), 1, "unknown key trials.cuont; allowed: lead_s, count"),
-        (("trials", "count"), 0, "trials.count must be a whole number from 1 to 1000000, not 0"),
-        (("trials", "count"), 2.5, "trials.count must be a whole number"),
-        (
-            ("trials", "lead_s"),
-            [0.3, 0.1],
-            "trials.lead_s must be a range with its lower limit first, [0.1, 0.3], not [0.3, 0.1]",
-        ),
-        (("trials", "lead_s"), [0.1], "trials.lead_s must be one number or a range"),
-        (
-            ("trials", "rate_hz"),
-            float("nan"),
-            "trials.rate_hz must be a number from 1 to 10000, not nan",
-        ),
-        (("seed",), -1, "seed must be a whole number"),
-        (("seed",), True, "seed must be a whole number"),
-        (("step_s", "sliding"), 0.003, "step_s.sliding must be an even part of a frame's 0.01 s"),
-        (("step_s", "soup"), 0.01, "unknown key step_s.soup"),
-        (("skin", "taxel_n_m"), 0.0, "skin.taxel_n_m must be a number above 0"),
-        (("skin", "taxel_n_m"), 1e18, "skin.taxel_n_m must be a number above 0, at most 1e+15"),
-        (("skin", "cols"), 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
-        (("motion",), {"travel_s": 0.1}, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
-        (
-            ("motion",),
-            {"start_deg": [119.0, 5.0, 0.0, 42.0, 0.0]},
-            "the arm's stroke ends after 0.05 s",
-        ),
-        (("skin", "threshold_counts"), 1.5, "skin.threshold_counts must be a whole number"),
-        (("spread", "place_m"), 0.05, "spread.place_m must be at most 0.0322, not 0.05: some"),
-        (("spread", "yaw_deg"), 50, "spread.yaw_deg must be a number from 0 to 30, not 50"),
-        (
-            ("motion",),
-            {"rate_deg_s": [0, 0, 0, 0, 0]},
-            "motion.rate_deg_s must be not all 0, so that the arm reaches",
-        ),
-        (
-            ("motion",),
-            {"start_deg": [-60, 0, 0, 0, 0]},
-            "motion.start_deg of shoulder_pitch must be -47.61 to 120, not -60.0",
-        ),
-        (
-            ("motion",),
-            {"start_deg": [1, 2]},
-            "motion.start_deg must be a list of 5 numbers, not [1, 2]",
-        ),
-        (
-            ("arm",),
-            {"stiffness_nm_rad": [1, 1, 1, 1, -1]},
-            "arm.stiffness_nm_rad must be a number above 0, not -1",
-        ),
-        (
-            ("effects", "add"),
-            ["tlit"],
-            "effects.add must be a list of different names out of foundation, lateral",
-        ),
-        (("effects", "add"), ["stems"], "it needs an object of family foliage"),
-        (("effects", "add"), ["relaxation"], "it needs an object of family foam or pillow"),
-        (("effects", "add"), ["cover"], "it needs an object with cover_n_m"),
-        (("effects", "add"), ["noise", "noise"], "effects.add must be a list of different names"),
-        (
-            ("effects", "leave_out"),
-            ["tilt"],
-            "effects.leave_out must be a list without tilt, which effects.add adds",
-        ),
-        (
-            ("effects", "tilt"),
-            {"x": 1},
-            "unknown key effects.tilt; allowed: add, leave_out, inertia",
-        ),
-        (
-            ("effects", "noise"),
-            {"counts": -1},
-            "effects.noise.counts must be a number from 0 to 65535, not -1",
-        ),
-        (("effects", "noise"), 3, "effects.noise must be a table"),
-        (("object",), {}, "object must be a list of tables, not {}"),
-        (("object",), [], "give at least one [[object]] or [[family]]"),
-        (("object", 0, "family"), "metal", "family must be one of rigid, foam"),
-        (
-            ("object", 0, "mass_kg"),
-            -1.0,
-            "object 'box': mass_kg must be a number above 0, at most 1e+12, not -1.0",
-        ),
-        (
-            ("object", 0, "friction_static"),
-            -0.1,
-            "friction_static must be a number from 0 to 5, not -0.1",
-        ),
-        (("object", 0, "friction_kinetic"), 0.6, "must be at most friction_static (0.5)"),
-        (
-            ("object", 0, "mass_kg"),
-            [2.0, 1.0],
-            "mass_kg must be a range with its lower limit first, [1, 2]",
-        ),
-        (
-            ("object", 0, "mass_kg"),
-            "heavy",
-            "mass_kg must be a number above 0, at most 1e+12, not 'heavy'",
-        ),
-        (
-            ("object", 0, "conditions"),
-            ["flying"],
-            "conditions must be a list of different names out of fixed, movable",
-        ),
-        (("object", 0, "conditions"), [], "conditions must be fixed, movable or both"),
-        (("object", 0, "modulus_pa"), 1e4, "object 'box': unknown key modulus_pa; allowed: name"),
-        (("object", 0, "stem_count"), 3, "object 'box': unknown key stem_count"),
-        (("object", 0, "radius_m"), 1e-9, "radius_m must be a number from 0.001 to 1e+06"),
-        (("object", 0, "base_m"), 0.2, "object 'box': height_m is missing"),
-        (("object", 0, "name"), "", "object 0: name must be text"),
-    ],
-)
+MISTAKES = [
+    ("colour", 1, "unknown key colour; allowed: seed, trials, arm"),
+    ("trials.cuont", 1, "unknown key trials.cuont; allowed: lead_s, count"),
+    ("trials.count", 0, "trials.count must be a whole number from 1 to 1000000, not 0"),
+    ("trials.count", 2.5, "trials.count must be a whole number"),
+    ("trials.lead_s", [0.3, 0.1], "a range with its lower limit first, [0.1, 0.3], not [0.3, 0.1]"),
+    ("trials.lead_s", [0.1], "trials.lead_s must be one number or a range"),
+    ("trials.rate_hz", math.nan, "trials.rate_hz must be a number from 1 to 10000, not nan"),
+    ("seed", True, "seed must be a whole number"),
+    ("step_s.sliding", 0.003, "step_s.sliding must be an even part of a frame's 0.01 s"),
+    ("step_s.soup", 0.01, "unknown key step_s.soup"),
+    ("skin.taxel_n_m", 1e18, "skin.taxel_n_m must be a number above 0, at most 1e+15"),
+    ("skin.cols", 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
+    ("skin.threshold_counts", 1.5, "skin.threshold_counts must be a whole number"),
+    ("motion.travel_s", 0.1, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
+    ("motion.start_deg", [119.0, 5.0, 0.0, 42.0, 0.0], "the arm's stroke ends after 0.05 s"),
+    ("motion.start_deg", [-60, 0, 0, 0, 0], "of shoulder_pitch must be -47.61 to 120, not -60.0"),
+    ("motion.start_deg", [1, 2], "motion.start_deg must be a list of 5 numbers, not [1, 2]"),
+    ("motion.rate_deg_s", [0] * 5, "must be not all 0, so that the arm reaches an object"),
+    ("motion.place_m", 5.0, "motion.place_m must be a number from 0.02232 to"),
+    ("spread.place_m", 0.05, "spread.place_m must be at most 0.0322, not 0.05: some"),
+    ("spread.yaw_deg", 50, "spread.yaw_deg must be a number from 0 to 30, not 50"),
+    ("arm.stiffness_nm_rad", [1, 1, 1, 1, -1], "stiffness_nm_rad must be a number above 0, not -1"),
+    ("effects.add", ["tlit"], "effects.add must be a list of different names out of foundation,"),
+    ("effects.add", ["stems"], "it needs an object of family foliage"),
+    ("effects.add", ["cover"], "it needs an object with cover_n_m"),
+    ("effects.add", ["noise", "noise"], "effects.add must be a list of different names"),
+    ("effects.leave_out", ["tilt"], "must be a list without tilt, which effects.add adds"),
+    ("effects.leave_out", ["sliding"], "leaves out sliding, without which object 'box' would not"),
+    ("effects.tilt", {"x": 1}, "unknown key effects.tilt; allowed: add, leave_out, inertia"),
+    ("effects.noise.counts", -1, "effects.noise.counts must be a number from 0 to 65535, not -1"),
+    ("effects.noise", 3, "effects.noise must be a table"),
+    ("object", {}, "object must be a list of tables, not {}"),
+    ("object", [], "give at least one [[object]] or [[family]]"),
+    ("object", GOOD["object"] * 2, "object 'box': name must be different from every other object"),
+    ("object.0.name", "", "object 0: name must be text"),
+    ("object.0.family", "metal", "family must be one of rigid, foam"),
+    ("object.0.conditions", ["flying"], "a list of different names out of fixed, movable"),
+    ("object.0.conditions", [], "conditions must be fixed, movable or both"),
+    ("object.0.mass_kg", -1.0, "mass_kg must be a number above 0, at most 1e+12, not -1.0"),
+    ("object.0.mass_kg", "heavy", "mass_kg must be a number above 0, at most 1e+12, not 'heavy'"),
+    ("object.0.friction_static", None, "friction_static is missing"),
+    ("object.0.friction_kinetic", 0.6, "must be at most friction_static (0.5)"),
+    ("object.0.modulus_pa", 1e4, "object 'box': unknown key modulus_pa; allowed: name"),
+    ("object.0.base_m", 0.2, "object 'box': height_m is missing"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "says"), MISTAKES)
 def test_a_mistake_gets_one_sentence_with_the_key_and_what_is_allowed(path, value, says):
     with pytest.raises(InputError) as error:
-        from_dict(broken(path, value), where="scene.toml")
+        from_dict(changed(path, value), where="scene.toml")
     assert str(error.value).startswith("scene.toml: ")
     assert says in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_a_movable_object_needs_what_it_slides_on():
-    table = copy.deepcopy(GOOD)
-    del table["object"][0]["friction_static"]
-    with pytest.raises(InputError, match="friction_static is missing"):
-        from_dict(table)
 
 
 def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
@@ -216,15 +145,6 @@ def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
         scenes.load(other)
 
 
-def test_two_objects_of_one_name():
-    table = copy.deepcopy(GOOD)
-    table["object"] = table["object"] * 2
-    with pytest.raises(
-        InputError, match="object 'box': name must be different from every other object's"
-    ):
-        from_dict(table)
-
-
 def test_files_that_are_no_scene(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         scenes.load(tmp_path / "none.toml")
@@ -234,40 +154,18 @@ def test_files_that_are_no_scene(tmp_path):
         scenes.load(path)
 
 
-LEAVES = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(),
-    st.floats(),
-    st.text(max_size=4),
-    st.lists(st.one_of(st.integers(-3, 3), st.floats(), st.text(max_size=3)), max_size=3),
-    st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
-)
+SHORT = st.lists(st.integers(-3, 3) | st.floats() | st.text(max_size=3), max_size=3)
+VALUES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4) | SHORT
+PATHS = [path for path, *_ in MISTAKES] + ["object.0", "object.0.width_m", "object.0.cover_n_m"]
 
 
-def paths(table, prefix=()):
-    found = [prefix] if prefix else []
-    items = table.items() if isinstance(table, dict) else enumerate(table)
-    for key, value in items:
-        found.append((*prefix, key))
-        if isinstance(value, dict | list):
-            found += paths(value, (*prefix, key))
-    return found
-
-
-@settings(max_examples=150)
-@given(
-    st.sampled_from([*paths(GOOD), *(("object", 0, k) for k in ("width_m", "cover_n_m"))]),
-    LEAVES,
-)
+@settings(max_examples=100)
+@given(st.sampled_from(PATHS), VALUES | st.dictionaries(st.text(max_size=3), st.integers()))
 def test_any_value_anywhere_is_taken_or_refused_in_one_sentence(path, value):
     try:
-        from_dict(broken(path, value))
+        from_dict(changed(path, value))
     except InputError as error:
-        sentence = str(error)
-    else:
-        sentence = ""
-    assert "\n" not in sentence
+        assert "\n" not in str(error)
 
 
 def test_a_skin_of_other_columns_has_them_evenly_around():
@@ -307,48 +205,21 @@ def test_an_arm_that_slides_is_refused(tmp_path):
         from_dict({**GOOD, "arm": arm}, str(tmp_path / "scene.toml"))
 
 
-def test_an_arm_may_have_many_joints(tmp_path):
-    dof = 17
-    joints = "".join(
-        f'[[joint]]\nname = "j{i}"\ntype = "revolute"\naxis = [0.0, 0.0, 1.0]\n'
-        f"translate = [{0.02 * (i > 0)}, 0.0, 0.0]\n"
-        for i in range(dof)
-    )
-    (tmp_path / "arm.toml").write_text(f'base = "a"\ntip = "b"\n{joints}')
-    gains = {"stiffness_nm_rad": [30.0] * dof, "damping_nms_rad": [0.5] * dof}
-    motion = {"start_deg": [0.0] * dof, "rate_deg_s": [20.0, *[0.0] * (dof - 1)]}
-    box = {"name": "box", "family": "rigid", "conditions": ["fixed"], "width_m": 0.03}
-    table = {"step_s": {"base": 0.01}, "arm": {"chain": "arm.toml", **gains}, "motion": motion}
-    _, trial = next(simulate(from_dict({**table, "object": [box]}, str(tmp_path / "scene.toml"))))
-    assert trial.joints.shape[1] == dof
-
-
 def test_an_arm_may_come_from_a_urdf(tmp_path):
     """The joints of Cody's chain, written as URDF, make the same trials."""
-    chain, links = Chain.cody(), []
-    joints = ""
-    for i, joint in enumerate(chain.joints):
-        links.append(f"l{i}")
-        before = chain.joints[i - 1].translate if i else (0.0, 0.0, 0.0)
-        joints += (
-            f'<joint name="{joint.name}" type="continuous"><parent link="l{i}"/>'
-            f'<child link="l{i + 1}"/><origin xyz="{" ".join(map(str, before))}"/>'
-            f'<axis xyz="{" ".join(map(str, joint.axis))}"/></joint>'
+    chain, step, xml = Chain.cody(), (0.0, 0.0, 0.0), ""
+    for i, (name, axis) in enumerate([*((j.name, j.axis) for j in chain.joints), ("tip", None)]):
+        turns = f'<axis xyz="{" ".join(map(str, axis))}"/>' if axis else ""
+        xml += (
+            f'<link name="l{i}"/><joint name="{name}" type="{"continuous" if axis else "fixed"}">'
+            f'<parent link="l{i}"/><child link="l{i + 1}"/>'
+            f'<origin xyz="{" ".join(map(str, step))}"/>{turns}</joint>'
         )
-    tip = " ".join(map(str, chain.joints[-1].translate))
-    joints += (
-        f'<joint name="tip" type="fixed"><parent link="l{len(links)}"/><child link="tip"/>'
-        f'<origin xyz="{tip}"/></joint>'
-    )
-    names = "".join(f'<link name="{n}"/>' for n in (*links, f"l{len(links)}", "tip"))
-    (tmp_path / "arm.urdf").write_text(f'<robot name="cody">{names}{joints}</robot>')
-    arm = {
-        "chain": "arm.urdf",
-        "base": "l0",
-        "tip": "tip",
-        "stiffness_nm_rad": list(CODY_STIFFNESS),
-        "damping_nms_rad": list(CODY_DAMPING),
-    }
+        step = chain.joints[min(i, len(chain.joints) - 1)].translate
+    last = len(chain.joints) + 1
+    (tmp_path / "arm.urdf").write_text(f'<robot name="cody">{xml}<link name="l{last}"/></robot>')
+    arm = {"chain": "arm.urdf", "base": "l0", "tip": f"l{last}"}
+    arm |= {"stiffness_nm_rad": list(CODY_STIFFNESS), "damping_nms_rad": list(CODY_DAMPING)}
     box = {"name": "box", "family": "rigid", "conditions": ["fixed"]}
     plain = {"trials": {"count": 1}, "step_s": {"base": 0.01}, "object": [box]}
     here = str(tmp_path / "scene.toml")
