@@ -232,7 +232,7 @@ demo-data: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
 	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --decision-points none \
-		--features paper --projection pca --tasks category mobility object
+		--features paper --projection pca --tasks category mobility object --name demo
 	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
 
 HARD := $(OUT)/hard-cases

@@ -108,6 +108,10 @@ def trials(
     skin = dict(read_json(folder / "skin.json")) if (folder / "skin.json").is_file() else {}
     parts = [part for file in files for part in _trials_in(_table(file), folder, options.task)]
     measured = [_measured(table, options) for _, _, table in parts]
+    for (_, _, table), (_, values, _) in zip(parts, measured, strict=True):
+        if values.shape[1] != measured[0][1].shape[1]:
+            few = f"{values.shape[1]} taxels, and {parts[0][2].path} {measured[0][1].shape[1]}"
+            raise InputError(f"{table.path}: has {few}; name them by --taxels")
     starts = [np.median(values[:START], axis=0) for _, values, _ in measured]
     rest = max(starts, key=np.nansum) if options.falls else 0.0
     for (name, labels, table), (t, values, joints) in zip(parts, measured, strict=True):

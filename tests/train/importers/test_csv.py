@@ -139,6 +139,15 @@ def test_what_cannot_be_used_is_one_sentence(content, words, sentence, tmp_path,
     assert ("x.txt" in said) != ("big" in words)
 
 
+def test_trials_of_different_skins_are_refused(folder, capsys):
+    (folder / "a.txt").write_text("1 2\n")
+    (folder / "b.txt").write_text("1 2 3\n")
+    assert imported(folder, "--rate", "1", "--falls")[0] == 2
+    said = capsys.readouterr().err
+    assert "b.txt: has 3 taxels, and " in said
+    assert said.endswith("a.txt 2; name them by --taxels\n")
+
+
 def test_a_folder_without_tables_is_refused(tmp_path, capsys):
     assert main(["import", "csv", str(tmp_path), "--out", str(tmp_path / "o")]) == 2
     assert "holds no file .csv" in capsys.readouterr().err
