@@ -108,8 +108,10 @@ def confusion(name: str, title: str, truth: NDArray[np.str_], said: NDArray[np.s
         axes = canvas.subplots()
         axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
         small = {"fontsize": 6} if phone and n > 6 else {}
-        axes.set_xticks(range(n), range(1, n + 1), **small)
+        shown = range(0, n, -(-n // MATRIX_TEXT))
+        axes.set_xticks(shown, [i + 1 for i in shown], **small)
         axes.set_yticks(range(n), numbered, **small)
+        axes.set(xlabel="answer, by number", ylabel="touched")
         for i, j in zip(*np.nonzero(counts), strict=True) if n <= MATRIX_TEXT else ():
             text = f"{counts[i, j]:.0f}" + (f"\n{shares[i, j]:.0%}" if n <= 4 else "")
             colour = "white" if shares[i, j] > 0.55 else "black"

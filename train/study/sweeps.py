@@ -66,7 +66,7 @@ def confusion(context: Context) -> Section:
         assert result.said is not None
         counts = {"task": task, "classes": len(set(truth)), "trials": result.total}
         best.append(counts | score(result))
-        title = f"{task}: a row for each thing touched, a column for each answer"
+        title = f"{task}: answers to each thing touched"
         pictures.append(figures.confusion(f"confusion_{task}", title, truth, result.said))
         pairs = Counter(zip(truth.tolist(), result.said.tolist(), strict=True))
         cells += [
