@@ -24,8 +24,8 @@ PEERS = {
     "soft": ('solref="-3000 -50"', ""),
 }
 """{box: (stiffness of its contact, its joint)}."""
-LEAST = 3
-"""How many times MuJoCo's trials a second."""
+LEAST = {"cody18": 1.5, "household": 2.0}
+"""{scene: how many times MuJoCo's trials a second}: more where more trials run side by side."""
 
 
 def mujoco_trial(solref, joint):
@@ -70,7 +70,7 @@ def peer_of(trial):
     return trial.condition if trial.object.family == "rigid" else "soft"
 
 
-@pytest.mark.parametrize("name", ["cody18", "household"])
+@pytest.mark.parametrize("name", LEAST)
 def bench_simulate(note, name):
     scene = load(SCENES / f"{name}.toml")
     batches = parts(scene)
@@ -86,4 +86,4 @@ def bench_simulate(note, name):
         own.append(seconds_of(ours) / len(trials))
         ratios.append(statistics.mean(seconds[peer_of(trial)] for trial in trials) / own[-1])
     note("trials a second of one core", 1.0 / statistics.median(own[1:]), "-")
-    note("times MuJoCo's trials a second", statistics.median(ratios[1:]), f"at least {LEAST}")
+    note("times MuJoCo's trials a second", statistics.median(ratios[1:]), f"at least {LEAST[name]}")
