@@ -21,6 +21,12 @@ COMMANDS = tuple(
     "check scan calibrate record label run view replay explain info verify bench fake demo".split()
 )
 """Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
+FLAGS = {
+    ("--json",): "print JSON lines even to a terminal",
+    ("-v", "--verbose"): "print more messages to stderr",
+    ("-q", "--quiet"): "print only errors to stderr",
+}
+"""Options of every command, with their help."""
 UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of writing to a full disk, beyond a quota, or to a terminal that has gone."""
 
@@ -38,15 +44,8 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
     for command in add_commands(top, "edge.commands", wanted):
-        command.add_argument(
-            "--json", action="store_true", help="print JSON lines even to a terminal"
-        )
-        command.add_argument(
-            "-v", "--verbose", action="store_true", help="print more messages to stderr"
-        )
-        command.add_argument(
-            "-q", "--quiet", action="store_true", help="print only errors to stderr"
-        )
+        for flags, text in FLAGS.items():
+            command.add_argument(*flags, action="store_true", help=text)
     return top
 
 
@@ -82,11 +81,8 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
             argcomplete.autocomplete(top)
     arguments = top.parse_args(argv)
-    level = logging.INFO
-    if getattr(arguments, "verbose", False):
-        level = logging.DEBUG
-    elif getattr(arguments, "quiet", False):
-        level = logging.ERROR
+    quieter = logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
+    level = logging.DEBUG if getattr(arguments, "verbose", False) else quieter
     with messages(top.prog, level):
         return _run(top, arguments)
 
@@ -125,11 +121,8 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
         if error.filename is not None or error.errno not in UNWRITABLE:
             raise
         _discard_output()
-        print(
-            f"{top.prog}: standard output cannot be written: {error.strerror}; redirect it to "
-            "another place",
-            file=sys.stderr,
-        )
+        problem = f"standard output cannot be written: {error.strerror}"
+        print(f"{top.prog}: {problem}; redirect it to another place", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130

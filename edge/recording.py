@@ -149,7 +149,8 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     if layout.shape != (rows, cols):
         fail(f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}")
 
-    t = _as_double(recording.t)
+    t = np.asarray(recording.t)
+    t = t.astype(np.float64) if t.dtype.kind == "f" else t
     expect("t", t, np.float64, (n,))
     if not np.isfinite(t).all():
         fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
@@ -158,7 +159,8 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         fail(f"time goes back at frame {backwards[0] + 1}; sort the frames or split the recording")
     joints, dof = recording.joints, 0
     if joints is not None:
-        joints = _as_double(joints)
+        joints = np.asarray(joints)
+        joints = joints.astype(np.float64) if joints.dtype.kind == "f" else joints
         dof = max(joints.shape[1], 1) if joints.ndim == 2 else 1
         expect("joints", joints, np.float64, (n, dof))
         unknown = np.isnan(joints)
@@ -171,33 +173,24 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     if recording.valid is not None:
         expect("valid", recording.valid, np.bool_, (rows, cols), (n, rows, cols))
 
+    def are_names(texts: object) -> bool:
+        return isinstance(texts, list) and all(isinstance(x, str) and x != "" for x in texts)
+
     if isinstance(labels, dict) and labels:
-        labels = {task: _label_text(label) for task, label in labels.items()}
+        labels = {
+            task: str(label) if type(label) is int or isinstance(label, np.integer) else label
+            for task, label in labels.items()
+        }
         meta["labels"] = labels
-    if not isinstance(labels, dict) or not all(map(_is_name, (*labels, *labels.values()))):
+    if not isinstance(labels, dict) or not are_names([*labels, *labels.values()]):
         fail("meta.labels must map task names to labels, both text")
     names = meta.get("joint_names")
-    if names is not None and not (
-        isinstance(names, list) and all(map(_is_name, names)) and len(set(names)) == len(names)
-    ):
-        fail("meta.joint_names must be a list of different names")
-    if names is not None and len(names) != dof:
-        fail(f"the number of meta.joint_names is {len(names)}, of joint angles {dof}")
+    if names is not None:
+        if not are_names(names) or len(set(names)) < len(names):
+            fail("meta.joint_names must be a list of different names")
+        if len(names) != dof:
+            fail(f"the number of meta.joint_names is {len(names)}, of joint angles {dof}")
     return Recording(t, frames, joints, recording.valid, meta)
-
-
-def _as_double(values: NDArray[Any]) -> NDArray[Any]:
-    array = np.asarray(values)
-    return array.astype(np.float64) if array.dtype.kind == "f" else array
-
-
-def _label_text(label: object) -> object:
-    is_whole = isinstance(label, int | np.integer) and not isinstance(label, bool)
-    return str(label) if is_whole else label
-
-
-def _is_name(value: object) -> bool:
-    return isinstance(value, str) and value != ""
 
 
 def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:

@@ -18,14 +18,13 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge import __version__
 from edge.classifier import Classifier
@@ -39,7 +38,7 @@ from edge.skin.file import SkinFile, frame_rate, load
 from edge.skin.loop import garbage_aside
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker, first_contact
+from edge.touch.track import first_contact
 
 LOG = logging.getLogger(__name__)
 
@@ -162,33 +161,24 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     series, counts = contact[1], [frame.counts for frame in frames[INSIDE]]
     due = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
 
-    def region(counts: NDArray[np.uint16]) -> object:
-        return largest_region(counts, layout.threshold_counts, wraps=layout.wraps)
-
-    def vector(_: int = 0) -> NDArray[np.float64]:
-        return info.vector(series)
-
-    once, calls = vector(), range(rounds)
-    model.decide(once)
+    limit, vector, calls = layout.threshold_counts, info.vector(series), range(rounds)
+    model.decide(vector)
     few = max(rounds // 10, 4)
     stages = {
-        "region": timed(region, [counts[i % len(counts)] for i in calls]),
+        "region": timed(
+            lambda i: largest_region(counts[i % len(counts)], limit, wraps=layout.wraps), calls
+        ),
         "track": pushed(lambda: info.tracker(layout), frames, INSIDE, rounds),
-        "features": timed(vector, calls),
-        "decision": timed(lambda _: model.decide(once), calls),
-        "answer": timed(lambda _: model.decide(vector()), calls),
+        "features": timed(lambda _: info.vector(series), calls),
+        "decision": timed(lambda _: model.decide(vector), calls),
+        "answer": timed(lambda _: model.decide(info.vector(series)), calls),
         "frame": pushed(lambda: Classifier(model), frames, INSIDE, rounds),
         "last": pushed(lambda: Classifier(model), frames, slice(due, due + 1), few),
     }
     return {name: summary(times) for name, times in stages.items()}
 
 
-def pushed(
-    make: Callable[[], ContactTracker | Classifier],
-    frames: Sequence[Frame],
-    keep: slice,
-    rounds: int,
-) -> list[float]:
+def pushed(make: Callable[[], Any], frames: list[Frame], keep: slice, rounds: int) -> list[float]:
     """Microseconds of each frame in `keep`, pushed among the others into new objects of `make`."""
     times: list[float] = []
     while len(times) < rounds:
@@ -208,13 +198,9 @@ def timed(call: Callable[[Any], object], items: Iterable[Any]) -> list[float]:
 
 def summary(times: list[float]) -> Timings:
     """Median, 99th percentile (nearest rank) and number of times in microseconds."""
-    ordered = sorted(times)
-    rank = math.ceil(0.99 * len(ordered)) - 1
-    return {
-        "median_us": round(float(np.median(ordered)), 2),
-        "p99_us": round(ordered[rank], 2),
-        "n": len(ordered),
-    }
+    p99 = sorted(times)[math.ceil(0.99 * len(times)) - 1]
+    median = float(np.median(times))
+    return {"median_us": round(median, 2), "p99_us": round(p99, 2), "n": len(times)}
 
 
 def cold_start_ms(path: str) -> float:
@@ -225,18 +211,15 @@ def cold_start_ms(path: str) -> float:
 
 def machine() -> dict[str, Any]:
     """A description of this machine."""
+    versions = {"edge-classify": __version__, "python": platform.python_version()}
+    versions |= {"numpy": np.__version__, "onnxruntime": version("onnxruntime")}
     return {
         "name": platform.node(),
         "kind": kind(),
         "architecture": platform.machine(),
         "cores": os.cpu_count(),
         "system": platform.platform(),
-        "versions": {
-            "edge-classify": __version__,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "onnxruntime": version("onnxruntime"),
-        },
+        "versions": versions,
     }
 
 
@@ -244,21 +227,17 @@ def kind() -> str:
     """The name of the board, or else of the processor."""
     with suppress(OSError):
         return Path("/proc/device-tree/model").read_text(errors="replace").strip("\x00 \n")
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+        name = next(line for line in lines if line.startswith("model name"))
+        return name.partition(":")[2].strip()
     return platform.processor() or "unknown"
 
 
 def wire(skin: SkinFile) -> dict[str, Any]:
     """The wire time of a frame, from the bits that the drivers transfer over a fake bus."""
-    bits: NDArray[np.float64] = np.array(frame_bits(skin, FRAMES)) / FRAMES
-    rate = frame_rate(bits.tolist(), [bus.clock_hz for bus in skin.buses])
-    return {
-        "skin": skin.name,
-        "bits": bits.tolist(),
-        "clock_hz": [bus.clock_hz for bus in skin.buses],
-        "frame_ms": round(1e3 / rate, 4),
-        "frame_rate_hz": round(rate, 2),
-    }
+    bits = [count / FRAMES for count in frame_bits(skin, FRAMES)]
+    clocks = [bus.clock_hz for bus in skin.buses]
+    rate = frame_rate(bits, clocks)
+    times = {"frame_ms": round(1e3 / rate, 4), "frame_rate_hz": round(rate, 2)}
+    return {"skin": skin.name, "bits": bits, "clock_hz": clocks, **times}

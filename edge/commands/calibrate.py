@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import logging
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -67,18 +68,13 @@ def measure(
     Returns:
         The calibration, the number of valid values of each taxel, and the number of frames.
     """
-    shape = skin.layout.shape
-    n = np.zeros(shape, dtype=np.int64)
-    total, squares = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    n, total, squares = np.zeros((3, *skin.layout.shape), dtype=np.int64)
     seen = 0
-    for _ in Loop(skin, lasts_s=lasts_s).frames():
+    for seen, _ in enumerate(Loop(skin, lasts_s=lasts_s).frames(), 1):
         raw, valid = skin.raw()
         # Squares of 16 bits over 2**31 frames still fit 63 bits.
         values = np.where(valid, raw, 0).astype(np.int64)
-        n += valid
-        total += values
-        squares += values * values
-        seen += 1
+        n, total, squares = n + valid, total + values, squares + values * values
         if seen == frames:
             break
     return TaxelCalibration(*mean_and_deviation(n, total, squares)), n, seen
@@ -121,16 +117,14 @@ def unusable(
         bad[taxels] |= rest[taxels] >= chip.highest
         if not chip.kind.rests_at_zero:
             bad[taxels] |= rest[taxels] == 0
-    unusable: NDArray[np.bool_] = (served & bad).reshape(baseline.shape) & file.layout.alive
-    return unusable
+    return np.asarray((served & bad).reshape(baseline.shape) & file.layout.alive)
 
 
 def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Taxels (row, col) that vary far more than the others, the worst first."""
     limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
-    taxels = np.argwhere(noise > limit)
-    order = np.argsort(-noise[noise > limit], kind="stable")
-    return [(int(r), int(c)) for r, c in taxels[order]]
+    taxels = [(row, col) for row, col in np.argwhere(noise > limit).tolist()]
+    return sorted(taxels, key=lambda taxel: -noise[taxel])
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -168,22 +162,13 @@ def run(arguments: argparse.Namespace) -> int:
             f"[{row}, {col}], by {calibration.noise[row, col]:.1f} counts; keep everything off "
             "the skin, list broken taxels under dead in [signal], or use --force"
         )
-    taken = datetime.now(UTC).replace(microsecond=0)
-    backup = save_calibration(
-        arguments.skin, TaxelCalibration(calibration.baseline, calibration.noise, taken)
-    )
+    calibration = replace(calibration, taken=datetime.now(UTC).replace(microsecond=0))
+    backup = save_calibration(arguments.skin, calibration)
     median, largest = float(np.median(calibration.noise)), float(calibration.noise.max())
+    event = {"event": "calibrated", "skin": arguments.skin, "backup": str(backup), "frames": seen}
+    event |= {"noise_median": round(median, 3), "noise_largest": round(largest, 3)}
     Output.of(arguments).event(
-        {
-            "event": "calibrated",
-            "skin": arguments.skin,
-            "backup": str(backup),
-            "frames": seen,
-            "noise_median": round(median, 3),
-            "noise_largest": round(largest, 3),
-            "kept": int(lost.sum()),
-            "moving": moving,
-        },
+        {**event, "kept": int(lost.sum()), "moving": moving},
         f"{arguments.skin}: calibrated from {seen} frames; noise in counts: median {median:.1f}, "
         f"largest {largest:.1f}. The old file is kept as {backup}.",
     )

@@ -21,7 +21,6 @@ from edge.events import Decided, Event
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import Recording, load
-from edge.touch.region import find_regions
 
 LOG = logging.getLogger(__name__)
 
@@ -65,8 +64,6 @@ def picture(recording: Recording) -> str:
     """The frame of a recording with the largest sum of counts, as lines for a terminal."""
     layout = recording.layout
     strongest = int(recording.frames.sum(axis=(1, 2), dtype=np.int64).argmax())
-    frame = list(recording)[strongest]
-    regions = find_regions(frame.counts, layout.threshold_counts, wraps=layout.wraps)
     full = int(recording.frames.max())
-    colour = terminal.colours(frame, regions, layout.threshold_counts, full)
+    colour, _ = terminal.skin_colours(list(recording)[strongest], layout, full)
     return terminal.picture(colour, wide=2)

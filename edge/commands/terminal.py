@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from edge.skin.loop import Stop
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import Region
+from edge.touch.region import Region, find_regions
 
 CLEAR, HOME, HIDE, SHOW, PLAIN = "\x1b[2J", "\x1b[H", "\x1b[?25l", "\x1b[?25h", "\x1b[0m"
 REST = tuple(range(233, 242))
@@ -29,10 +29,15 @@ LOST = 18
 LEGEND = "■■■ touched, by force   ■ below the threshold   ■ cannot be read   q quits"
 
 
-def colours(
-    frame: Frame, regions: Sequence[Region], threshold: int, full: int
-) -> NDArray[np.uint8]:
-    """256-colour numbers (rows, cols), by force on a logarithmic scale up to `full` counts."""
+def skin_colours(
+    frame: Frame, layout: SkinLayout, full: int
+) -> tuple[NDArray[np.uint8], list[Region]]:
+    """256-colour numbers (rows, cols), and the regions.
+
+    The colours show force on a logarithmic scale up to `full` counts.
+    """
+    threshold = layout.threshold_counts
+    regions = find_regions(frame.counts, threshold, valid=frame.valid, wraps=layout.wraps)
     counts = frame.counts.astype(np.float64)
     rest = np.log1p(np.minimum(counts, threshold)) / math.log1p(max(threshold, 1))
     out: NDArray[np.uint8] = np.array(REST, dtype=np.uint8)[(rest * (len(REST) - 1)).astype(int)]
@@ -43,7 +48,7 @@ def colours(
         out[region.mask] = hot[region.mask]
     if frame.valid is not None:
         out[~frame.valid] = LOST
-    return out
+    return out, regions
 
 
 def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:

@@ -22,7 +22,6 @@ from edge.events import Decided, Onset
 from edge.model.model import Model
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import find_regions
 
 RATE_HZ = 10.0
 FULL_NEWTONS, FULL_FACTOR = 17.0, 50
@@ -44,11 +43,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[str]:
     """The lines of one picture."""
-    threshold = layout.threshold_counts
-    regions = find_regions(frame.counts, threshold, valid=frame.valid, wraps=layout.wraps)
-    scale = layout.counts_per_newton
+    scale, threshold = layout.counts_per_newton, layout.threshold_counts
     full = FULL_FACTOR * max(threshold, 1) if scale is None else round(FULL_NEWTONS * scale)
-    colour = terminal.colours(frame, regions, threshold, full)
+    colour, regions = terminal.skin_colours(frame, layout, full)
     columns = shutil.get_terminal_size().columns
     wide = 2 if 2 * layout.cols <= columns else 1
     texts = [terminal.caption(frame, regions, layout)]

@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -144,21 +143,6 @@ def test_a_bad_option_is_one_sentence(edge, exported, recordings, arguments, sai
     assert err.startswith("edge-classify: ")
     assert said in err
     assert err.count("\n") == 1
-
-
-def test_run_stops_cleanly_at_ctrl_c(exported, recordings):
-    process = subprocess.Popen(
-        [sys.executable, "-m", "edge.cli", "run", "--model", str(exported / "model.onnx"),
-         "--fake", str(recordings / "hard_0.npz"), "--loop"],
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    first = process.stdout.readline()
-    time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    rest, err = process.communicate(timeout=30)
-    assert (process.returncode, err) == (0, "")
-    events = lines(first + rest)
-    assert events[-1]["event"] == "end"
 
 
 @pytest.mark.parametrize("command", ["record", "run", "view"])

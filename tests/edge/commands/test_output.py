@@ -52,22 +52,6 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
 
 
 @pytest.mark.parametrize(
-    ("invalid", "text"),
-    [(12, "taxels without a valid value for 50 frames: 12"), (0, "all taxels are valid again")],
-)
-def test_silent_taxels_are_a_sentence(invalid, text):
-    event = {"event": "taxels", "t": 1.5, "invalid": invalid, "frames": 50}
-    assert event_text(event) == f"   1.500 s  {text}"
-
-
-def test_a_map_of_chips_comes_last(terminal, capsys):
-    assert main(["scan", "--fake", TOUCH]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 17
-    assert lines[-1] == "32 of 32 chips answer"
-
-
-@pytest.mark.parametrize(
     ("line", "text"),
     [
         ({"event": "onset", "onset_s": 1.5, "contact": 2}, "   1.500 s  contact 2"),
@@ -90,6 +74,15 @@ def test_a_map_of_chips_comes_last(terminal, capsys):
             "   1.400 s  object     box              ██████····  60%  (tie; labelled foam)",
         ),
         ({"event": "no_contact"}, "no contact"),
+        ({"event": "deleted", "file": "a/box-001.npz"}, "a/box-001.npz is deleted"),
+        (
+            {"event": "taxels", "t": 1.5, "invalid": 12, "frames": 50},
+            "   1.500 s  taxels without a valid value for 50 frames: 12",
+        ),
+        (
+            {"event": "taxels", "t": 1.5, "invalid": 0, "frames": 50},
+            "   1.500 s  all taxels are valid again",
+        ),
         (
             {"event": "saved", "file": "a/box-001.npz", "labels": {"object": "box"}, "frames": 150,
              "seconds": 1.5, "complete": False},

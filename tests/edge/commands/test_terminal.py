@@ -7,9 +7,8 @@ import numpy as np
 from edge.commands import terminal
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import find_regions
 
-LAYOUT = SkinLayout(rows=4, cols=4, threshold_counts=100)
+LAYOUT = SkinLayout(rows=4, cols=4, threshold_counts=100, wraps=False)
 
 
 def frame(*places, value=1000, valid=None):
@@ -20,8 +19,8 @@ def frame(*places, value=1000, valid=None):
 
 
 def drawn(f):
-    regions = find_regions(f.counts, 100, wraps=False)
-    return regions, terminal.colours(f, regions, 100, 5000)
+    colours, regions = terminal.skin_colours(f, LAYOUT, 5000)
+    return regions, colours
 
 
 def test_a_region_is_red_to_white_by_force_and_the_rest_grey():
@@ -67,8 +66,7 @@ def test_the_caption_is_for_a_person():
 def test_a_skin_that_feels_everything_or_nothing_is_drawn():
     for counts in (0, 65535):
         f = Frame(t=0.0, counts=np.full((3, 5), counts, dtype=np.uint16))
-        regions = find_regions(f.counts, 0)
-        colour = terminal.colours(f, regions, 0, 1)
+        colour, _ = terminal.skin_colours(f, SkinLayout(rows=3, cols=5), 1)
         assert terminal.picture(colour).count("▀") == 2 * 5 * 2
 
 
