@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 
-def wilson(right: int, total: int, z: float = 1.959963984540054) -> tuple[float, float]:
+def wilson(right: float, total: float, z: float = 1.959963984540054) -> tuple[float, float]:
     """Wilson's score interval of a proportion (95 % by default).
 
     Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212.

@@ -176,7 +176,7 @@ def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
     point = front.pick(arguments.front)
     print(
         f"{arguments.front}: a window of {point.window_s:g} s, {front.task} {point.accuracy:.1%} "
-        f"in {point.milliseconds:.0f} ms",
+        f"({100 * point.low:.0f} to {100 * point.high:.0f}) in {point.milliseconds:.0f} ms",
         file=sys.stderr,
     )
     return point

@@ -48,22 +48,3 @@ def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[s
 def unseen(choice: Chosen) -> Result | None:
     """The accuracy on objects never met; None where no objects could be left out."""
     return None if choice.left_out == TRIAL else choice.accuracy
-
-
-def front(points: Points, task: str, after_s: float, digest: str) -> dict[str, Any]:
-    """The contents of front.json: the windows that no other beats in both time and accuracy."""
-    best: list[dict[str, float]] = []
-    for window_s, tasks in points.items():
-        result = tasks[task].by_trial
-        if not best or result.accuracy > best[-1]["accuracy"]:
-            low, high = result.interval
-            best.append(
-                {
-                    "window_s": window_s,
-                    "milliseconds": round(1e3 * (window_s + after_s), 2),
-                    "accuracy": result.accuracy,
-                    "low": low,
-                    "high": high,
-                }
-            )
-    return {"format": 2, "task": task, "data_digest": digest, "points": best}

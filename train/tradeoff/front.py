@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from edge.config import json_file
 from edge.errors import InputError
+from edge.statistics import wilson
+from train.tradeoff.choices import Points
 
 NAMES = ("fast", "balanced", "accurate")
 BALANCED_S = 0.9
 """The longest window that counts as balanced."""
+VARIANCE = 2.0
+"""Of the nested accuracy's difference from the exported model's on other trials, in binomial
+variances: the folds' models differ from it, and the best windows are shown. `make risk` counts."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +28,14 @@ class OperatingPoint:
         window_s: seconds from onset that a decision waits for.
         milliseconds: from onset to decision.
         accuracy: nested over the entire choice, trials left out; 0 to 1.
+        low, high: 95 % interval of the exported model's accuracy.
     """
 
     window_s: float
     milliseconds: float
     accuracy: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,29 @@ class ParetoFront:
     points: tuple[OperatingPoint, ...]
 
     @classmethod
+    def of(cls, points: Points, task: str, after_s: float = 0.0) -> ParetoFront:
+        """The windows that no other beats in both time and accuracy.
+
+        Args:
+            points: the choices at each window, the shortest first.
+            task: whose accuracy counts.
+            after_s: seconds from the end of a window to the decision.
+        """
+        best: list[OperatingPoint] = []
+        for window_s, tasks in points.items():
+            result = tasks[task].by_trial
+            if not best or result.accuracy > best[-1].accuracy:
+                low, high = wilson(result.right / VARIANCE, result.total / VARIANCE)
+                after = round(1e3 * (window_s + after_s), 2)
+                best.append(OperatingPoint(window_s, after, result.accuracy, low, high))
+        return cls(task, tuple(best))
+
+    def to_dict(self, digest: str) -> dict[str, Any]:
+        """The contents of the front.json of recordings with a digest."""
+        points = [asdict(point) for point in self.points]
+        return {"format": 2, "task": self.task, "data_digest": digest, "points": points}
+
+    @classmethod
     def read(cls, path: Path, digest: str) -> ParetoFront:
         """Read the front.json that `make tradeoff` writes.
 
@@ -55,9 +87,7 @@ class ParetoFront:
         mend = "make one with `make tradeoff`"
         with json_file(path, "a front.json", mend) as content:
             points = [
-                OperatingPoint(
-                    *(float(point[key]) for key in ("window_s", "milliseconds", "accuracy"))
-                )
+                OperatingPoint(*(float(point[key.name]) for key in fields(OperatingPoint)))
                 for point in content["points"]
             ]
             task, measured = str(content["task"]), str(content["data_digest"])

@@ -18,7 +18,8 @@ from train.simulate import scene as scenes
 from train.tradeoff import answer, costs, early
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.choices import WINDOWS_S, chosen, followed, front
+from train.tradeoff.choices import WINDOWS_S, chosen, followed
+from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measured
 from train.tradeoff.wires import waited_s
 
@@ -99,7 +100,7 @@ def tradeoff(
     ]
     sections = [make(measured) for make in SECTIONS]
     report = write(out, "What accuracy costs in time", lead, sections)
-    best = front(points, main, measured.after_s, dataset.digest)
+    best = ParetoFront.of(points, main, measured.after_s).to_dict(dataset.digest)
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(best, indent=1).encode() + b"\n")
     return report

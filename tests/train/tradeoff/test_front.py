@@ -16,7 +16,7 @@ def text(points=POINTS, **more):
         "task": "object",
         "data_digest": DIGEST,
         "points": [
-            {"window_s": ms / 1000, "milliseconds": ms, "accuracy": accuracy}
+            {"window_s": ms / 1000, "milliseconds": ms, "accuracy": accuracy, "low": 0, "high": 1}
             for ms, accuracy in points
         ],
     } | more)  # fmt: skip

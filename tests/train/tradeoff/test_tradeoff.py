@@ -15,6 +15,7 @@ from edge.model.model import Model
 from edge.model.stopping import StoppingRule
 from edge.recording import save
 from edge.skin import file as skinfile
+from edge.statistics import wilson
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export
 from tests import browser
@@ -28,7 +29,7 @@ from train.rules import Course
 from train.tradeoff import answer, board, costs, early
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
-from train.tradeoff.choices import followed, front, unseen
+from train.tradeoff.choices import followed, unseen
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
@@ -71,13 +72,14 @@ def chosen(hits, left_out="trial"):
 def test_the_front_is_what_no_other_window_beats_in_both():
     shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
     points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
-    best = front(points, "t", 0.01, "0" * 64)
-    assert [(p["window_s"], p["milliseconds"], p["accuracy"]) for p in best["points"]] == [
+    best = ParetoFront.of(points, "t", 0.01).points
+    assert [(p.window_s, p.milliseconds, p.accuracy) for p in best] == [
         (0.2, 210.0, 0.5),
         (0.4, 410.0, 0.7),
         (0.8, 810.0, 0.9),
     ]
-    assert best["points"][0]["low"] < 0.5 < best["points"][0]["high"]
+    # As wide as that of half as many trials.
+    assert (best[0].low, best[0].high) == wilson(25, 50)
 
 
 def test_objects_never_met_have_a_figure_only_where_they_were_left_out():
@@ -91,7 +93,7 @@ def fronted(recordings, tmp_path_factory):
     path = tmp_path_factory.mktemp("front") / "front.json"
     dataset = followed(read([recordings]))
     points = {0.4: make_choice(dataset, 0.4)}
-    path.write_text(json.dumps(front(points, "category", 0.01, dataset.digest)))
+    path.write_text(json.dumps(ParetoFront.of(points, "category", 0.01).to_dict(dataset.digest)))
     return path, points[0.4]["category"]
 
 
@@ -100,7 +102,7 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1"]
     assert export([*given, "--front", "fast", "--fronts", str(path)]) == 0
     said = capsys.readouterr().err
-    assert f"category {choice.by_trial.accuracy:.1%} in 410 ms" in said
+    assert f"category {choice.by_trial.accuracy:.1%} (68 to 100) in 410 ms" in said
     info = Model(tmp_path / "model.onnx").info
     task = info.tasks["category"]
     assert info.window_s == 0.4
