@@ -18,7 +18,8 @@ from edge import __version__
 from edge.errors import EdgeError, InputError
 
 COMMANDS = tuple(
-    "check scan calibrate record label run view replay explain info verify bench fake demo".split()
+    "check scan calibrate record label teach run view replay explain info verify bench fake "
+    "demo".split()
 )
 """Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
 FLAGS = {

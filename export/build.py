@@ -25,32 +25,42 @@ class Builder:
     def __init__(self, scope: Any, container: Any, decision_point: str = "") -> None:
         self._scope, self._container = scope, container
         self.decision_point = decision_point
-        self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
+        self._constants: dict[tuple[str, str, tuple[int, ...], bytes], str] = {}
         self._made: dict[tuple[Any, ...], str] = {}
 
-    def constant(self, value: Any, dtype: Any = np.float64) -> str:
-        """Name of a constant; equal ones are stored once."""
+    def constant(self, value: Any, dtype: Any = np.float64, name: str = "") -> str:
+        """Name of a constant; equal ones are stored once, but for those that are given a name.
+
+        `edge.model.teaching` changes these.
+        """
         array = np.asarray(value, dtype=dtype)
-        key = (array.dtype.str, array.shape, array.tobytes())
+        key = (name, array.dtype.str, array.shape, array.tobytes())
         if key not in self._constants:
-            name = self._scope.get_unique_variable_name("constant")
-            tensor = numpy_helper.from_array(np.ascontiguousarray(array).reshape(array.shape))
-            self._container.add_initializer(name, tensor.data_type, list(array.shape), tensor)
-            self._constants[key] = name
+            own = name or self._scope.get_unique_variable_name("constant")
+            tensor = numpy_helper.from_array(np.ascontiguousarray(array).reshape(array.shape), own)
+            if name:  # the container's method stores equal constants once, whatever their names
+                self._container.initializers.append(tensor)
+            else:
+                self._container.add_initializer(own, tensor.data_type, list(array.shape), tensor)
+            self._constants[key] = own
         return self._constants[key]
 
     def ints(self, *values: int) -> str:
         """Name of a constant (n,) of axes, places or counts."""
         return self.constant(values, np.int64)
 
-    def by_decision_point(self, values: Sequence[Any], dtype: Any = np.float64) -> str:
-        """Name of the constant's value at the decision point that is asked for."""
-        if all(np.array_equal(value, values[0]) for value in values):
-            return self.constant(values[0], dtype)
-        stack = self.constant(np.stack(values), dtype)
+    def by_decision_point(
+        self, values: Sequence[Any], dtype: Any = np.float64, name: str = ""
+    ) -> str:
+        """Name of the value, at the decision point that is asked for, of a constant."""
+        if len(values) == 1 or (
+            not name and all(np.array_equal(value, values[0]) for value in values)
+        ):
+            return self.constant(values[0], dtype, name)
+        stack = self.constant(np.stack(values), dtype, name)
         return self.node("Gather", [stack, self.decision_point], axis=0)
 
-    def by_decision_point_small(self, values: Sequence[Any]) -> str:
+    def by_decision_point_small(self, values: Sequence[Any], name: str = "") -> str:
         """As `by_decision_point`, stored in float32 where that holds all values exactly.
 
         A single value is converted when the model is loaded, and costs a decision nothing.
@@ -58,8 +68,9 @@ class Builder:
         with np.errstate(over="ignore"):
             small = [np.asarray(value).astype(np.float32) for value in values]
         if not all(map(np.array_equal, small, values)):
-            return self.by_decision_point(values)
-        return self.node("Cast", [self.by_decision_point(small, np.float32)], to=TensorProto.DOUBLE)
+            return self.by_decision_point(values, name=name)
+        stored = self.by_decision_point(small, np.float32, name)
+        return self.node("Cast", [stored], to=TensorProto.DOUBLE)
 
     def taken(self, x: str, columns: NDArray[np.int64], width: int) -> str:
         """Name of some columns of x (n, width); of x itself where they are all."""

@@ -19,8 +19,9 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
+from edge.model.teaching import label_tables
 from export.build import OPSET, Builder, project, widened
-from train.pipeline import ContactClassifier, nearest_of_label
+from train.pipeline import ContactClassifier
 from train.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -28,9 +29,16 @@ LARGEST = float(np.finfo(np.float64).max)
 
 
 def _squares(
-    build: Builder, z: str, rows: Sequence[NDArray[np.float64]], components: int
+    build: Builder,
+    task: str,
+    z: str,
+    rows: Sequence[NDArray[np.float64]],
+    components: int,
+    absent: NDArray[np.bool_],
 ) -> tuple[str, str]:
     """Squared distances (n, rows) of points z (n, c) to rows (rows, c), less |z|^2, and |z|^2.
+
+    Those to `absent` trials (rows,), which have no label for the task, are infinite.
 
     All are whole numbers below 2^53 (`train.projection.coordinate_bits`), so that |b|^2 - 2 b.z
     cancels nothing. Of more coordinates than `components` the others count as 0: the tasks of a
@@ -39,8 +47,11 @@ def _squares(
     if components < rows[0].shape[1]:
         used = (np.arange(rows[0].shape[1]) < components).astype(np.float64)
         z = build.node("Mul", [z, build.constant(used)])
-    columns = build.by_decision_point_small([-2.0 * r.T for r in rows])
-    lengths = build.by_decision_point([(r[:, :components] ** 2).sum(axis=1) for r in rows])
+    columns = build.by_decision_point_small([-2.0 * r.T for r in rows], f"columns of {task}")
+    lengths = build.by_decision_point(
+        [np.where(absent, np.inf, (r[:, :components] ** 2).sum(axis=1)) for r in rows],
+        name=f"lengths of {task}",
+    )
     length = build.node("ReduceSumSquare", [z, build.ints(1)], keepdims=1)
     return build.node("Gemm", [z, columns, lengths]), length
 
@@ -60,7 +71,7 @@ def _decide(
     Args:
         build: takes the nodes.
         task: its name.
-        labels: of the training trials.
+        labels: of the training trials; -1 where one has none.
         classes: how many labels there are.
         k: how many neighbours vote.
         nearest: names of the neighbours' squared distances (n, k) less a length, of their rows
@@ -71,7 +82,8 @@ def _decide(
     squares, rows, length = nearest
     roots = build.node("Sqrt", [build.node("Add", [squares, length])])
     build.node("Mul", [roots, build.by_decision_point(units)], f"{task}_distances")
-    voters = build.node("Gather", [build.constant(labels, np.int64), rows])
+    known = build.constant(labels, np.int64, f"labels of {task}")
+    voters = build.node("Gather", [known, rows])
     # A vector that is not finite has no votes: class -1, whose row of the votes (the last) is 0.
     finite = build.node("LessOrEqual", [off, build.constant(LARGEST)])
     voters = build.node("Where", [finite, voters, build.constant(-1, np.int64)])
@@ -121,47 +133,47 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         space = last.spaces_[task]
         grids = [point.projections_[space].grid_ for point in points]
         units = [grid.unit for grid in grids]
-        rows = [point.rows_[space] / unit for point, unit in zip(points, units, strict=True)]
+        members = last.members_[space]
+        rows = []
+        for point, unit in zip(points, units, strict=True):
+            of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
+            of_all[members] = point.rows_[space] / unit
+            rows.append(of_all)
+        labels = np.full(last.n_trials_, -1)
+        labels[members] = last.labels_[task]
+        output = names[f"{task}_label"].removesuffix("_label")
         # Trials span fewer components at some decision points: there, the rest are always 0.
         components = max(point.components_[task] for point in points)
-        squares, length = _squares(build, projected[space][0], widened(rows), components)
-        output = names[f"{task}_label"].removesuffix("_label")
+        squares, length = _squares(
+            build, output, projected[space][0], widened(rows), components, labels < 0
+        )
         k = build.ints(choice.k)
-        # Where only some of the trials have a label, the places among them are not the trials.
-        members, named = last.members_[space], names[f"{task}_neighbours"]
-        whole = len(members) == members[-1] + 1
-        near = ["", named if whole else ""]
+        near = ["", names[f"{task}_neighbours"]]
         values, places = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
-        if not whole:
-            build.node("Gather", [build.constant(members, np.int64), places], named)
-        labels, classes = last.labels_[task], len(last.classes_[task])
+        classes = len(last.classes_[task])
         nearest = values, places, length
         _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])
         if early or last.products_:
             all_squares = build.node("Add", [squares, length])
             areas = build.by_decision_point([unit**2 for unit in units])
-            sums = _label_sums(build, all_squares, labels, classes)
+            sums = _label_sums(build, output, all_squares, labels, classes)
             build.node("Mul", [sums, areas], names[f"{task}_label_distances"])
 
 
-def _label_sums(build: Builder, squares: str, labels: NDArray[np.int64], classes: int) -> str:
+def _label_sums(
+    build: Builder, task: str, squares: str, labels: NDArray[np.int64], classes: int
+) -> str:
     """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n, rows)."""
-    sizes = np.bincount(labels, minlength=classes)
-    counts = nearest_of_label(sizes)
-    # The rows of each label, filled up with one more column that is infinitely far away.
-    rows = np.full((classes, int(sizes.max())), len(labels))
-    for label, size in enumerate(sizes):
-        rows[label, :size] = np.flatnonzero(labels == label)
-    ints = build.ints
-    wider = build.node("Pad", [squares, ints(0, 0, 0, 1), build.constant(np.inf)])
-    own = build.node("Gather", [wider, build.constant(rows, np.int64)], axis=1)
-    nearest, _ = build.nodes(
-        "TopK", [own, ints(int(counts.max()))], ["", ""], axis=2, largest=0, sorted=1
+    tables = label_tables(labels, classes)
+    rows, most, taken, counts = (
+        build.constant(table, table.dtype, f"{name} of {task}") for name, table in tables.items()
     )
-    taken = np.arange(counts.max()) < counts[:, None]
-    kept = build.node("Where", [build.constant(taken, bool), nearest, build.constant(0.0)])
-    total = build.node("ReduceSum", [kept, ints(2)], keepdims=0)
-    return build.node("Div", [total, build.constant(counts.astype(np.float64))])
+    wider = build.node("Pad", [squares, build.ints(0, 0, 0, 1), build.constant(np.inf)])
+    own = build.node("Gather", [wider, rows], axis=1)
+    nearest, _ = build.nodes("TopK", [own, most], ["", ""], axis=2, largest=0, sorted=1)
+    kept = build.node("Where", [taken, nearest, build.constant(0.0)])
+    total = build.node("ReduceSum", [kept, build.ints(2)], keepdims=0)
+    return build.node("Div", [total, counts])
 
 
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:

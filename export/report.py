@@ -40,7 +40,7 @@ class Answers:
 
     Attributes:
         classes: its labels, sorted.
-        truth: (n,) labels.
+        truth: (n,) labels; empty where a trial has none, or was never left out.
         said: (parts, n) answers of fits to a part of the other trials, the last to all.
         explained: {trial: why the last answered so}, of those told wrong and some others.
     """
@@ -77,16 +77,20 @@ def _left_out(
     features: Sequence[str],
     widths: Sequence[int],
     test: NDArray[np.int64],
+    own: NDArray[np.bool_] | None,
 ) -> tuple[list[NDArray[np.str_]], dict[int, Explanation]]:
     """[part] (test,) answers, and explanations of the wrong ones and of some others."""
     classes, index = np.unique(y[task], return_inverse=True)
-    others = np.delete(np.arange(len(X)), test)
+    counting = choice.counts(y[task], own) > 0
+    counting[test] = False
+    others = np.flatnonzero(counting)
     part_of, said = stratified_folds(y[task][others], PARTS), []
     for part in range(PARTS):
         train = others[part_of <= part]
         fewer = replace(choice, k=min(choice.k, len(train)))
         model = ContactClassifier({task: fewer}, features, widths)
-        model.fit(X[train], {name: labels[train] for name, labels in y.items()})
+        owned = None if own is None else own[train]
+        model.fit(X[train], {name: labels[train] for name, labels in y.items()}, owned)
         rows = model.neighbours(task, X[test])[1]
         said.append(classes[vote(index[train][rows], len(classes))[0]])
     key, c = model.spaces_[task], model.components_[task]
@@ -116,17 +120,20 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     form = dataset.names, dataset.widths(fitted.samples)
     tasks = {*fitted.chosen, *(target for choice in choices for target in choice.targets)}
     y = {task: dataset.labels(task) for task in tasks}
+    tested = {t: (chosen.folds >= 0) & (y[t] != "") for t, chosen in fitted.chosen.items()}
+    folds = {t: np.where(tested[t], chosen.folds, -1) for t, chosen in fitted.chosen.items()}
     cases = [
-        (X, y, task, choice, *form, np.flatnonzero(chosen.folds == fold))
+        (X, y, task, choice, *form, np.flatnonzero(folds[task] == fold), dataset.own)
         for task, chosen in fitted.chosen.items()
         for fold, choice in enumerate(chosen.by_fold)
+        if (folds[task] == fold).any()
     ]
     answers = {}
     for task in fitted.chosen:
-        said = np.tile(y[task], (PARTS, 1))
-        answers[task] = Answers(np.unique(y[task]).tolist(), y[task], said, {})
+        truth = np.where(tested[task], y[task], "")
+        answers[task] = Answers(np.unique(y[task]).tolist(), truth, np.tile(truth, (PARTS, 1)), {})
     results = Workers(jobs, progress=False).map("report", _left_out, cases)
-    for (_, _, task, *_, test), (said, explained) in zip(cases, results, strict=True):
+    for (_, _, task, *_, test, _), (said, explained) in zip(cases, results, strict=True):
         answers[task].said[:, test] = said
         answers[task].explained.update(explained)
     return answers
@@ -160,8 +167,9 @@ def _accuracy(exported: Exported, task: str) -> Section:
     answer, chosen = exported.answers[task], exported.fitted.chosen[task]
     untouched = exported.fitted.dataset.untouched_labels(task)
     unfelt = [label if label == NO_CONTACT else UNFELT for label in untouched]
-    truth = np.array([*answer.truth, *untouched], dtype=str)
-    said = np.array([*answer.said[-1], *unfelt], dtype=str)
+    tested = answer.truth != ""
+    truth = np.array([*answer.truth[tested], *untouched], dtype=str)
+    said = np.array([*answer.said[-1][tested], *unfelt], dtype=str)
     whose = "alone" if chosen.left_out == TRIAL else f"with its entire {chosen.left_out}"
     missed = f", {counted(len(untouched), 'recording')} without a contact among them"
     text = (
@@ -267,8 +275,11 @@ def _learning(exported: Exported) -> Section:
     folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
     sizes = [round(n * (1.0 - 1.0 / folds) * part / PARTS) for part in range(1, PARTS + 1)]
     results = {
-        task: [Result(int((said == answer.truth).sum()), n) for said in answer.said]
-        for task, answer in exported.answers.items()
+        task: [
+            Result(int((said == truth)[truth != ""].sum()), int((truth != "").sum()))
+            for said in every
+        ]
+        for task, truth, every in ((t, a.truth, a.said) for t, a in exported.answers.items())
     }
     rows: list[Row] = [
         {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}

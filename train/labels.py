@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from itertools import permutations
 
 from edge.errors import InputError
+from edge.model.teaching import JOINED
 from edge.recording import Recording
 
 NO_CONTACT = "none"
 """The label of a recording in which nothing is touched."""
 ALIKE = "alike"
 """`meta.contacts` of a recording whose contacts all have its labels."""
-JOINED = ("category", "softness", "mobility")
-"""A task whose labels are those of two others, joined by a hyphen."""
 ENOUGH = 10
 """Trials with a label for a task that are enough to fit it, where most trials lack one."""
 

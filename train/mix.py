@@ -93,7 +93,7 @@ def mix(
         if tasks:
             chosen |= settings(dataset.part(trials), {t: y[t][trials] for t in tasks})
     half = max(round((~own).sum() / own.sum()), 1)
-    weights = tuple(dict.fromkeys(((1, half), ONCE, ALONE, SIMULATED)))
+    weights = tuple(dict.fromkeys((ONCE, (1, half), ALONE, SIMULATED)))
     grids = [
         _grid(task, chosen[task].choice, each, labelled[task])
         for task in y
@@ -131,18 +131,34 @@ def mix(
         )
     for task, settled in chosen.items():
         table = by_trial if task == leave_out else by_group
-        best = table.choices[task][table.chosen(task)]
+        # The first within a standard error of the best, as ten trials hardly tell them apart.
+        rank = np.arange(len(table.choices[task]))
+        best = table.choices[task][table.chosen(task, rank)]
         for fold, choice_of in enumerate(without):
-            choice_of[task] = table.choices[task][by_trial.without(task, fold)]
+            choice_of[task] = table.choices[task][by_trial.without(task, fold, rank)]
         chosen[task] = replace(
             settled,
             choice=best,
-            accuracy=table.nested(task),
-            by_trial=by_trial.nested(task),
+            accuracy=table.nested(task, rank),
+            by_trial=by_trial.nested(task, rank),
             left_out=TRIAL if table is by_trial else leave_out,
+            folds=table.folds,
+            by_fold=tuple(
+                table.choices[task][table.without(task, fold, rank)]
+                for fold in range(int(table.folds.max()) + 1)
+            ),
         )
-        notes.append(f"{task}: {_shares(table, task, half)}")
-        if task in shared and best.weights == ALONE:
+        names = {
+            ONCE: "both",
+            (1, half): f"both, yours counted {half} times (half of the weight)",
+            ALONE: "your own alone",
+            SIMULATED: "simulated alone",
+        }
+        answers_of = table.held_out(task)[:, table.tested[task]].mean(axis=1)
+        shares = {c.weights: s for c, s in zip(table.choices[task], answers_of, strict=True)}
+        told = ", ".join(f"{names[each]} {share:.1%}" for each, share in shares.items())
+        notes.append(f"{task}: {told}; taken: {names[best.weights]}")
+        if task in shared and shares[ALONE] == max(shares.values()):
             notes.append(
                 f"simulated trials no longer help {task}: export your own alone, which also "
                 "chooses the features by them"
@@ -164,20 +180,3 @@ def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> Sear
         (task,),
         weights,
     )
-
-
-def _shares(table: AnswerTable, task: str, half: int) -> str:
-    """The accuracy with each of the weights, and which are taken."""
-    names = {
-        (1, half): f"both, yours counted {half} times (half of the weight)",
-        ONCE: "both",
-        ALONE: "your own alone",
-        SIMULATED: "simulated alone",
-    }
-    answers = table.held_out(task)[:, table.tested[task]]
-    shares = [
-        f"{names[choice.weights]} {right.mean():.1%}"
-        for choice, right in zip(table.choices[task], answers, strict=True)
-    ]
-    taken = table.choices[task][table.chosen(task)].weights
-    return f"{', '.join(shares)}; taken: {names[taken]}"

@@ -16,6 +16,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
+from edge.model.teaching import nearest_of_label
 from edge.touch.features import FEATURES
 from train.agreement import factors_of
 from train.projection import Projection
@@ -80,18 +81,6 @@ class NearestNeighbours(ClassifierMixin, BaseEstimator):
         _, rows = self.kneighbors(X)
         winners, _ = vote(self.labels_[rows], len(self.classes_))
         return np.asarray(self.classes_[winners])
-
-
-NEAREST_OF_LABEL = 3
-LABEL_SHARE = 20
-
-
-def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many of so many training trials stand for their label: a twentieth, or 3 where there are.
-
-    The distance of a part of the trials stays what it is when there are more of them.
-    """
-    return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
 
 def label_distances(
@@ -172,6 +161,7 @@ class ContactClassifier:
         spaces_: {task: Space}.
         columns_: {space: the columns of the vectors that it takes, rising}.
         projections_: {space: Projection}, with the components of the task that has most.
+        n_trials_: how many there are.
         members_: {space: (m,) the trials that it was fitted on, rising}.
         rows_: {space: (m, c)} these trials, projected.
         classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
@@ -206,7 +196,7 @@ class ContactClassifier:
             raise InputError(
                 f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
             )
-        self.n_features_in_ = X.shape[1]
+        self.n_trials_, self.n_features_in_ = X.shape
         self.spaces_: dict[str, Space] = {}
         counts: dict[Space, NDArray[np.int64]] = {}
         for task, choice in self.choices.items():

@@ -108,7 +108,7 @@ def text(info: ModelInfo, about: dict[str, Any]) -> str:
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())
     lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples of each of"]
     lines += wrapped(units, "  ")
-    if info.decision_points_s:
+    if info.decision_points_s and not info.taught:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
     wraps = ", closed around" if skin.wraps else ""
@@ -120,6 +120,10 @@ def text(info: ModelInfo, about: dict[str, Any]) -> str:
         if chain is None
         else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}.",
         f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with {versions}.",
+        f"Taught {info.taught} of them on a board: accuracies are those from before, and no error "
+        "rate is certified."
+        if info.taught
+        else "",
         f"A decision takes {about['decision_us']:g} us on this machine (median).",
     ):
         lines += wrapped(sentence)

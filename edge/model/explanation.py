@@ -63,13 +63,15 @@ class Space(NamedTuple):
                 operator, (name, *path[operator]) = nodes[name]
             unit, c = constant(nodes[f"{task}_distances"][1][1]), model.info.tasks[task].components
             columns = path.get("Gather")
+            rows = constant(path["Gemm"][0]).T[:, :c] * (-0.5 * unit)
+            rows[np.isinf(constant(path["Gemm"][1]))] = np.inf  # trials without a label
             voters = next(given for _, given in nodes.values() if f"{task}_neighbours" in given)
             return cls(
                 constants[columns[0]] if columns else np.arange(model.info.width),
                 constant(path["Sub"][0]),
                 constant(path["Mul"][0]),
                 constant(path["MatMul"][0])[:, :c] * unit,
-                constant(path["Gemm"][0]).T[:, :c] * (-0.5 * unit),
+                rows,
                 constants[voters[0]],
             )
 

@@ -87,6 +87,8 @@ class ModelInfo:
     """Of the model, as its owner calls it."""
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be kept."""
+    taught: int = 0
+    """The last so many trials were added on a board (`edge.model.teaching`)."""
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -170,6 +172,7 @@ class ModelInfo:
                 **({"kernels": kernels} if self.kernels else {}),
                 **({"name": self.name} if self.name else {}),
                 **({"trials": self.trials} if self.trials else {}),
+                **({"taught": self.taught} if self.taught else {}),
                 "rows": self.rows,
                 "data_digest": self.data_digest,
                 "versions": self.versions,
@@ -230,6 +233,7 @@ class ModelInfo:
                 },
                 name=meta.text("name", "", empty=True),
                 trials=meta.texts("trials", ()),
+                taught=meta.whole("taught", 0, allowed=range(1 << 31)),
             )
             tracking.done()
         except InputError as error:

@@ -8,7 +8,7 @@ and uses only the operators of an exported model, in a graph of its size.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,7 +36,7 @@ NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
 """Fields of a TensorProto."""
 
-TYPES = {1: "<f4", 7: "<i8", 11: "<f8"}
+TYPES = {1: "<f4", 7: "<i8", 9: "|b1", 11: "<f8"}
 """{type of a TensorProto: its numbers}."""
 
 Message = dict[int, list[int | memoryview]]
@@ -69,25 +69,32 @@ def _varint(data: memoryview, at: int) -> tuple[int, int]:
     raise ValueError("a number of more than 64 bits")
 
 
-def _message(value: int | memoryview) -> Message:
-    """The fields of a protobuf message (protobuf.dev, Encoding)."""
+def _fields(value: int | memoryview) -> Iterator[tuple[int, int | memoryview, memoryview]]:
+    """Number, value and bytes of each field of a protobuf message (protobuf.dev, Encoding)."""
     if isinstance(value, int):
         raise ValueError("a number where a message belongs")
-    fields: Message = defaultdict(list)
     at = 0
     while at < len(value):
+        first = at
         key, at = _varint(value, at)
         size = {1: 8, 5: 4}.get(key & 7)
         if key & 7 == 0:
             number, at = _varint(value, at)
-            fields[key >> 3].append(number)
+            yield key >> 3, number, value[first:at]
             continue
         if key & 7 == 2:
             size, at = _varint(value, at)
         if size is None or at + size > len(value):
             raise ValueError("a field of an unknown kind, or one that runs past its message")
-        fields[key >> 3].append(value[at : at + size])
         at += size
+        yield key >> 3, value[at - size : at], value[first:at]
+
+
+def _message(value: int | memoryview) -> Message:
+    """The values of a protobuf message's fields."""
+    fields: Message = defaultdict(list)
+    for number, content, _ in _fields(value):
+        fields[number].append(content)
     return fields
 
 
@@ -174,3 +181,49 @@ def graph(data: bytes) -> tuple[dict[str, tuple[str, list[str]]], dict[str, NDAr
                 values: Any = np.frombuffer(tensor[9][-1], TYPES[kind])  # type: ignore[arg-type]
                 constants[_text(tensor, 8)] = values.reshape(tensor.get(1, []))
     return nodes, constants
+
+
+def rewritten(
+    data: bytes, constants: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]
+) -> bytes:
+    """A model's bytes with other values of some constants, and other metadata."""
+    model: list[bytes | memoryview] = []
+    for number, value, unchanged in _fields(memoryview(data)):
+        if number == GRAPH:
+            model.append(_field(GRAPH, b"".join(_constants_changed(value, constants))))
+        elif number == METADATA and (key := _text(_message(value), 1)) in metadata:
+            entry = _field(1, key.encode()) + _field(2, metadata[key].encode())
+            model.append(_field(METADATA, entry))
+        else:
+            model.append(unchanged)
+    return b"".join(model)
+
+
+def _constants_changed(
+    graph: int | memoryview, constants: Mapping[str, NDArray[Any]]
+) -> Iterator[bytes | memoryview]:
+    kinds = {np.dtype(kind): number for number, kind in TYPES.items()}
+    for number, value, unchanged in _fields(graph):
+        if number == INITIALIZERS and (name := _text(_message(value), 8)) in constants:
+            array = np.ascontiguousarray(constants[name])
+            tensor = [_field(1, size) for size in array.shape]
+            tensor += [_field(2, kinds[array.dtype]), _field(8, name.encode())]
+            yield _field(INITIALIZERS, b"".join([*tensor, _field(9, array.tobytes())]))
+        else:
+            yield unchanged
+
+
+def _field(number: int, value: int | bytes) -> bytes:
+    """A field of a protobuf message: a number, or bytes."""
+    if isinstance(value, int):
+        return _encoded(number << 3) + _encoded(value)
+    return _encoded(number << 3 | 2) + _encoded(len(value)) + value
+
+
+def _encoded(value: int) -> bytes:
+    """A varint."""
+    out = bytearray()
+    while value >= 0x80:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*out, value])

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.model.model import Model, require_joints
-from edge.recording import Recording, load_arrays, load_meta
+from edge.recording import Recording, load_arrays, load_meta, save_arrays
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
@@ -206,6 +206,35 @@ def outputs_at_points(model: Model, vectors: NDArray[np.float64]) -> dict[str, N
     """The graph's outputs for vectors (decision points, n, width), each at its decision point."""
     seen = [outputs(model, rows, point) for point, rows in enumerate(vectors)]
     return {key: np.stack([answers[key] for answers in seen]) for key in seen[0]}
+
+
+def renew(
+    path: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    model: Model,
+    vectors: NDArray[np.float64],
+) -> None:
+    """Write a golden file of a model whose neighbours were changed.
+
+    Args:
+        path: the golden file from before.
+        target: the new one.
+        model: with the new neighbours.
+        vectors: (decision points, m, width) further vectors.
+    """
+    arrays = load_arrays(path)
+    meta = {**load_meta(os.fspath(path), arrays), "model": model.info.data_digest}
+    del arrays["meta"]
+    arrays["vectors"] = np.concatenate([arrays["vectors"], vectors[-1]])
+    seen = {"": outputs(model, arrays["vectors"])}
+    if model.info.decision_points_s:
+        early = np.concatenate([arrays["decision_point_vectors"], vectors], axis=1)
+        arrays["decision_point_vectors"] = early
+        seen["decision_point_"] = outputs_at_points(model, early)
+    for prefix, answers in seen.items():
+        for task in model.info.tasks:
+            arrays |= {f"{task}_{prefix}{p}": answers[f"{task}_{p}"] for p in parts(model)}
+    save_arrays(target, arrays, meta, compress=True)
 
 
 def compared(name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float) -> Check:

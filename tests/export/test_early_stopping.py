@@ -13,6 +13,7 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.model.info import Task
 from edge.model.model import Model
+from edge.model.teaching import taught
 from edge.model.verify import first_series, verify
 from edge.recording import save
 from edge.touch.features import FEATURES
@@ -234,3 +235,50 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(agreeing,
             (event,) = (e for e in events if isinstance(e, Decided) and e.task == task)
             assert event.window_s == model.decision_points_s[at[i]]
             assert (event.label != truth[task][i]) == wrong[i]
+
+
+def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(early, tmp_path):
+    """Two tasks of one space; the second trial has a label for the first task alone."""
+    rng = np.random.default_rng(1)
+    y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
+    width = early[0].info.samples * len(FEATURES)
+    X, more, queries = (rng.normal(size=(3, n, width)) for n in (45, 3, 9))
+    choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1)}
+    sequential = SequentialClassifier(choices, early[0].info.decision_points_s).fit(X, y)
+    info = replace(
+        early[0].info,
+        tasks={
+            task: Task(tuple(sorted(set(y[task]))), c.k, c.components, "none", 0.5)
+            for task, c in choices.items()
+        },
+        stopping=sequential.stopping_,
+        novelty=sequential.novelty_,
+        rows=45,
+        trials=(),
+    )
+    (tmp_path / "model.onnx").write_bytes(to_onnx(sequential, info))
+    labels = [{"t": "c", "u": "y"}, {"t": "a", "u": "strange"}, {"u": "x", "t": "b"}]
+    data = taught(Model(tmp_path / "model.onnx"), ["one", "two", "three"], more, labels)
+    (tmp_path / "taught.onnx").write_bytes(data)
+    for point, vectors in zip(sequential.decision_points_, more, strict=True):
+        for task, known in (("t", [0, 1, 2]), ("u", [0, 2])):
+            before, after = point.spaces_[task], (*point.spaces_[task], task)
+            point.spaces_[task], point.n_trials_ = after, 48
+            for of_space in (point.projections_, point.columns_):
+                of_space[after] = of_space[before]
+            rows = point.project(after, vectors[known])
+            point.rows_[after] = np.vstack([point.rows_[before], rows])
+            point.members_[after] = np.array([*range(45), *(45 + i for i in known)])
+            new = [sorted(set(y[task])).index(labels[i][task]) for i in known]
+            point.labels_[task] = np.array([*point.labels_[task], *new])
+        del point.projections_[before]
+    (tmp_path / "oracle.onnx").write_bytes(to_onnx(sequential, replace(info, rows=48)))
+    model, oracle = Model(tmp_path / "taught.onnx"), Model(tmp_path / "oracle.onnx")
+    for point in range(3):
+        for vectors in (queries[point], more[point]):
+            expected = oracle.run(vectors, point)
+            for key, values in model.run(vectors, point).items():
+                assert (values == expected[key]).all(), key
+    assert (model.info.rows, model.info.taught) == (48, 3)
+    with pytest.raises(InputError, match=r"taught 3 trials after its error rates were certified"):
+        stopping_rules(model, 0.2)

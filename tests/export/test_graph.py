@@ -177,7 +177,7 @@ def test_every_number_of_voters_agrees_down_to_the_last_tie(export, k):
     assert differences(fitted, model, features(100, seed=1)) == []
 
 
-def test_tasks_of_one_space_share_its_projection_and_rows(export):
+def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     X = features(50)
     choices = {
         "a": Choice("IV", 20, 2),
@@ -190,9 +190,10 @@ def test_tasks_of_one_space_share_its_projection_and_rows(export):
     proto = onnx.load(model.path)
     operators = [n.op_type for n in proto.graph.node]
     assert operators.count("MatMul") == 2  # projections: scaling IV, none
-    assert operators.count("Gemm") == 3  # distances: of 20, 3 and 7 components
+    assert operators.count("Gemm") == 4  # distances
     large = [t.dims for t in proto.graph.initializer if np.prod(t.dims) >= 50 * 7]
-    assert sorted(map(tuple, large)) == [(7, 50), (20, 50), (120, 7), (120, 20)]
+    # A task's rows are its own, so that it can be taught alone.
+    assert sorted(map(tuple, large)) == [(7, 50), *[(20, 50)] * 3, (120, 7), (120, 20)]
     assert [o.domain for o in proto.opset_import] == [""]
 
 

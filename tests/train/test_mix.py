@@ -37,10 +37,13 @@ def test_five_trials_with_a_category_alone_are_trained_with_all_the_simulated_on
     assert set(fitted.chosen) == {"category", "softness"}
     for chosen in fitted.chosen.values():
         assert (chosen.accuracy.right, chosen.accuracy.total) == (5, 5)
-        assert chosen.choice.weights == (1, 5)
+        assert chosen.choice.weights == (1, 1)
     assert "5 of your own trials beside 24 simulated ones" in fitted.notes[0]
     assert "not fitted, as fewer than 3 of your own have it: object" in fitted.notes[1]
-    assert "yours counted 5 times (half of the weight) 100.0%, both 100.0%" in fitted.notes[2]
+    assert (
+        "both 100.0%, both, yours counted 5 times (half of the weight) 100.0%, your"
+        in fitted.notes[2]
+    )
 
 
 def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(make_touch, tmp_path):

@@ -1,0 +1,69 @@
+"""Teach a model labelled trials, on the board.
+
+Adds the trials to the nearest neighbours of the model, in the projection that it has, and writes
+the new model and its golden file into a folder. A taught model carries no certificate: it decides
+at the end of its window, and `run --error` refuses it. The next `make export` with the same
+recordings fits everything anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from pathlib import Path
+
+import numpy as np
+
+from edge.commands.output import Output
+from edge.commands.replay import suited
+from edge.errors import InputError
+from edge.files import write_whole
+from edge.model.model import Model
+from edge.model.teaching import joined, taught
+from edge.model.verify import first_series, renew
+from edge.recording import find, load
+
+LOG = logging.getLogger(__name__)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("--model", required=True, help="model.onnx")
+    parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
+    parser.add_argument(
+        "--golden", type=Path, help="of the model (default: golden.npz beside it, if it is there)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("taught"), help="a folder (default: %(default)s)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the taught model and its golden file."""
+    model, output = Model(arguments.model), Output.of(arguments)
+    names, vectors, labels = [], [], []
+    for path in find(arguments.recordings):
+        recording = load(path)
+        contact = first_series(suited(model, recording, str(path)), model)
+        if contact is None:
+            raise InputError(f"{path}: holds no contact")
+        names.append(str(path))
+        labels.append(joined(recording.labels))
+        vectors.append([model.info.vector(contact[1], s) for s in model.decision_points_s])
+    golden = arguments.golden or Path(arguments.model).with_name("golden.npz")
+    at_points = np.array(vectors).swapaxes(0, 1)
+    data = taught(model, names, at_points, labels)
+    target = arguments.out / "model.onnx"
+    with write_whole(target) as file:
+        file.write(data)
+    after = Model(target)
+    if arguments.golden is not None or golden.exists():
+        renew(golden, target.with_name("golden.npz"), after, at_points)
+    else:
+        LOG.warning(f"{golden}: no such file, so none is written for the taught model")
+    for task, entry in after.info.tasks.items():
+        count = sum(own.get(task) in entry.labels for own in labels)
+        line = {"event": "taught", "task": task, "trials": count, "file": str(target)}
+        output.event(line, f"{task}: {count} of {len(names)} trials taught")
+    LOG.info(f"{target}: its accuracy is not measured, and no error rate is certified any more")
+    return 0

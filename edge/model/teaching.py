@@ -1,0 +1,167 @@
+"""Teaching a model on the board: trials become neighbours, in the projection that the model has.
+
+An exported model keeps what the neighbours of a task are in constants of its graph that carry the
+task's name. They alone are changed. Scaling, projection, calibration and certificates are still
+those of the trials that the model was fitted on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.files import parsing, read_bytes
+from edge.model import onnx_file
+from edge.model.info import METADATA_KEY
+from edge.model.model import LARGEST_BYTES, Model
+
+NEAREST_OF_LABEL = 3
+LABEL_SHARE = 20
+JOINED = ("category", "softness", "mobility")
+"""A task whose labels are those of two others, joined by a hyphen."""
+
+
+def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How many of so many training trials stand for their label: a twentieth, or 3 where there are.
+
+    The distance of a part of the trials stays what it is when there are more of them.
+    """
+    return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
+
+
+def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[Any]]:
+    """The constants from which a graph takes the distances of labels.
+
+    Args:
+        labels: (n,) of the trials; -1 where one has none.
+        classes: how many labels there are.
+
+    Returns:
+        `members` (classes, largest) trials of each label, filled up with n; `counts` (classes,) of
+        them that stand for the label, and `most` (1,) of these; `taken` (classes, most) whether one
+        does.
+    """
+    sizes = np.bincount(labels[labels >= 0], minlength=classes)
+    counts = nearest_of_label(sizes)
+    members = np.full((classes, int(sizes.max())), len(labels))
+    for label, size in enumerate(sizes):
+        members[label, :size] = np.flatnonzero(labels == label)
+    return {
+        "members": members,
+        "most": counts.max(keepdims=True),
+        "taken": np.arange(counts.max()) < counts[:, None],
+        "counts": counts.astype(np.float64),
+    }
+
+
+def joined(labels: Mapping[str, str]) -> dict[str, str]:
+    """{task: label} of a trial, with those of `JOINED` that follow from its others."""
+    whole, *parts = JOINED
+    follow: dict[str, str] = {}
+    if labels.get(whole, "").count("-") == 1:
+        follow = dict(zip(parts, labels[whole].split("-"), strict=True))
+    elif labels.keys() >= set(parts):
+        follow = {whole: "-".join(labels[part] for part in parts)}
+    return {**follow, **labels}
+
+
+def taught(
+    model: Model,
+    names: Sequence[str],
+    vectors: NDArray[np.float64],
+    labels: Sequence[Mapping[str, str]],
+) -> bytes:
+    """The model's file with further neighbours.
+
+    A trial counts for the tasks for which it has a label that the model knows.
+
+    Args:
+        model: as it was exported, or taught before.
+        names: (m,) of the trials' files.
+        vectors: (decision points, m, width) of the trials.
+        labels: (m,) {task: label}.
+
+    Raises:
+        InputError: a trial lies outside the projection's reach, or has no label that is known; or
+            the file was exported by an earlier version.
+    """
+    info = model.info
+    for name, trial, own in zip(names, vectors.swapaxes(0, 1), labels, strict=True):
+        decisions = [model.decide(vector, point) for point, vector in enumerate(trial)]
+        if any(next(iter(each.values())).out_of_range for each in decisions):
+            raise InputError(
+                f"{name}: lies far outside the trials that the model was fitted on, so its "
+                "projection cannot place it; export a model with it"
+            )
+        if not any(own.get(task) in entry.labels for task, entry in info.tasks.items()):
+            known = "; ".join(f"{t}: {', '.join(e.labels[:6])}" for t, e in info.tasks.items())
+            raise InputError(
+                f"{name}: has no label that the model knows ({known}); label it, or export anew"
+            )
+    data = read_bytes(model.path, LARGEST_BYTES)
+    with parsing(model.path, "a model that can be taught", "; export it again"):
+        nodes, constants = onnx_file.graph(data)
+        changed: dict[str, NDArray[Any]] = {}
+        for task, entry in info.tasks.items():
+            index = {label: i for i, label in enumerate(entry.labels)}
+            new = np.array([index.get(own.get(task, ""), -1) for own in labels])
+            z = np.stack(
+                [_coordinates(nodes, constants, task, p, x) for p, x in enumerate(vectors)]
+            )
+            columns, lengths = constants[f"columns of {task}"], constants[f"lengths of {task}"]
+            more = {"columns": -2.0 * z.swapaxes(1, 2) * (new >= 0), "lengths": (z**2).sum(axis=2)}
+            more["lengths"][:, new < 0] = np.inf
+            for key, old in (("columns", columns), ("lengths", lengths)):
+                values = more[key].reshape(*old.shape[:-1], len(names)).astype(old.dtype)
+                changed[f"{key} of {task}"] = np.concatenate([old, values], axis=-1)
+            every = np.concatenate([constants[f"labels of {task}"], new])
+            changed[f"labels of {task}"] = every
+            if f"members of {task}" in constants:
+                for key, table in label_tables(every, len(entry.labels)).items():
+                    changed[f"{key} of {task}"] = table
+    digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
+    after = replace(
+        info,
+        rows=info.rows + len(names),
+        trials=(*info.trials, *(Path(name).stem for name in names)) if info.trials else (),
+        taught=info.taught + len(names),
+        data_digest=digest,
+    )
+    return onnx_file.rewritten(data, changed, {METADATA_KEY: after.to_json()})
+
+
+def _coordinates(
+    nodes: Mapping[str, tuple[str, list[str]]],
+    constants: Mapping[str, NDArray[Any]],
+    task: str,
+    point: int,
+    x: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(m, c) whole coordinates of vectors (m, width), by the graph's own operators."""
+
+    def value(name: str) -> NDArray[Any]:
+        if name in constants:
+            return constants[name]
+        operator, (source, *_) = nodes[name]
+        return value(source)[point] if operator == "Gather" else value(source)
+
+    way, name = [], nodes[nodes[f"{task}_neighbours"][1][0]][1][0]
+    while name in nodes:
+        operator, (name, *given) = nodes[name]
+        way.append((operator, given))
+    for operator, given in reversed(way):
+        a = [value(name).astype(np.float64) for name in given]
+        if operator == "Gather":
+            x = x[:, value(given[0])]
+        elif operator in ("Sub", "Mul", "MatMul"):
+            x = {"Sub": np.subtract, "Mul": np.multiply, "MatMul": np.matmul}[operator](x, a[0])
+        else:
+            x = np.clip(x, *a) if operator == "Clip" else np.rint(x)
+    return x
