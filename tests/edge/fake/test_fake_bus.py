@@ -2,10 +2,9 @@
 
 import errno
 
-import numpy as np
 import pytest
 
-from edge.i2c.bus import BusGone, BusNack, BusRefused, BusTimeout, fetch, read, send, write
+from edge.i2c.bus import BusError, BusGone, BusRefused, fetch, read, send, write
 from edge.i2c.tca9548a import FakeTCA9548A
 from tests.faulty import Fault, FaultyBus
 
@@ -59,24 +58,14 @@ def test_the_largest_shapes_are_carried():
     assert fetch(fake, 0x10, b"\x05", 2) == b"\x05\x00"
 
 
-def test_a_mux_connects_at_stop_and_not_before():
+def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(monkeypatch):
     fake = bus()
-    mux = fake.chips[0x70]
-    connected = []
-    mux.channels[3][0x20] = Echo()
-    plain = mux.write
-    mux.write = lambda data, t: (plain(data, t), connected.append(mux.connected))
-    send(fake, 0x70, [1 << 3])
-    assert connected == [[]]
-    assert mux.connected == [3]
-    send(fake, 0x20, [1])
-
-
-def test_two_chips_at_one_address_pull_the_same_wire():
-    fake = bus()
-    mux = fake.chips[0x70]
+    mux, connected = fake.chips[0x70], []
     mux.channels[0][0x20], mux.channels[1][0x20] = Echo(0b1100), Echo(0b1010)
+    plain = mux.write
+    monkeypatch.setattr(mux, "write", lambda *a: (plain(*a), connected.append(mux.connected)))
     send(fake, 0x70, [3])
+    assert (connected, mux.connected) == ([[]], [0, 1])
     assert fetch(fake, 0x20, b"", 1) == bytes([0b1000])
 
 
@@ -89,61 +78,31 @@ def test_time_advances_by_the_bits_only_where_it_is_asked_for():
     assert timed.now() == pytest.approx(66 / 100_000)
 
 
-def test_faults_by_position_hit_those_transactions_and_no_others():
-    fake = bus(faults=[Fault(code=errno.EIO, at=[1, 3])])
-    hit = []
-    for i in range(5):
+def test_faults_hit_the_transactions_that_they_name_and_a_hung_one_costs_the_timeout():
+    faults = [Fault(code=errno.EIO, at=[1, 3]), Fault(code=errno.ETIMEDOUT, at=[4])]
+    fake = bus(timed=True, clock_hz=1e9, timeout_s=0.03, faults=faults)
+    codes = []
+    for _ in range(6):
         try:
             send(fake, 0x10, [0])
-        except OSError as error:
-            hit.append((i, error.errno))
-    assert hit == [(1, errno.EIO), (3, errno.EIO)]
-    assert fake.transactions == 5
+            codes.append(0)
+        except BusError as error:
+            codes.append(error.errno)
+    assert codes == [0, errno.EIO, 0, errno.EIO, errno.ETIMEDOUT, 0]
+    assert (fake.transactions, fake.met) == (6, 3)
+    assert fake.now() == pytest.approx(0.03, rel=1e-3)
 
 
-def test_random_faults_repeat_by_seed_and_keep_their_rate():
-    def hits(seed):
-        fake = bus(faults=[Fault(rate=0.1)], seed=seed)
-        out = []
-        for i in range(4000):
-            try:
-                send(fake, 0x10, [0])
-            except BusNack:
-                out.append(i)
-        return out
-
-    assert hits(1) == hits(1) != hits(2)
-    assert abs(len(hits(1)) - 400) < 5 * np.sqrt(4000 * 0.1 * 0.9)
-
-
-def test_a_hung_transfer_costs_the_timeout():
-    fake = bus(timed=True, timeout_s=0.03, faults=[Fault(code=errno.ETIMEDOUT, at=[0])])
-    with pytest.raises(BusTimeout):
-        send(fake, 0x10, [0])
-    assert fake.now() == 0.03
-
-
-def test_an_unplugged_adapter_is_gone_until_it_is_back():
+def test_an_unplugged_adapter_is_gone_until_it_is_back_and_opened_again():
     fake = bus(faults=[Fault(code=errno.ENODEV, during=(1.0, 2.0))])
     send(fake, 0x10, [0])
     fake.sleep(1.5)
-    with pytest.raises(BusGone):
-        send(fake, 0x10, [0])
+    for action in (lambda: send(fake, 0x10, [0]), fake.reopen):
+        with pytest.raises(BusGone):
+            action()
     fake.close()
-    with pytest.raises(BusGone):
-        fake.reopen()
     fake.sleep(1.0)
     with pytest.raises(BusGone):
         send(fake, 0x10, [0])
     fake.reopen()
     send(fake, 0x10, [0])
-
-
-def test_a_flip_turns_one_bit_and_a_hold_serves_the_old_bytes():
-    fake = bus(faults=[Fault(kind="flip", at=[1]), Fault(kind="hold", at=[3])])
-    first = fetch(fake, 0x10, b"", 8)
-    flipped = fetch(fake, 0x10, b"", 8)
-    assert bin(int.from_bytes(first, "big") ^ int.from_bytes(flipped, "big")).count("1") == 1
-    send(fake, 0x10, bytes(range(1, 9)))
-    assert fetch(fake, 0x10, b"", 8) == flipped
-    assert fetch(fake, 0x10, b"", 8) == bytes(range(1, 9))

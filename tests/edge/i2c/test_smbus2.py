@@ -116,19 +116,3 @@ def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
     assert done.stdout == (
         "/dev/i2c-1, address 0x70: the adapter has gone; plug it in again (ENODEV)\nb'\\x00'\n"
     )
-
-
-def test_scan_maps_the_chips_that_answer(library, tmp_path):
-    from edge.skin import file as skinfile
-
-    code = "import sys; from edge.cli import main; sys.exit(main(sys.argv[1:]))"
-    skin = str(skinfile.shipped("cody"))
-    done = python(library, code, "scan", "--skin", skin)
-    assert done.returncode == 0
-    assert done.stdout.count('"state": "running"') == 32
-    assert done.stderr.count("#") == 384
-    done = python(library, code, "scan", "--skin", skin, I2CDEV_MUTE="1:0x2C")
-    assert done.returncode == 1
-    assert "  0 |...#####################|" in done.stderr
-    assert "31 of 32 chips answer" in done.stderr
-    assert "/dev/i2c-1, address 0x2c: does not answer" in done.stdout

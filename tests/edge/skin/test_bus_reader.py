@@ -8,14 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.classifier import Classifier
-from edge.events import Decided
 from edge.fake.clock import VirtualClock
-from edge.fake.player import Playback
 from edge.i2c.bus import BusRefused, bus_error
-from edge.model.model import Model
-from edge.recording import load
-from edge.skin import file as skinfile
 from edge.skin.bus_reader import (
     LONG_PAUSE_S,
     LONGEST_PAUSE_S,
@@ -145,23 +139,6 @@ def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_sta
     buses = faulty_buses(CODY, lambda t: QUIET, clock, faults=refused)
     with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
         BusReader(buses[0], CODY.buses[0], [np.zeros(24, np.uint8)] * 12, CODY.reading).start()
-
-
-def test_a_decision_made_with_missing_taxels_says_so(recordings, exported):
-    """A chip far from the contact does not answer for half a second of it."""
-    trial = load(recordings / "hard_0.npz")
-    model = Model(exported / "model.onnx")
-    file = replace(skinfile.load(skinfile.shipped("cody")), layout=trial.layout)
-    lost = [Fault(bus=file.buses[0].device, channel=0, address=0x2C, during=(0.5, 1.0))]
-    for faults, flagged in (((), False), (lost, True)):
-        playback = Playback(trial)
-        with faulty_skin(file, playback, faults=faults) as skin:
-            classifier = Classifier(model, skin.layout)
-            loop = Loop(skin, joints=playback, lasts_s=playback.ends)
-            events = [event for frame in loop.frames() for event in classifier.push(frame)]
-        decisions = [e for e in events if isinstance(e, Decided)]
-        assert ["missing_taxels" in e.flags for e in decisions] == [flagged] * 2
-        assert decisions[0].label == trial.labels["category"]
 
 
 def changes(skin, seconds):

@@ -8,7 +8,7 @@ import pytest
 from edge.errors import InputError
 from edge.skin import file as skinfile
 from edge.skin.calibration import calibration_text, dead_band, save_calibration, with_calibration
-from edge.skin.file import Reading, TaxelCalibration
+from edge.skin.file import TaxelCalibration
 from tests.edge.skin.small import SMALL, mistake
 
 
@@ -19,10 +19,6 @@ def test_cody_is_384_taxels_on_three_buses():
     assert [len(bus.chips) for bus in cody.buses] == [12, 12, 8]
     assert cody.uncovered == 0
     assert {chip.kind.name for chip in cody.chips} == {"ad7147"}
-
-
-def test_what_is_not_said_has_a_default():
-    assert skinfile.parse(SMALL).reading == Reading()
 
 
 @pytest.mark.parametrize(

@@ -47,9 +47,8 @@ def test_an_mpr121_that_says_nothing_works():
 
 def test_what_the_file_says_counts():
     file = mpr121("threshold_counts = 20", "sign = 1\ndead_band_counts = 1")
-    assert file.chips[0].sign == 1
+    assert (file.chips[0].sign, file.signal.dead_band_counts) == (1, 1)
     assert (file.layout.threshold_counts, file.layout.onset) == (20, 20)
-    assert file.signal.dead_band_counts == 1
 
 
 def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
