@@ -30,7 +30,7 @@ FLAPS_S = 1.0
 LONGEST_PAUSE_S = 1.0
 """Time between two attempts to open a lost bus again, at most: a tenth of the time since the loss,
 and no less than `PAUSE_S`."""
-SET_UP_AFTER, SET_UP_EVERY = 16, 64
+SET_UP_AFTER, SET_UP_EVERY = 8, 64
 """A chip that keeps its settings but serves damaged bytes is set up again after so many frames in a
 row, and then every so many; a conversion takes at most four frames at 100 Hz."""
 LONGEST_STEP_S = 0.0015

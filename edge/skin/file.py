@@ -188,12 +188,10 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
             array = np.array(table.get(key), dtype=np.float64)
         except (TypeError, ValueError, OverflowError):  # no numbers, or rows of different lengths
             array = np.empty(0)
-        whole = key == "baseline"
-        if array.shape != layout.shape or (whole and (array % 1.0 != 0.0).any()):
-            raise InputError(
-                f"{table.called(key)} must be {layout.rows} rows of {layout.cols} "
-                f"{'whole ' if whole else ''}numbers; calibrate again"
-            )
+        kind = "whole numbers" if key == "baseline" else "numbers"
+        if array.shape != layout.shape or (key == "baseline" and (array % 1.0 != 0.0).any()):
+            rows = f"{layout.rows} rows of {layout.cols} {kind}"
+            raise InputError(f"{table.called(key)} must be {rows}; calibrate again")
         if not ((array >= 0.0) & (array <= 65535.0)).all():
             raise InputError(
                 f"{table.called(key)} has a value outside of 0 to 65535; calibrate again"

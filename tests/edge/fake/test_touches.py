@@ -62,12 +62,12 @@ def test_every_contact_begins_and_goes_on_for_a_window_on_a_skin_whose_scale_is_
 
 
 def test_trials_differ_and_the_same_seed_gives_the_same():
-    one, again, other = made(0.01, trials=2), made(0.01, trials=2), made(0.01, seed=1)
-    assert len(one) == 8
-    for name, recording in one.items():
+    first_set, again, other = made(0.01, trials=2), made(0.01, trials=2), made(0.01, seed=1)
+    assert len(first_set) == 8
+    for name, recording in first_set.items():
         assert np.array_equal(recording.frames, again[name].frames)
-    first = one["pillow-movable-000"].frames
-    assert not np.array_equal(first, one["pillow-movable-001"].frames[: len(first)])
+    first = first_set["pillow-movable-000"].frames
+    assert not np.array_equal(first, first_set["pillow-movable-001"].frames[: len(first)])
     assert not np.array_equal(first, other["pillow-movable-000"].frames[: len(first)])
 
 

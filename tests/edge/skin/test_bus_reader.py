@@ -202,3 +202,11 @@ def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_hea
     (lost_at, *lost), (back_at, *back) = heard
     assert (lost_at, lost, back) == (0.1, [name, True], [name, False])
     assert 10.0 <= back_at <= 10.0 + LONGEST_PAUSE_S + 0.1
+
+
+def test_a_chip_that_another_program_kept_half_set_up_is_back_in_half_a_second():
+    """The mux turned away during its set-up, whose rows were read back from another chip."""
+    fault, at = KINDS["another program's mux channel"], {"first": 609, "every": 1000}
+    outcome = sweep("", SKINS["one bus"], fault, set_up=True, overhead_s=100e-6, **at)
+    assert (outcome.met, outcome.missing, outcome.wrong) == (1, 48, 0)
+    assert outcome.back_s < BACK_S
