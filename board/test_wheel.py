@@ -16,7 +16,7 @@ import pytest
 import edge
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-LARGEST = 255_000
+LARGEST = 260_000
 
 
 @pytest.fixture(scope="session")
