@@ -37,13 +37,14 @@ def wire():
     return Wire()
 
 
-def stream(wire, *, ahead=1000.0, delay=0.002, n=10):
-    """Ten poses, 10 ms apart, from a sender whose clock is `ahead` of ours."""
-    for i in range(n):
-        sent = i * 0.01
-        wire.now = sent + delay
-        wire.send(sent + ahead, [sent, -sent])
-        wire.joints.at(wire.now)
+def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
+    """What is known after each line, of poses [t, -t] whose sender's clock is ahead of ours."""
+    known = []
+    for i in lines:
+        wire.now = i / hz + 0.002
+        wire.send(i / hz + ahead(i), [i / hz, -i / hz])
+        known.append(wire.at())
+    return known
 
 
 def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(wire):
@@ -55,7 +56,7 @@ def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_count
 
 @pytest.mark.parametrize("ahead", [-50.0, 0.0, 1.7e9])
 def test_the_senders_clock_need_not_be_ours(wire, ahead):
-    stream(wire, ahead=ahead)
+    stream(wire, ahead=lambda _: ahead)
     # A clock of 1.7e9 s resolves 0.24 us.
     assert wire.at(0.087) == pytest.approx([0.085, -0.085], abs=1e-6)
 
@@ -97,7 +98,7 @@ def test_a_shared_clock_takes_the_time_as_it_is():
 
 
 def test_a_sender_that_starts_anew_is_believed(wire):
-    stream(wire, ahead=1000.0)
+    stream(wire)
     wire.now = 0.15
     wire.send(3.0, [7.0, 7.0])
     assert wire.at() == [7.0, 7.0]
@@ -213,39 +214,28 @@ def test_names_that_do_not_suit_are_refused(named, q, names, problem):
 
 @pytest.mark.parametrize("ahead_s", [0.03, 0.3, 100.0])
 def test_one_line_ahead_of_time_costs_one_line(wire, ahead_s):
-    stream(wire, n=50)
+    stream(wire, range(50))
     wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
-    assert wire.joints.at(wire.now) is not None
-    for i in range(50, 100):
-        wire.now = i * 0.01 + 0.002
-        wire.send(i * 0.01 + 1000.0, [i * 0.01, -i * 0.01])
-        assert wire.at() == pytest.approx([i * 0.01, -i * 0.01], abs=1e-6)
-    assert wire.joints.malformed == 1
-    assert "ahead" in wire.joints.problem
+    assert wire.at() is not None
+    known = stream(wire, range(50, 100))
+    np.testing.assert_allclose(known, [[i / 100, -i / 100] for i in range(50, 100)], atol=1e-6)
+    assert (wire.joints.malformed, "ahead" in wire.joints.problem) == (1, True)
 
 
 @pytest.mark.parametrize(("place", "hz"), [(0, 25), (8, 100)])
 def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_second(
     wire, place, hz
 ):
-    known = []
-    for i in range(2 * hz):
-        wire.now = i / hz + 0.002
-        wire.send(i / hz + 1000.0 + 0.3 * (i == place), [0.0, 0.0])
-        known.append(wire.at())
+    known = stream(wire, range(2 * hz), hz=hz, ahead=lambda i: 1000.0 + 0.3 * (i == place))
     assert None not in known[place + hz :]
 
 
 @pytest.mark.parametrize("step_s", [0.5, -0.5])
 def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
-    stream(wire, n=50)
-    known = []
-    for i in range(50, 150):
-        wire.now = i * 0.01 + 0.002
-        wire.send(i * 0.01 + 1000.0 + step_s, [i * 0.01, 0.0])
-        known.append(wire.at())
+    stream(wire, range(50))
+    known = stream(wire, range(50, 150), ahead=lambda _: 1000.0 + step_s)
     assert None not in known[60:]
-    assert known[-1] == pytest.approx([1.49, 0.0], abs=1e-6)
+    assert known[-1] == pytest.approx([1.49, -1.49], abs=1e-6)
 
 
 def test_a_flood_of_lines_is_bounded_in_each_frame(wire):
