@@ -86,13 +86,13 @@ def edge(*words: object) -> None:
     command(edge_main, *words)
 
 
-def importing(kind: str) -> Callable[[Path], None]:
+def importing(kind: str, *more: str) -> Callable[[Path], None]:
     """`python -m train import KIND`."""
 
     def read(path: Path) -> None:
         out = path.parent / "out"
         shutil.rmtree(out, ignore_errors=True)
-        command(train_main, "import", kind, path, "--out", out)
+        command(train_main, "import", kind, path, "--out", out, *more)
 
     return read
 
@@ -123,12 +123,14 @@ def recordings() -> list[bytes]:
 
 def read_model(path: Path) -> None:
     """Load a model and ask it once."""
+    from edge.model.explanation import Space
     from edge.model.model import Model
 
     model = Model(path)
     for task, decision in model.decide(np.ones(model.info.width)).items():
         if not np.isfinite(decision.confidence):
             raise Wrong(f"{task} has a confidence of {decision.confidence}")
+        Space.of(model, task)
 
 
 def skins() -> list[bytes]:
@@ -274,6 +276,12 @@ def read_frames(path: Path) -> None:
     importing("csv_frames")(folder)
 
 
+TABLES = [
+    b"time,a,b\n0,245,244\n0.1,240,244\n0.2,230,241\n",
+    b"trial\tobject\tt\ttaxel\tvalue\n1\tcup\t0\t0\t9\n1\tcup\t0\t1\t8\n2\tpen\t0\t0\t7\n2\tpen\t0\t1\t7\n",
+]
+"""A trial of a sensor whose values fall, and two trials with a value a row."""
+
 READERS = (
     Reader("recording", ".npz", recordings, mutate.of_npz,
            lambda path: edge("replay", "--summary", "--model", MODEL, path)),
@@ -288,6 +296,7 @@ READERS = (
     Reader("scene", ".toml", files("train/scenes/*.toml"), mutate.of_text, read_scene,
            beside_a_scene),
     Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
+    Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
     Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("mcap")),
     Reader("rosbag", ".bag", bags, mutate.of_bytes, importing("rosbag")),

@@ -34,7 +34,7 @@ from train.importers.csv_frames import FASTEST_HZ, labels_beside
 
 LABELS = "labels.csv"
 SUFFIXES = (".csv", ".tsv", ".txt", ".npy", ".mat")
-LARGEST_BYTES = 1 << 28
+LARGEST_BYTES, LARGEST = 1 << 28, 1e100
 TIMES = ("t", "time", "time_s", "timestamp", "seconds")
 """Names of a column of times."""
 START = 3
@@ -81,9 +81,10 @@ class _Table:
         return places
 
     def numbers(self, places: list[int]) -> NDArray[np.float64]:
-        """(n, places) values."""
+        """(n, places) values; NaN in place of those that are beyond measure."""
         with parsing(str(self.path), "a table of numbers"):
-            return np.asarray(self.values[:, places].astype(np.float64))
+            values = self.values[:, places].astype(np.float64)
+            return np.where(np.abs(values) < LARGEST, values, np.nan)
 
     def time(self, named: str | None = None) -> list[int]:
         """The column of times, or none."""
@@ -106,7 +107,10 @@ def trials(
         raise InputError(f"{path}: holds no file {', '.join(SUFFIXES)}; give a folder of trials")
     beside = labels_beside(folder / LABELS)
     skin = dict(read_json(folder / "skin.json")) if (folder / "skin.json").is_file() else {}
-    parts = [part for file in files for part in _trials_in(_table(file), folder, options.task)]
+    parts: list[tuple[str, dict[str, str], _Table]] = []
+    for file in files:
+        with parsing(str(file), "a table", "; save it as text"):
+            parts += _trials_in(_table(file), folder, options.task)
     measured = [_measured(table, options) for _, _, table in parts]
     for (_, _, table), (_, values, _) in zip(parts, measured, strict=True):
         if values.shape[1] != measured[0][1].shape[1]:
@@ -135,32 +139,27 @@ def trials(
 
 def _table(path: Path) -> _Table:
     """The table in a file."""
-    with parsing(str(path), "a table", "; save it as text"):
-        data, suffix = read_bytes(path, LARGEST_BYTES), path.suffix.lower()
-        if suffix in (".npy", ".mat"):
-            file = io.BytesIO(data)
-            stored = {"": np.load(file)} if suffix == ".npy" else loadmat(file)
-            arrays = {
-                key: array
-                for key, array in stored.items()
-                if key[:1] != "_" and array.dtype.kind in "iuf"
-            }
-            n, shape = len(max(arrays.values(), key=np.size)), ()
-            names: list[str] = []
-            blocks: list[NDArray[Any]] = []
-            for key, array in arrays.items():
-                shape = array.shape[1:] if array.ndim == 3 else shape
-                if array.size % n == 0:
-                    blocks.append(array.reshape(n, -1))
-                    wide = range(1, blocks[-1].shape[1] + 1)
-                    names += [f"{key}.{i}".strip(".") for i in wide] if len(wide) > 1 else [key]
-            return _Table(path, names, np.hstack(blocks), shape)
-        lines = [line for line in data.decode("utf-8-sig").splitlines() if line.strip()]
-        marks = [mark for mark in "\t;," if mark in lines[0]]
-        rows = list(csv.reader(lines, delimiter=marks[0])) if marks else [x.split() for x in lines]
-        if all(map(_is_number, rows[0])):
-            return _Table(path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows))
-        return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:]))
+    data, suffix = read_bytes(path, LARGEST_BYTES), path.suffix.lower()
+    if suffix in (".npy", ".mat"):
+        file = io.BytesIO(data)
+        stored = {"": np.load(file)} if suffix == ".npy" else loadmat(file)
+        arrays = {k: v for k, v in stored.items() if k[:1] != "_" and v.dtype.kind in "iuf"}
+        n, shape = len(max(arrays.values(), key=np.size)), ()
+        names: list[str] = []
+        blocks: list[NDArray[Any]] = []
+        for key, array in arrays.items():
+            shape = array.shape[1:] if array.ndim == 3 else shape
+            if array.size % n == 0:
+                blocks.append(array.reshape(n, -1))
+                wide = range(1, blocks[-1].shape[1] + 1)
+                names += [f"{key}.{i}".strip(".") for i in wide] if len(wide) > 1 else [key]
+        return _Table(path, names, np.hstack(blocks), shape)
+    lines = [line for line in data.decode("utf-8-sig").splitlines() if line.strip()]
+    marks = [mark for mark in "\t;," if mark in lines[0]]
+    rows = list(csv.reader(lines, delimiter=marks[0])) if marks else [x.split() for x in lines]
+    if all(map(_is_number, rows[0])):
+        return _Table(path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows))
+    return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:]))
 
 
 def _is_number(text: str) -> bool:
@@ -192,7 +191,10 @@ def _trials_in(
 
 def _pivoted(table: _Table) -> _Table:
     """A row for each time and a column for each taxel, of a table with a row for each value."""
-    t, taxel, value = table.numbers([*table.time(), *table.columns("taxel,value")]).T
+    places = [*table.time(), *table.columns("taxel,value")]
+    if len(places) != 3:
+        raise InputError(f"{table.path}: has no column of times; name it t")
+    t, taxel, value = table.numbers(places).T
     times, row = np.unique(t, return_inverse=True)
     taxels, column = np.unique(taxel, return_inverse=True)
     values = np.full((len(times), 1 + len(taxels)), np.nan)
