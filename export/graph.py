@@ -155,7 +155,8 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])
         if early or last.products_:
             all_squares = build.node("Add", [squares, length])
-            areas = build.by_decision_point([unit**2 for unit in units])
+            spreads = [point.spreads_[task] for point in points]
+            areas = build.by_decision_point([u**2 / s for u, s in zip(units, spreads, strict=True)])
             sums = _label_sums(build, output, all_squares, labels, classes)
             build.node("Mul", [sums, areas], names[f"{task}_label_distances"])
 

@@ -125,8 +125,9 @@ def candidates(
     Features of several units need scaling by Method IV. Principal components of the paper's three
     features are tried with more scalings and numbers where you ask for these features only. Beside
     other candidates the best of so many settings would win by chance. Methods II and III are left
-    out, as Method I and no scaling have the same neighbours. Where `kinds_of` names kinds (`drawn`)
-    only what carries over to other skins and arms is tried.
+    out, as Method I and no scaling have the same neighbours. The discriminants of all tasks side by
+    side tell known things best, so they are tried where no group is left out. Where `kinds_of`
+    names kinds (`drawn`) only what carries over to other skins and arms is tried.
     """
     combinations_tried: Sequence[tuple[str, ...]] = WITH_JOINTS if joints else PLAIN
     if drawn:
@@ -159,6 +160,9 @@ def candidates(
             )
             pairs = products(y) if kind == "lda" else {}
             grids = [grid, *(replace(grid, targets=pairs[t], tasks=(t,)) for t in pairs)]
+            together = tuple(t for t in sorted(y) if t not in pairs and (y[t] != "").all())
+            if kind == "lda" and len(together) > 1 and not drawn:
+                grids.append(replace(grid, targets=together))
             scaled = [
                 replace(grid, scaling=method)
                 for method in (scalings if scaling is None else (scaling,))
@@ -190,7 +194,7 @@ def groupable(labels: NDArray[np.str_], groups: NDArray[np.str_]) -> bool:
 
 
 def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.int64]:
-    """(choices,) rank of the price of each choice's features and projection, from 0.
+    """(choices,) rank of the price of each choice's features, projection and targets, from 0.
 
     The price is the number of weights of the largest projection tried: these are fitted, stored on
     the board and multiplied for a decision. At an equal price the first choice ranks lower.
@@ -199,8 +203,8 @@ def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.in
         choices: the candidates' settings.
         widths: columns of each feature.
     """
-    sizes: dict[tuple[tuple[str, ...], str], int] = {}
-    kinds = [(choice.features, choice.projection) for choice in choices]
+    sizes: dict[tuple[object, ...], int] = {}
+    kinds = [(choice.features, choice.projection, choice.targets) for choice in choices]
     for kind, choice in zip(kinds, choices, strict=True):
         weights = choice.components * sum(widths[name] for name in choice.features or widths)
         sizes[kind] = max(sizes.get(kind, 0), weights)
@@ -304,6 +308,7 @@ class Choosing:
         unseen = [
             replace(g, shrinkages=tuple(s for s in g.shrinkages if s >= UNSEEN_SHRINKAGE))
             for g in grids
+            if self._leave_out not in g.targets  # discriminants of the groups that are left out
         ]
         y = self._y
         if not any(grid.targets for grid in grids):

@@ -166,6 +166,7 @@ class ContactClassifier:
         rows_: {space: (m, c)} these trials, projected.
         classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
         components_: {task: components kept}, at most as many as there are.
+        spreads_: {task: mean variance of the coordinates within its labels}; 1 where there is none.
         products_: {task: its factors} of the tasks decided together; see `edge.model.agreement`.
     """
 
@@ -224,11 +225,17 @@ class ContactClassifier:
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}
+        self.spreads_: dict[str, float] = {}
         for task, choice in self.choices.items():
             labels = y[task][self.members_[self.spaces_[task]]]
             self.classes_[task], self.labels_[task] = np.unique(labels, return_inverse=True)
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
+            rows = self.rows_[self.spaces_[task]][:, : self.components_[task]]
+            members = np.eye(len(self.classes_[task]))[self.labels_[task]]
+            means = (members.T @ rows) / members.sum(axis=0)[:, None]
+            within = (rows - means[self.labels_[task]]) ** 2
+            self.spreads_[task] = float(within.mean() if within.any() else 1.0)
         return self
 
     def _projection(

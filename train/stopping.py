@@ -98,6 +98,7 @@ def _answers(model: ContactClassifier, x: NDArray[np.float64]) -> dict[str, tupl
         classes = len(model.classes_[task])
         labels[task], _ = vote(model.labels_[task][rows], classes)
         to_labels[task] = label_distances(squares, model.labels_[task], classes)
+        to_labels[task] /= model.spreads_[task]
         nearest[task] = np.sqrt(squares.min(axis=1))
     for task, factors in model.products_.items():
         together, distances = agreed(task, factors, to_labels)

@@ -29,6 +29,19 @@ TASKS = {
 }
 
 
+def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():
+    """Category is left out, as its factors are there."""
+    together = ("mobility", "object", "softness")
+    y = {task: np.tile(labels, 2) for task, labels in TASKS.items()}
+    y["object"] = np.arange(8).astype(str)
+    plain, drawn = (
+        {grid.targets for candidate in candidates(y, drawn=d) for grid in candidate.grids}
+        for d in (False, True)
+    )
+    assert plain == {(), ("mobility", "softness"), together}
+    assert together not in drawn
+
+
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert {one.sets for one in candidates(TASKS)} == set(PLAIN)
     assert {one.sets for one in candidates(TASKS, joints=True)} == set(WITH_JOINTS)

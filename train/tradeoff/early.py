@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.stopping import StoppingRule
+from train.choose import TRIAL
 from train.dataset import DataSet
 from train.evaluate import Result, stratified_folds
 from train.fitting import fit
@@ -128,7 +129,10 @@ class _Fold:
 def compare_stopping(
     dataset: DataSet, decision_points_s: Sequence[float], *, jobs: int = 1
 ) -> dict[str, StoppingComparison]:
-    """{task: comparison}. Folds are held out in turn; a quick export of the others answers them."""
+    """{task: comparison}. Folds are held out in turn; a quick export of the others answers them.
+
+    The folds hold trials of things that the others know, so the export leaves out trials too.
+    """
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
     tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
@@ -162,7 +166,7 @@ def _held_out(
     dataset: DataSet, test: NDArray[np.int64], decision_points_s: Sequence[float]
 ) -> _Fold:
     train = some(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
-    fitted = fit(train, quick=True, decision_points_s=decision_points_s, jobs=1)
+    fitted = fit(train, quick=True, leave_out=TRIAL, decision_points_s=decision_points_s, jobs=1)
     model, others = fitted.sequential, some(dataset, test)
     assert model is not None
     names = fitted.dataset.names
