@@ -72,7 +72,7 @@ def early(measured: Measured) -> Section:
     rows: list[Row] = [
         {
             "task": task,
-            "at most wrong %": percent(rule.asked),
+            "asked error %": percent(rule.asked),
             "right %": percent(1.0 - rule.wrong),
             "mean time s": round(rule.mean_s, 3),
             "points beside waiting": points(rule.gain),
@@ -155,7 +155,7 @@ def reasons(measured: Measured) -> Section:
         "that the trials cannot certify, and names the smallest one that they can. Leave a margin "
         "above that. Early decisions were not measured on objects never met.",
     ]
-    rows: list[Row] = [{"object": name, "moves after, s": round(at, 2)} for name, at in slow]
+    rows: list[Row] = [{"object": name, "time until it moves s": round(at, 2)} for name, at in slow]
     table = Table("breakaway", "When each object that can move does", rows)
     return Section("Why, and how to have it", notes, [table])
 

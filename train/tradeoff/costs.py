@@ -146,7 +146,9 @@ def measure(raw: Recordings, dataset: DataSet, windows: Points, workers: Workers
         return {task: hits(dataset, choice.by_trial) for task, choice in tasks.items()}
 
     base = of(windows[WINDOW_S])
-    waits = [Change(f"waiting {w:g} s", f"{w - WINDOW_S:+.1f} s", dataset, w) for w in WAITS_S]
+    waits = [
+        Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset, w) for w in WAITS_S
+    ]
     cases = changes(raw, dataset)
     afters = [(of(windows[wait.window_s]), 0.0) for wait in waits]
     afters += workers.map("costs", answered, [(case,) for case in cases])
