@@ -29,7 +29,7 @@ class Onset:
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""
-        return {"event": "onset", **_which(self.contact), "onset_s": round(self.onset_s, 6)}
+        return _line("onset", self)
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,7 @@ class Decided:
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""
-        line: dict[str, Any] = {
-            "event": "decision",
-            **_which(self.contact),
-            "window_s": self.window_s,
-            "onset_s": round(self.onset_s, 6),
-        }
+        line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
             line["place"] = None if self.position is None else list(self.position)
         line |= {
@@ -126,19 +121,16 @@ class Release:
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""
-        return {
-            "event": "release",
-            **_which(self.contact),
-            "onset_s": round(self.onset_s, 6),
-            "release_s": round(self.release_s, 6),
-        }
+        return {**_line("release", self), "release_s": round(self.release_s, 6)}
 
 
 Event = Onset | Decided | Release
 
 
-def _which(contact: int | None) -> dict[str, int]:
-    return {} if contact is None else {"contact": contact}
+def _line(name: str, event: Event) -> dict[str, Any]:
+    """What the lines of all events have."""
+    contact = {} if event.contact is None else {"contact": event.contact}
+    return {"event": name, **contact, "onset_s": round(event.onset_s, 6)}
 
 
 def json_line(event: Mapping[str, Any]) -> str:

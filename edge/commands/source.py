@@ -142,7 +142,7 @@ def open_joints(
     """The source of joint angles that the options name, or else the recording being played.
 
     Args:
-        arguments: with the options of `options.add_joints`.
+        arguments: with the options of `options.add_reading`.
         opened: the skin that is being read.
         arm: whose joint angles are wanted, or None if it is unknown.
         dof: how many angles a line must have; None if none are wanted.
@@ -245,7 +245,7 @@ def reading(
     """Read the skin that the options name, until a signal comes.
 
     Args:
-        arguments: with the options of `options.add_skin`, `add_joints` and `add_web`.
+        arguments: with the options of `options.add_reading`.
         model: decides on the contacts; its arm and its angles are wanted.
         arm: whose angles are wanted, without a model.
         dof: how many angles are wanted, without a model.
