@@ -32,7 +32,7 @@ from scipy.stats import binom
 
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
-from train.choose import candidates
+from train.candidates import candidates
 from train.dataset import DataSet, load_trials
 from train.fitting import Fitted, fit
 from train.pipeline import columns_of

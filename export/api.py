@@ -22,7 +22,8 @@ from edge.model.model import Model
 from edge.touch import measures
 from export import golden
 from export.graph import to_onnx
-from train.choose import TRIAL, Candidate, Chosen
+from train.candidates import Candidate
+from train.choose import TRIAL, Chosen
 from train.dataset import DataSet
 from train.evaluate import Result
 from train.fitting import Fitted

@@ -1,9 +1,9 @@
-"""The choice of features, scaling, projection and their numbers, by nested cross-validation."""
+"""The choice among the candidates, by nested cross-validation."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -11,16 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.recording import Recording
-from edge.touch.feature_sets import expand
-from train.agreement import products
+from train.candidates import Candidate, costs, places_of
 from train.dataset import DataSet
 from train.evaluate import (
-    NEIGHBOURS,
-    SHRINKAGES,
     AnswerTable,
     Labels,
     Result,
-    SearchGrid,
     choose,
     evaluate,
     fits,
@@ -30,43 +26,7 @@ from train.evaluate import (
 from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
-from train.projection import KINDS
 
-PLAIN = (
-    ("paper",),
-    ("contact",),
-    ("moments",),
-    ("contact", "moments"),
-    ("taxels",),
-    ("sqrt_taxels",),
-    ("kernels",),
-    ("moments", "zone_kernels"),
-)
-"""Combinations of feature sets that are candidates for recordings without joint angles."""
-WITH_JOINTS = (
-    ("paper",),
-    ("contact", "joints"),
-    ("moments", "joints"),
-    ("contact", "moments", "joints"),
-    ("taxels",),
-    ("sqrt_taxels",),
-    ("contact", "joints", "posture"),
-    ("moments", "joints", "posture"),
-    ("kernels", "joints"),
-    ("moments", "zone_kernels", "joints"),
-)
-"""Those for recordings with joint angles, whose changes show how far the thing gave way."""
-DRAWN = (("paper",), ("contact",))
-DRAWN_WITH_JOINTS = (*DRAWN, ("contact", "joints"))
-"""Those for touches of simulated things that are drawn from kinds (`kinds_of`). Joint angles at
-onset and single taxels say how the scene is built. Moments say how large and of what form a
-contact is, in which simulators of soft things differ most."""
-QUICK = 3
-"""Combinations tried by a quick choice, from the first on."""
-COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
-QUICK_SHRINKAGES = (0.3, 0.03)
-FEW_NEIGHBOURS = (1, 3, 5)
-PAPER_SCALINGS = ("none", "I", "IV", "V")
 FEWEST_GROUPS = 3
 """Objects that a class needs before entire objects can be left out."""
 LEAVE_OUT = "object"
@@ -79,97 +39,10 @@ GROUP_FOLDS, FEW = 20, 300
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on differences
 that are small beside the features' spread, which do not carry over to new objects."""
-DRAWN_SHRINKAGES, DRAWN_COMPONENTS = (1.0, 0.3), (1, 2, 3, 4, 6, 8, 10)
-"""Those tried for touches of simulated things of several kinds, and the most discriminants. Another
-physics differs most in what is small beside the features' spread."""
 UNSEEN_MARGIN = 0.01
 """Accuracy on left-out groups within which the cheaper candidate is taken."""
 WINDOW_MARGIN = 0.02
 """Accuracy that is not worth twice the wait."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """Features, and how they are projected.
-
-    Attributes:
-        sets: names of feature sets and of single features.
-        projection: one of `train.projection.KINDS`.
-        grids: the settings tried with them.
-    """
-
-    sets: tuple[str, ...]
-    projection: str
-    grids: tuple[SearchGrid, ...]
-
-    @property
-    def name(self) -> str:
-        """The names of its features, as `--features` takes them."""
-        return " ".join(self.sets)
-
-
-def candidates(
-    y: Labels,
-    *,
-    joints: bool = False,
-    drawn: bool = False,
-    features: Sequence[str] | None = None,
-    projection: str | None = None,
-    scaling: str | None = None,
-    components: int | None = None,
-    k: int | None = None,
-    quick: bool = False,
-) -> list[Candidate]:
-    """Every candidate; arguments you pass are held fixed.
-
-    Features of several units need scaling by Method IV. Principal components of the paper's three
-    features are tried with more scalings and numbers where you ask for these features only. Beside
-    other candidates the best of so many settings would win by chance. Methods II and III are left
-    out, as Method I and no scaling have the same neighbours. The discriminants of all tasks side by
-    side tell known things best, so they are tried where no group is left out. Where `kinds_of`
-    names kinds (`drawn`) only what carries over to other skins and arms is tried.
-    """
-    combinations_tried: Sequence[tuple[str, ...]] = WITH_JOINTS if joints else PLAIN
-    if drawn:
-        combinations_tried = DRAWN_WITH_JOINTS if joints else DRAWN
-    if quick:
-        combinations_tried = combinations_tried[:QUICK]
-    if features is not None:
-        combinations_tried = [tuple(features)]
-    shrinkages = DRAWN_SHRINKAGES if drawn else QUICK_SHRINKAGES if quick else SHRINKAGES
-    counts = DRAWN_COMPONENTS if drawn else COMPONENTS
-    tried = []
-    for sets in combinations_tried:
-        for kind in KINDS if projection is None else (projection,):
-            paper = sets == ("paper",)
-            # By default discriminants are not tried for the paper's few features, and a quick
-            # choice tries discriminants alone for the others.
-            untried = kind == "lda" if paper else kind == "pca" and quick
-            if features is None and projection is None and untried:
-                continue
-            thorough = features is not None and kind == "pca"
-            scalings = PAPER_SCALINGS if paper and thorough else ("IV",)
-            neighbours = NEIGHBOURS if thorough else FEW_NEIGHBOURS
-            grid = SearchGrid(
-                projection=kind,
-                features=expand(sets),
-                components=counts if components is None else (components,),
-                shrinkages=shrinkages,
-                most_directions=DRAWN_COMPONENTS[-1] if drawn else None,
-                neighbours=neighbours if k is None else (k,),
-            )
-            pairs = products(y) if kind == "lda" else {}
-            grids = [grid, *(replace(grid, targets=pairs[t], tasks=(t,)) for t in pairs)]
-            together = tuple(t for t in sorted(y) if t not in pairs and (y[t] != "").all())
-            if kind == "lda" and len(together) > 1 and not drawn:
-                grids.append(replace(grid, targets=together))
-            scaled = [
-                replace(grid, scaling=method)
-                for method in (scalings if scaling is None else (scaling,))
-                for grid in grids
-            ]
-            tried.append(Candidate(tuple(sets), kind, tuple(scaled)))
-    return tried
 
 
 def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:
@@ -191,25 +64,6 @@ def groupable(labels: NDArray[np.str_], groups: NDArray[np.str_]) -> bool:
     return len(classes) > 1 and all(
         len(set(groups[labels == label].tolist())) >= FEWEST_GROUPS for label in classes
     )
-
-
-def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.int64]:
-    """(choices,) rank of the price of each choice's features, projection and targets, from 0.
-
-    The price is the number of weights of the largest projection tried: these are fitted, stored on
-    the board and multiplied for a decision. At an equal price the first choice ranks lower.
-
-    Args:
-        choices: the candidates' settings.
-        widths: columns of each feature.
-    """
-    sizes: dict[tuple[object, ...], int] = {}
-    kinds = [(choice.features, choice.projection, choice.targets) for choice in choices]
-    for kind, choice in zip(kinds, choices, strict=True):
-        weights = choice.components * sum(widths[name] for name in choice.features or widths)
-        sizes[kind] = max(sizes.get(kind, 0), weights)
-    ranks = {kind: rank for rank, kind in enumerate(sorted(sizes, key=lambda kind: sizes[kind]))}
-    return np.array([ranks[kind] for kind in kinds], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -377,7 +231,7 @@ class Choosing:
             grouped = task in self._grouped
             table, margin = (groups, UNSEEN_MARGIN) if grouped else (trials, 0.0)
             choices, prices = table.choices[task], costs(table.choices[task], self._widths)
-            own = [_places_of(candidate, choices) for candidate in self.tried]
+            own = [places_of(candidate, choices) for candidate in self.tried]
             chosen_without = without_folds(task, trials, table, prices, margin)
             for by_task, choice in zip(without, chosen_without, strict=True):
                 by_task[task] = choice
@@ -426,12 +280,6 @@ def without_folds(
         others = (answers[:, trials.folds != fold] for fold in range(count))
         places = [choose(each, prices, margin=margin) for each in others]
     return [table.choices[task][place] for place in places]
-
-
-def _places_of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:
-    """The places of a candidate's own choices."""
-    names = {(grid.features, grid.projection) for grid in candidate.grids}
-    return np.flatnonzero([(c.features, c.projection) in names for c in choices])
 
 
 def _with_untouched(labels: Sequence[str], result: Result) -> Result:

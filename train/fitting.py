@@ -18,7 +18,8 @@ from edge.touch.arm import Chain
 from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
-from train.choose import LEAVE_OUT, Candidate, Choosing, Chosen, candidates, kinds_of
+from train.candidates import Candidate, candidates
+from train.choose import LEAVE_OUT, Choosing, Chosen, kinds_of
 from train.dataset import DataSet, load_trials, read
 from train.evaluate import Labels
 from train.mix import mix

@@ -1,4 +1,4 @@
-"""The candidates, their order of cost, and the choice of the window."""
+"""What is left out, the choice of settings, and of the window."""
 
 from dataclasses import replace
 from itertools import product
@@ -8,16 +8,7 @@ import pytest
 
 import train
 from edge.recording import save
-from edge.touch.feature_sets import expand
-from train.choose import (
-    PLAIN,
-    WITH_JOINTS,
-    candidates,
-    costs,
-    groupable,
-    kinds_of,
-    without_folds,
-)
+from train.choose import groupable, kinds_of, without_folds
 from train.evaluate import AnswerTable
 from train.pipeline import Choice
 
@@ -27,41 +18,6 @@ TASKS = {
     "object": np.array(["wall", "box", "pillow", "ball"]),
     "softness": np.array(["rigid", "rigid", "soft", "soft"]),
 }
-
-
-def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():
-    """Category is left out, as its factors are there."""
-    together = ("mobility", "object", "softness")
-    y = {task: np.tile(labels, 2) for task, labels in TASKS.items()}
-    y["object"] = np.arange(8).astype(str)
-    plain, drawn = (
-        {grid.targets for candidate in candidates(y, drawn=d) for grid in candidate.grids}
-        for d in (False, True)
-    )
-    assert plain == {(), ("mobility", "softness"), together}
-    assert together not in drawn
-
-
-def test_features_of_joints_are_candidates_where_recordings_have_them():
-    assert {one.sets for one in candidates(TASKS)} == set(PLAIN)
-    assert {one.sets for one in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
-    assert len(candidates(TASKS, joints=True, quick=True)) == 3
-
-
-def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
-    tried = {(candidate.sets, candidate.projection) for candidate in candidates(TASKS)}
-    both = {(sets, kind) for sets in PLAIN for kind in ("pca", "lda")}
-    assert tried == both - {(("paper",), "lda")}
-
-
-def test_arguments_you_pass_are_held_fixed():
-    (candidate,) = candidates(
-        TASKS, features=["paper"], projection="pca", scaling="V", components=3, k=2
-    )
-    (grid,) = candidate.grids
-    settings = candidate.name, grid.scaling, grid.components, grid.neighbours
-    assert settings == ("paper", "V", (3,), (2,))
-    assert grid.features == expand(["paper"])
 
 
 def test_whole_objects_can_be_left_out_where_each_class_has_several():
@@ -91,14 +47,6 @@ def test_simulated_things_that_a_scene_numbers_are_of_kinds(make_touch):
     assert kinds_of([*touches.values(), recorded]) is None
 
 
-def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
-    for joints in (False, True):
-        tried = candidates(TASKS, joints=joints, drawn=True)
-        assert not {"posture", "taxels", "sqrt_taxels"} & {s for one in tried for s in one.sets}
-        assert min(min(grid.shrinkages) for one in tried for grid in one.grids) == 0.3
-    assert min(min(grid.shrinkages) for one in candidates(TASKS) for grid in one.grids) < 0.3
-
-
 @pytest.mark.parametrize(
     ("kinds", "left_out"), [(("box", "bin", "post"), "kind"), (("box", "bin"), "object")]
 )
@@ -110,22 +58,6 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     assert fitted.chosen["category"].left_out == left_out
     assert fitted.chosen["object"].left_out == "trial"
-
-
-def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
-    choices = [
-        Choice("IV", 3, 1, "lda", 0.1, ("a", "b")),
-        Choice("IV", 3, 5, "lda", 1.0, ("a", "b")),
-        Choice("IV", 3, 1, "lda", 0.1, ("a",)),
-        Choice("I", 2, 1, "pca", 0.1, ("a",)),
-        Choice("IV", 20, 1, "pca", 0.1, ("a",)),
-    ]
-    assert costs(choices, {"a": 10, "b": 11}).tolist() == [1, 1, 0, 2, 2]
-
-
-def test_of_equally_many_weights_those_listed_first_are_cheaper():
-    choices = [Choice("IV", 1, 1, "lda", features=(name,)) for name in ("b", "a", "c")]
-    assert costs(choices, {"a": 5, "b": 5, "c": 4}).tolist() == [1, 2, 0]
 
 
 def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_trials():

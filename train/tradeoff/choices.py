@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from edge.touch.feature_sets import expand
 from edge.touch.features import WINDOW_S
-from train.choose import TRIAL, Chosen, candidates, kinds_of
+from train.candidates import candidates
+from train.choose import TRIAL, Chosen, kinds_of
 from train.dataset import DataSet, Recordings, load_trials
 from train.evaluate import Result
 from train.fitting import fit

@@ -1,0 +1,73 @@
+"""The candidates, and their order of cost."""
+
+import numpy as np
+
+from edge.touch.feature_sets import expand
+from train.candidates import PLAIN, WITH_JOINTS, candidates, costs
+from train.pipeline import Choice
+
+TASKS = {
+    "category": np.array(["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]),
+    "mobility": np.array(["fixed", "movable", "fixed", "movable"]),
+    "object": np.array(["wall", "box", "pillow", "ball"]),
+    "softness": np.array(["rigid", "rigid", "soft", "soft"]),
+}
+
+
+def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():
+    """Category is left out, as its factors are there."""
+    together = ("mobility", "object", "softness")
+    y = {task: np.tile(labels, 2) for task, labels in TASKS.items()}
+    y["object"] = np.arange(8).astype(str)
+    plain, drawn = (
+        {grid.targets for candidate in candidates(y, drawn=d) for grid in candidate.grids}
+        for d in (False, True)
+    )
+    assert plain == {(), ("mobility", "softness"), together}
+    assert together not in drawn
+
+
+def test_features_of_joints_are_candidates_where_recordings_have_them():
+    assert {one.sets for one in candidates(TASKS)} == set(PLAIN)
+    assert {one.sets for one in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
+    assert len(candidates(TASKS, joints=True, quick=True)) == 3
+
+
+def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
+    tried = {(candidate.sets, candidate.projection) for candidate in candidates(TASKS)}
+    both = {(sets, kind) for sets in PLAIN for kind in ("pca", "lda")}
+    assert tried == both - {(("paper",), "lda")}
+
+
+def test_arguments_you_pass_are_held_fixed():
+    (candidate,) = candidates(
+        TASKS, features=["paper"], projection="pca", scaling="V", components=3, k=2
+    )
+    (grid,) = candidate.grids
+    settings = candidate.name, grid.scaling, grid.components, grid.neighbours
+    assert settings == ("paper", "V", (3,), (2,))
+    assert grid.features == expand(["paper"])
+
+
+def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
+    for joints in (False, True):
+        tried = candidates(TASKS, joints=joints, drawn=True)
+        assert not {"posture", "taxels", "sqrt_taxels"} & {s for one in tried for s in one.sets}
+        assert min(min(grid.shrinkages) for one in tried for grid in one.grids) == 0.3
+    assert min(min(grid.shrinkages) for one in candidates(TASKS) for grid in one.grids) < 0.3
+
+
+def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
+    choices = [
+        Choice("IV", 3, 1, "lda", 0.1, ("a", "b")),
+        Choice("IV", 3, 5, "lda", 1.0, ("a", "b")),
+        Choice("IV", 3, 1, "lda", 0.1, ("a",)),
+        Choice("I", 2, 1, "pca", 0.1, ("a",)),
+        Choice("IV", 20, 1, "pca", 0.1, ("a",)),
+    ]
+    assert costs(choices, {"a": 10, "b": 11}).tolist() == [1, 1, 0, 2, 2]
+
+
+def test_of_equally_many_weights_those_listed_first_are_cheaper():
+    choices = [Choice("IV", 1, 1, "lda", features=(name,)) for name in ("b", "a", "c")]
+    assert costs(choices, {"a": 5, "b": 5, "c": 4}).tolist() == [1, 2, 0]
