@@ -1,7 +1,5 @@
 """Scenes of one object, and a rig for its own steps: a joint that pushes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -28,15 +26,16 @@ def movable(mass, static, kinetic, **keys):
     return one_object(conditions=["movable"], **moves, **keys)
 
 
+def scene(objects, families=(), **rest) -> Scene:
+    """A scene whose steps are as long as a frame."""
+    things = {"object": list(objects), "family": list(families)}
+    return from_dict({"step_s": {"base": 0.01}, **things, **rest})
+
+
 def make(objects, *add, **trials) -> Scene:
-    return from_dict(
-        {
-            "trials": {"count": 2, **trials},
-            "step_s": {"base": 1.0 / trials.get("rate_hz", 100)},
-            "effects": {"add": list(add)},
-            "object": objects,
-        }
-    )
+    step_s = {"base": 1.0 / trials.get("rate_hz", 100)}
+    trials = {"count": 2, **trials}
+    return scene(objects, trials=trials, step_s=step_s, effects={"add": list(add)})
 
 
 def specs_of(scene, step_s=0.01):
@@ -75,7 +74,7 @@ class Trace:
     speed: np.ndarray
     depth: np.ndarray
 
-    def of(self, i: int) -> Trace:
+    def of(self, i: int):
         """One pusher's trace."""
         return Trace(**{name: seen[:, i : i + 1] for name, seen in vars(self).items()})
 

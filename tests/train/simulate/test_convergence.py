@@ -1,7 +1,5 @@
 """The automatic step: what it claims is what a much shorter step shows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

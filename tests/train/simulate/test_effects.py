@@ -1,7 +1,5 @@
 """An effect is added by a module and its entry in the schema, as CONTRIBUTING.md shows."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

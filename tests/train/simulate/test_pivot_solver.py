@@ -1,7 +1,5 @@
 """The loads on a pivoting forearm are the one minimum of a convex energy, or are refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace

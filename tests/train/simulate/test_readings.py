@@ -46,8 +46,7 @@ def test_each_taxel_stands_at_its_place_on_the_skin(taxels):
 
 
 @pytest.mark.parametrize(
-    ("count", "shown"),
-    [(0.5, 0), (1.5, 2), (2.4, 2), (-3.0, 0), (FULL - 0.4, 65535), (1e9, 65535)],
+    ("count", "shown"), [(0.5, 0), (1.5, 2), (2.4, 2), (-3.0, 0), (FULL - 0.4, 65535), (1e9, 65535)]
 )
 def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, shown):
     assert reading([6], [0.0, count, 0.0]).frames()[1, 1, 2] == shown

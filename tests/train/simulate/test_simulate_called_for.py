@@ -1,7 +1,5 @@
 """An effect that is not called for costs nothing and changes nothing: six proofs."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import subprocess
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
+from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run_batch
 from train.simulate.convergence import kinds
 from train.simulate.engine import values_of
@@ -24,19 +23,14 @@ ROOT = Path(__file__).parents[3]
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
 
 
-def scene(*add, leave_out=(), objects=None, seed=3, **trials):
-    things = objects or [
-        {"name": "box", "family": "rigid", "conditions": ["fixed", "movable"], **MOVES}
-    ]
-    return from_dict(
-        {
-            "seed": seed,
-            "trials": {"count": 3, "after_s": 0.6, **trials},
-            "step_s": {"base": 0.01},
-            "spread": {"place_m": 0.01, "roll_deg": 5.0, "friction": 0.1},
-            "effects": {"add": list(add), "leave_out": list(leave_out)},
-            "object": things,
-        }
+def scene(*add, leave_out=(), objects=None, **trials):
+    box = {"name": "box", "family": "rigid", "conditions": ["fixed", "movable"], **MOVES}
+    return scenes.scene(
+        objects or [box],
+        seed=3,
+        trials={"count": 3, "after_s": 0.6, **trials},
+        spread={"place_m": 0.01, "roll_deg": 5.0, "friction": 0.1},
+        effects={"add": list(add), "leave_out": list(leave_out)},
     )
 
 

@@ -6,8 +6,6 @@ effects are: in free motion nothing, and never less than nothing in all. Of what
 what is pushed has its speed and its lean.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -15,12 +13,11 @@ import numpy as np
 import pytest
 
 from edge.errors import EdgeError
-from tests.train.simulate.scenes import make, one_object, run, specs_of
+from tests.train.simulate.scenes import make, one_object, run, scene, specs_of
 from train.simulate import engine
 from train.simulate.convergence import kinds
 from train.simulate.effects import viscous
 from train.simulate.plan import ALL, Call, make_plan
-from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS, FAMILIES
 
 RANGES = {
@@ -127,14 +124,11 @@ def pair_scene(first, second):
     family, condition = common[0], "movable" if "sliding" in pair else "fixed"
     thing = {"name": "thing", "family": family, "conditions": [condition], **keys}
     own = set(FAMILIES[family].effects[1:])
-    one = from_dict(
-        {
-            "trials": {"count": 6, "lead_s": 0.1, "after_s": 0.7},
-            "step_s": {"base": 0.01},
-            "spread": {"place_m": 0.02, "yaw_deg": 3.0},
-            "object": [{**thing, **OWN_RANGES.get(family, {})}],
-            "effects": {"add": sorted(pair), "leave_out": sorted(own - pair)},
-        }
+    one = scene(
+        [{**thing, **OWN_RANGES.get(family, {})}],
+        trials={"count": 6, "lead_s": 0.1, "after_s": 0.7},
+        spread={"place_m": 0.02, "yaw_deg": 3.0},
+        effects={"add": sorted(pair), "leave_out": sorted(own - pair)},
     )
     assert pair <= set(next(iter(kinds(one)))), pair
     return one

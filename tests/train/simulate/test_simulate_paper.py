@@ -1,7 +1,5 @@
 """The default scene set, held to the paper's three headline accuracies (section IV-A)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,43 +1,25 @@
 """What is pushed off its middle turns, a slope helps or hinders, and what tips too far falls."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
-from tests.train.simulate.scenes import run
+from tests.train.simulate.scenes import make, one_object, run
 from train.simulate import base
 from train.simulate.contact import GRAVITY
 from train.simulate.effects import sliding, stribeck, tipping
 from train.simulate.plan import ALL
-from train.simulate.scene import from_dict
 
 MU, MASS = 0.4, 1.0
 AT_THE_END = slice(-40, None)
 
 
-def push(step_s=0.0025, **keys):
+def push(**keys):
     """A box of even friction that the arm pushes, and its batch of one trial."""
-    box = {
-        "name": "box",
-        "family": "rigid",
-        "conditions": ["movable"],
-        "width_m": 0.05,
-        "mass_kg": MASS,
-        "friction_static": MU,
-        "friction_kinetic": MU,
-        **keys,
-    }
-    scene = from_dict(
-        {
-            "trials": {"count": 1, "lead_s": 0.2, "after_s": 1.8},
-            "step_s": {"base": step_s},
-            "object": [box],
-        }
-    )
-    return run(scene, step_s)
+    even = {"width_m": 0.05, "mass_kg": MASS, "friction_static": MU, "friction_kinetic": MU}
+    box = one_object(conditions=["movable"], **{**even, **keys})
+    return run(make(box, count=1, after_s=1.8), 0.0025)
 
 
 class TestTurning:

@@ -1,7 +1,5 @@
 """Scenes to files: the same bytes however they are run, and the command line."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +9,10 @@ import pytest
 
 from edge.errors import InputError
 from edge.recording import load
+from tests.train.simulate.scenes import make, one_object, scene
 from train.__main__ import main
 from train.simulate import scene as scenes
 from train.simulate.run import simulate, total_trials, write
-from train.simulate.scene import from_dict
 
 DEMO = Path(__file__).parents[3] / "train" / "scenes" / "demo.toml"
 
@@ -81,14 +79,10 @@ def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(written
 
 
 def test_the_sensors_effects_reach_the_recording():
-    table = {
-        "trials": {"count": 1, "after_s": 0.6},
-        "step_s": {"base": 0.01},
-        "object": [{"name": "bar", "family": "rigid", "conditions": ["fixed"], "width_m": 0.03}],
-    }
 
     def one(**effects):
-        return next(simulate(from_dict({**table, "effects": effects})))[1]
+        trials = {"count": 1, "after_s": 0.6}
+        return next(simulate(scene(one_object(width_m=0.03), trials=trials, effects=effects)))[1]
 
     plain = one()
     peak = plain.frames.max()
@@ -178,12 +172,11 @@ def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):
 
 def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
     """A contact begins above it (`edge.touch.track`)."""
-    box = {"name": "box", "family": "rigid", "conditions": ["fixed"]}
-    scene = from_dict({"trials": {"count": 1}, "step_s": {"base": 0.01}, "object": [box]})
-    ((_, trial),) = simulate(scene)
+    one = make(one_object(), count=1)
+    ((_, trial),) = simulate(one)
     for onset, unfelt in ((int(trial.frames.max()) - 1, 0), (int(trial.frames.max()), 1)):
-        scene = replace(scene, skin=replace(scene.skin, onset_counts=onset))
-        assert write(scene, tmp_path).unfelt == unfelt
+        felt = replace(one, skin=replace(one.skin, onset_counts=onset))
+        assert write(felt, tmp_path).unfelt == unfelt
 
 
 def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):

@@ -1,7 +1,5 @@
 """A scene's file: what it may say, and the sentence that each mistake gets."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import replace

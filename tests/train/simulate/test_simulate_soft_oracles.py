@@ -1,7 +1,5 @@
 """Simulated foam held against answers that are known: its creep, its bed, its layer."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,17 +1,15 @@
 """Labels are what happened, whole families can be drawn, and what contradicts itself is refused."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import pytest
 
 from edge.errors import InputError
+from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run
 from train.simulate import convergence
 from train.simulate.run import simulate, write
-from train.simulate.scene import from_dict
 
 BOX = {
     "name": "box",
@@ -32,16 +30,9 @@ FAMILY = {
 del FAMILY["friction_kinetic"]
 
 
-def scene(*objects, families=(), **rest):
-    return from_dict(
-        {
-            "trials": {"count": 4, "lead_s": 0.1, "after_s": 1.4},
-            "step_s": {"base": 0.01},
-            "object": list(objects),
-            "family": list(families),
-            **rest,
-        }
-    )
+def scene(*objects, **rest):
+    trials = {"count": 4, "lead_s": 0.1, "after_s": 1.4}
+    return scenes.scene(objects, **{"trials": trials, **rest})
 
 
 class TestLabels:
