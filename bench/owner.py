@@ -4,8 +4,8 @@ Takes a simulated set, and trials of another engine in the place of the owner's:
 transfer` leaves in `build/transfer/seedN`, where the numbers in a file's name tell the object. Half
 of the objects are always left out; of the other half, N trials are the owner's. Prints the share of
 the left-out trials that are decided rightly by the simulated trials alone, the owner's alone, both,
-both with the owner's at half of the weight, and with the weight that `make export SCENE=...
-DATA=...` chooses on the owner's trials.
+both with the owner's at half of the weight, with the weight that `make export SCENE=... DATA=...`
+chooses on the owner's trials, and by a model of the simulated ones that was taught the owner's.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from train.dataset import DataSet, load_trials
 from train.mix import ALONE, ONCE, SIMULATED, mix
 from train.pipeline import ContactClassifier
 
-COUNTS = (10, 20, 40, 80)
+COUNTS = (5, 10, 20, 40, 80)
 TASKS = ("category", "mobility")
+COLUMNS = ("simulated", "own", "both", "half", "chosen", "taught")
 
 
 def renamed(source: Path, target: Path) -> Path:
@@ -61,7 +62,7 @@ def main() -> None:
         return choosing.choose(WINDOW_S)[0]
 
     chosen = settings(trials.part(~own), {task: labels[~own] for task, labels in y.items()})
-    print(f"{'':<20}simulated  own  both  half  chosen")
+    print(f"{'':<16}" + "".join(f"{name:>10}" for name in COLUMNS))
     for count in COUNTS:
         right: dict[str, list[list[float]]] = {task: [] for task in TASKS}
         for repeat in range(options.repeats):
@@ -88,10 +89,19 @@ def main() -> None:
                     ).fit(X[used], labels, own[used])
                     told = classifier.predict(X[asked])[task]
                     shares.append(float((told == y[task][asked]).mean()))
-                right[task].append(shares)
+                simulated = ContactClassifier(
+                    {task: replace(best, weights=ONCE)}, trials.names, trials.widths(SAMPLES)
+                ).fit(X[~own], {task: each[~own] for task, each in y.items()})
+                (space,) = simulated.spaces_.values()
+                classes = simulated.classes_[task].searchsorted(y[task][known])
+                simulated.labels_[task] = np.append(simulated.labels_[task], classes)
+                rows = simulated.rows_[space], simulated.project(space, X[known])
+                simulated.rows_[space] = np.vstack(rows)
+                told = simulated.predict(X[asked])[task]
+                right[task].append([*shares, float((told == y[task][asked]).mean())])
         for task, rows in right.items():
             means = 100.0 * np.mean(rows, axis=0)
-            print(f"{task:<10}{count:>4} own  " + "  ".join(f"{mean:5.1f}" for mean in means))
+            print(f"{task:<11}{count:>4} " + "".join(f"{mean:>10.1f}" for mean in means))
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from train.evaluate import (
     group_folds,
     stratified_folds,
 )
+from train.labels import ENOUGH
 from train.pipeline import Choice
 
 FEWEST_OWN = 3
@@ -131,20 +132,22 @@ def mix(
         )
     for task, settled in chosen.items():
         table = by_trial if task == leave_out else by_group
-        # The first within a standard error of the best, as ten trials hardly tell them apart.
+        # The first within a standard error of the best, as ten trials hardly tell them apart; fewer
+        # than that choose nothing.
         rank = np.arange(len(table.choices[task]))
-        best = table.choices[task][table.chosen(task, rank)]
+        rule = rank, (rank[:1] if labelled[task] < ENOUGH else None)
+        best = table.choices[task][table.chosen(task, *rule)]
         for fold, choice_of in enumerate(without):
-            choice_of[task] = table.choices[task][by_trial.without(task, fold, rank)]
+            choice_of[task] = table.choices[task][by_trial.without(task, fold, *rule)]
         chosen[task] = replace(
             settled,
             choice=best,
-            accuracy=table.nested(task, rank),
-            by_trial=by_trial.nested(task, rank),
+            accuracy=table.nested(task, *rule),
+            by_trial=by_trial.nested(task, *rule),
             left_out=TRIAL if table is by_trial else leave_out,
             folds=table.folds,
             by_fold=tuple(
-                table.choices[task][table.without(task, fold, rank)]
+                table.choices[task][table.without(task, fold, *rule)]
                 for fold in range(int(table.folds.max()) + 1)
             ),
         )
