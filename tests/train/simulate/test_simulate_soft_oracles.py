@@ -17,7 +17,7 @@ RADIUS = 0.04604
 
 
 class TestRelaxation:
-    @pytest.mark.parametrize("tau", [0.05, 0.5, 2.0])
+    @pytest.mark.parametrize("tau", [1e-6, 0.004, 0.05, 0.5, 2.0, 1e5])
     def test_ramp_and_hold_of_the_standard_linear_solid(self, tau):
         k, ratio, rate, up = 500.0, 1.2, 0.02, 0.5
         law = {"effects": ("relaxation",), "relax_ratio": ratio, "relax_s": tau}
@@ -292,21 +292,13 @@ class TestBubbles:
         assert law == pytest.approx(want, rel=1e-12)
 
 
-def test_stems_bent_too_far_have_slipped_off():
-    batch = run(make(one_object(family="foliage", stem_slip_m=0.03, stem_spread_m=0.5)))
-    stems = batch.trials.own["stems"]
-    bent = batch.trials.depth[0] - stems.depth
-    assert (bent > 0.03).any()
-    assert (stems.stiffness[bent > 0.03] == 0.0).all()
-    assert (stems.stiffness[bent <= 0.03] > 0.0).any()
-
-
 def test_the_stems_that_are_held_bear_by_their_own_bends():
     keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
     batch = run(make(one_object(family="foliage", **keys)))
     stems = batch.trials.own["stems"]
-    assert (stems.stiffness == 0.0).any()
     bent = np.maximum(batch.trials.depth[0] - stems.depth, 0.0)
+    assert (bent > 0.03).any()
+    assert (stems.stiffness[bent > 0.03] == 0.0).all()
     want = (stems.stiffness * bent).sum(axis=0)
     assert (want > 0.1).all()
     np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-9)
