@@ -10,6 +10,7 @@ import pytest
 
 from edge import cli
 from edge.i2c import block
+from edge.i2c.chip import MOST_TAXELS
 from edge.model.info import FORMAT
 from export.__main__ import main as export
 
@@ -76,5 +77,5 @@ def test_the_table_of_formats_ends_with_the_one_that_is_written():
 def test_the_block_protocol_is_described_as_it_is():
     text = (DOCS / "block-protocol.md").read_text()
     assert f"`{block.crc16(b'123456789'):#06x}`".replace("0x29b1", "0x29B1") in text
-    assert f"at most {block.MOST_TAXELS} taxels" in text
+    assert f"at most {MOST_TAXELS} taxels" in text
     assert block.pack(__import__("numpy").array([0xABC, 0xDEF], "u2"), 12).hex(" ").upper() in text

@@ -16,7 +16,7 @@ from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
 from edge.i2c import block
 from edge.i2c.bus import wire_bits
-from edge.i2c.chip import UNUSED, ChipSpec, Sense
+from edge.i2c.chip import MOST_TAXELS, UNUSED, ChipSpec, Sense
 from edge.i2c.serial_bus import serial_bits
 from edge.i2c.tca9548a import FakeTCA9548A
 from edge.recording import Recording
@@ -276,11 +276,9 @@ def skin_file(layout: SkinLayout) -> SkinFile:
     cody = skinfile.load(skinfile.shipped("cody"))
     if layout.shape == cody.layout.shape:
         return replace(cody, name="fake", layout=layout)
-    taxels, most = layout.rows * layout.cols, block.MOST_TAXELS
-    chips = tuple(
-        ChipSpec(block.KIND, 0x08 + i, tuple(range(first, min(first + most, taxels))))
-        for i, first in enumerate(range(0, taxels, most))
-    )
-    if len(chips) > 100:
-        raise InputError(f"a fake skin has at most {100 * most} taxels, not {taxels}")
+    taxels = range(layout.rows * layout.cols)
+    shares = [taxels[first : first + MOST_TAXELS] for first in taxels[::MOST_TAXELS]]
+    if len(shares) > 100:
+        raise InputError(f"a fake skin has at most {100 * MOST_TAXELS} taxels, not {len(taxels)}")
+    chips = tuple(ChipSpec(block.KIND, 0x08 + i, tuple(share)) for i, share in enumerate(shares))
     return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

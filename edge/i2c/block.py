@@ -23,8 +23,6 @@ from edge.i2c.chip import Chip, ChipKind, ChipSpec, Defaults, FakeChip, Option, 
 IDENTITY, FRAME = b"\x00", b"\x10"
 MAGIC = b"TAXL\x01"
 BITS = (8, 12, 16)
-MOST_TAXELS = 4000
-"""A frame then stays under the 8192 bytes of one message."""
 UNCHANGED_FRAMES = 25
 """Readings with one sequence number after which the microcontroller hangs."""
 FAKE_RATE_HZ = 100.0
@@ -194,7 +192,6 @@ KIND = ChipKind(
         12: Defaults(drift_counts_per_s=1.25, drift_limit_counts=125),
         8: Defaults(drift_counts_per_s=0.08, drift_limit_counts=8),
     }.get(options["bits"], Defaults()),
-    most_taxels=MOST_TAXELS,
     unchanged_frames=UNCHANGED_FRAMES,
     serial=True,
     rests_at_zero=True,

@@ -358,14 +358,12 @@ class LinuxBus:
                 if error.errno == errno.EBUSY:
                     raise bus_error(errno.EBUSY, self.name, address) from None
             self._asked.add(address)
-        prepared: list[Any] = []
-        for message in messages:
-            buffer = message.buffer
-            pointer = ctypes.cast(buffer.ctypes.data, ctypes.POINTER(ctypes.c_char))
-            prepared.append(
-                i2c_msg(addr=message.address, flags=int(message.read), len=len(buffer), buf=pointer)
-            )
-        return Transfer(messages, i2c_rdwr_ioctl_data.create(*prepared))
+        char = ctypes.POINTER(ctypes.c_char)
+        structures = [
+            i2c_msg(m.address, int(m.read), len(m.buffer), ctypes.cast(m.buffer.ctypes.data, char))
+            for m in messages
+        ]
+        return Transfer(messages, i2c_rdwr_ioctl_data.create(*structures))
 
     def transfer(self, prepared: Transfer) -> None:
         """Send it; the interpreter lock is free while it is on the wire.

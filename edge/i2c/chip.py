@@ -19,6 +19,8 @@ from edge.i2c.bus import Bus, BusError, read, wire_bits, write
 
 ADDRESSES = range(0x08, 0x78)
 """7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
+MOST_TAXELS = 4000
+"""A frame of 16-bit taxels then stays under the 8192 bytes of one message."""
 UNUSED = -1
 """A stage without a taxel."""
 Parsed = tuple[NDArray[np.uint16], NDArray[np.bool_]]
@@ -192,11 +194,10 @@ class ChipKind:
         highest: the largest raw value that is not saturated.
         rest: raw value at rest of a fake chip without calibration.
         addresses: addresses that the chip can have.
-        stages: number of its stages; None where the skin file decides, up to `most_taxels`.
+        stages: number of its stages; None where the skin file decides, up to `MOST_TAXELS`.
         pointer_bytes: bytes of the register pointer.
         options: keys of a skin file that only this kind has.
         defaults: values that the skin file need not give.
-        most_taxels: limit where `stages` is None.
         unchanged_frames: readings with the same bytes after which the chip hangs for certain;
             None where bytes at rest may stay the same.
         serial: whether it can be on a serial port.
@@ -216,7 +217,6 @@ class ChipKind:
     pointer_bytes: int = 1
     options: Mapping[str, Option] = field(default_factory=dict)
     defaults: Callable[[Mapping[str, int]], Defaults] = lambda options: Defaults()
-    most_taxels: int = 4000
     unchanged_frames: int | None = None
     serial: bool = False
     rests_at_zero: bool = False

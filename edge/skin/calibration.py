@@ -68,8 +68,6 @@ def save_calibration(path: str | os.PathLike[str], calibration: TaxelCalibration
 
 def dead_band(skin: SkinFile) -> NDArray[np.int32]:
     """(rows * cols,) counts under which a taxel reads 0; at least 1: no count is negative."""
-    floor = max(1, skin.signal.dead_band_counts)
-    if skin.calibration is None:
-        return np.full(skin.layout.rows * skin.layout.cols, floor, dtype=np.int32)
-    sigma = skin.signal.dead_band_sigma * skin.calibration.noise.ravel()
-    return np.maximum(floor, np.ceil(np.minimum(sigma, 65535.0))).astype(np.int32)
+    noise = np.zeros(skin.layout.shape) if skin.calibration is None else skin.calibration.noise
+    sigma = np.ceil(np.minimum(skin.signal.dead_band_sigma * noise.ravel(), 65535.0))
+    return np.maximum(max(1, skin.signal.dead_band_counts), sigma.astype(np.int32))

@@ -14,7 +14,6 @@ from edge.skin.file import SkinFile
 
 NOISY_COUNTS = 1.0
 """Standard deviation from which a chip's bytes change with every conversion."""
-NO_LIMIT = 1 << 62
 
 
 class Decoder:
@@ -72,7 +71,7 @@ class Decoder:
             highest = np.minimum(highest, baseline + reach)
             np.logical_or.at(noisy, self._chip_of, file.calibration.noise.ravel() >= NOISY_COUNTS)
         stuck = file.reading.stuck_frames
-        self._limits = np.where(noisy[:-1], stuck, NO_LIMIT)
+        self._limits = np.where(noisy[:-1], stuck, np.iinfo(np.int64).max)
         """Equal readings in a row after which a chip is stuck, if its bytes must change."""
         for i, chip in enumerate(chips):
             if chip.kind.unchanged_frames is not None:

@@ -140,9 +140,8 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     signal = _signal(signals, layout, defaults)
     if not skin.has("threshold_counts") and defaults.threshold_counts:
         layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
-    calibration = None
-    if top.has("calibration"):
-        calibration = _calibration(top.table("calibration"), layout)
+    has = top.has("calibration")
+    calibration = _calibration(top.table("calibration"), layout) if has else None
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 

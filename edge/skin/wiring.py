@@ -10,7 +10,7 @@ from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.i2c import tca9548a
 from edge.i2c.bus import device_path
-from edge.i2c.chip import UNUSED, ChipKind, ChipSpec
+from edge.i2c.chip import MOST_TAXELS, UNUSED, ChipKind, ChipSpec
 from edge.skin.kinds import KINDS
 from edge.touch.layout import SkinLayout
 
@@ -77,8 +77,6 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
 def _port(table: ConfigTable) -> tuple[str, int]:
     """A serial port and its bits per second."""
     port = table.text("serial")
-    if not port or "\0" in port:
-        raise table.fail("serial", 'the path of a serial port, such as "/dev/ttyACM0"')
     if table.has("device"):
         raise InputError(f"{table.called('device')} is an I2C bus; give it or serial, not both")
     return port, table.whole("baud", 115_200, range(1_200, 20_000_001))
@@ -134,11 +132,9 @@ def _chip(
             f"{table.called('taxels')} names {len(taxels)} taxels, but an {kind.name.upper()} has "
             f"{kind.stages} stages; write [] for a stage without a taxel"
         )
-    if not 1 <= len(taxels) <= kind.most_taxels:
-        raise InputError(
-            f"{table.called('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
-            f"{kind.most_taxels}"
-        )
+    if not 1 <= len(taxels) <= MOST_TAXELS:
+        limits = f"names {len(taxels)} taxels; a chip serves 1 to {MOST_TAXELS}"
+        raise InputError(f"{table.called('taxels')} {limits}")
     own = table.whole("sign", kind.defaults(options).sign if sign is None else sign, (1, -1))
     table.done()
     return ChipSpec(kind, address, taxels, mux, channel, own, options)
