@@ -63,6 +63,28 @@ def test_every_share_is_that_of_a_loop_of_whole_numbers(biases, channels):
     assert len(set(expected)) > 20
 
 
+@pytest.mark.parametrize(("biases", "channels"), [(1008, 32), (504, 36)])
+def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(biases, channels):
+    minirocket = pytest.importorskip(
+        "aeon.transformations.collection.convolution_based._minirocket",
+        reason="aeon is not installed",
+    )
+    rng = np.random.default_rng(biases)
+    values = rng.integers(0, 1 << 12, (channels, SAMPLES))
+    table = KernelTable((2,) * channels, tuple(rng.integers(-(1 << 15), 1 << 15, biases).tolist()))
+    mixes = kernels._mixes(channels)
+    parameters = (
+        mixes.sum(axis=1).astype(np.int32),
+        np.nonzero(mixes)[1].astype(np.int32),
+        np.array(kernels.DILATIONS, np.int32),
+        np.array(kernels.BIASES[biases], np.int32),
+        np.array(table.biases, np.float32),
+    )
+    touch = kernels.shifted(values, table.shifts)[None].astype(np.float32)
+    (theirs,) = minirocket._static_transform_multi(touch, parameters, np.array(HEAVY, np.int32))
+    assert shares(values, table).astype(np.float32).tolist() == theirs.tolist()
+
+
 def test_the_largest_values_stay_exact():
     values = np.full((32, SAMPLES), 1 << 60)
     values[:, ::2] = 0
