@@ -32,10 +32,17 @@ def run(arguments: argparse.Namespace) -> int:
         low, high = (round(factor * max(level, 1)) for level in (threshold, onset))
         rows.append((name, min(low, 65534), min(high, 65534)))
     print(f"{'':<11}threshold  onset  recordings with a contact  contacts")
+    counts = {}
     for name, low, high in bar(rows, desc="following", leave=False):
-        touched, total = count_contacts(recordings, low, high)
+        counts[name] = touched, total = count_contacts(recordings, low, high)
         tqdm.write(
             f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  {total:>8}"
         )
     print(f"use: --threshold {threshold} --onset {onset}")
+    hidden = max(counts.values())[0] - counts["proposed"][0]
+    if hidden:
+        print(
+            f"other thresholds show a contact in {hidden} more of the recordings, of noise or of "
+            "touches as weak as it; `make export` tries lower ones and takes what decides best"
+        )
     return 0
