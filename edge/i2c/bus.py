@@ -359,7 +359,7 @@ class LinuxBus:
                     raise bus_error(errno.EBUSY, self.name, address) from None
             self._asked.add(address)
         char = ctypes.POINTER(ctypes.c_char)
-        structures = [
+        structures: list[Any] = [
             i2c_msg(m.address, int(m.read), len(m.buffer), ctypes.cast(m.buffer.ctypes.data, char))
             for m in messages
         ]
