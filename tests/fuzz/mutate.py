@@ -83,7 +83,8 @@ def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
     where = [draw.randrange(changed.size + 1) for _ in range(draw.choice((1, 3, 100)))]
     inside = [i for i in where if i < changed.size]
     if array.dtype.kind == "f":
-        changed.reshape(-1)[inside] = draw.choice(FLOATS)
+        with np.errstate(over="ignore"):  # a float32 becomes infinite
+            changed.reshape(-1)[inside] = draw.choice(FLOATS)
     elif array.dtype.kind in "ui":
         limits = np.iinfo(array.dtype)
         changed.reshape(-1)[inside] = draw.choice((limits.min, limits.max, 0))
