@@ -256,18 +256,19 @@ def _features(exported: Exported) -> Section:
     dataset, rows = fitted.dataset, []
     widths = dict(zip(dataset.names, dataset.widths(fitted.samples), strict=True))
     for name, unit in dataset.units.items():
-        row: Row = {"feature": name, "unit": "" if unit == "1" else unit, "values": widths[name]}
+        row: Row = {"feature": name}
         for task, answer in exported.answers.items():
             pulls = [why.pulls for why in answer.explained.values() if why.pulls]
             shares = [abs(p.get(name, 0.0)) / (sum(map(abs, p.values())) or 1.0) for p in pulls]
             row[f"{task}, % of pull"] = percent(float(np.mean(shares or [0.0])))
-        rows.append(row)
+        rows.append({**row, "unit": "" if unit == "1" else unit, "values": widths[name]})
     text = [
         "A feature's pull is by how much it brings a touch nearer to the nearest trial of its "
         "answer than to the nearest trial of another label. The table shows the features' parts "
         f"of all pulls, as a mean over left-out trials: about {EXPLAINED}, and those told wrong."
     ]
-    return Section("Features", text, [Table("features", "Features of the model", rows)])
+    table = Table("features", "Features of the model", rows, narrow=3)
+    return Section("Features", text, [table])
 
 
 def _learning(exported: Exported) -> Section:
@@ -288,11 +289,11 @@ def _learning(exported: Exported) -> Section:
     half = PARTS // 2 - 1
     text = [
         f"{task}: twice the trials, {sizes[-1]} in place of {sizes[half]}, brought "
-        f"{100 * (row[-1].accuracy - row[half].accuracy):+.1f} points. The next doubling usually "
-        "brings less."
+        f"{100 * (row[-1].accuracy - row[half].accuracy):+.1f} points."
         for task, row in results.items()
     ]
     text.append(
+        "A further doubling usually brings less than the last one did. "
         "All fits take the settings that were chosen with all trials of their fold. The fewer "
         "trials are of the same objects. For objects that are new to the model, record more "
         "objects rather than more touches."
