@@ -182,9 +182,9 @@ def _by_kind(values: Array, kinds: list[_Kind]) -> list[Array]:
 
 def _judged(kind: _Kind, tolerance: float) -> Convergence:
     *forces, reference = kind.forces
-    apart = [_distance(force, reference) for force in forces]
+    distances = [_distance(force, reference) for force in forces]
     extrapolated = kind.errors(len(forces))
-    errors = (*map(max, zip(apart, extrapolated, strict=False)), apart[-1])
+    errors = (*map(max, zip(distances, extrapolated, strict=False)), distances[-1])
     smallest = min(errors)
     limit = tolerance if smallest <= tolerance else LITTLE_GAIN * smallest
     step_s, error = next((s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit)

@@ -255,15 +255,15 @@ def readings(
     plan = t.plan if scene is t.scene else make_plan(scene, t.specs)
     for i in every.tolist():
         window = physics.window[i].reshape(physics.window.shape[1], -1)
-        some = np.flatnonzero(window.any(axis=0))
-        row, column = np.divmod(some, len(t.columns))
+        loaded = np.flatnonzero(window.any(axis=0))
+        row, column = np.divmod(loaded, len(t.columns))
         seen = Readings(
             scene=scene,
             trial=t.specs[i],
             effects=plan.effects[i],
             which=i,
             t=physics.t,
-            counts=window[:, some],
+            counts=window[:, loaded],
             taxels=row * t.skin.cols + t.columns[column, i],
             joints=physics.joints[i].copy(),
         )

@@ -97,9 +97,9 @@ class Plan:
                 if call.index is ALL:
                     call.function(trials, i)
                     continue
-                some = call.index if i is ALL else i[call.which[i]]
-                if some.size:
-                    call.function(trials, some)
+                callers = call.index if i is ALL else i[call.which[i]]
+                if callers.size:
+                    call.function(trials, callers)
 
     def also(self, effect: str, i: Index) -> Mask:
         """Whether each of the trials i calls for an effect."""

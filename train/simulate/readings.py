@@ -67,6 +67,6 @@ class Readings:
 
     def frames(self) -> NDArray[np.uint16]:
         """(frames, rows, cols) whole counts within the converter's range."""
-        whole = np.zeros((len(self.counts), self.shape[0] * self.shape[1]), dtype=np.uint16)
-        whole[:, self.taxels] = np.clip(np.rint(self.counts), 0.0, FULL)
-        return whole.reshape(-1, *self.shape)
+        counts = np.zeros((len(self.counts), self.shape[0] * self.shape[1]), dtype=np.uint16)
+        counts[:, self.taxels] = np.clip(np.rint(self.counts), 0.0, FULL)
+        return counts.reshape(-1, *self.shape)

@@ -64,7 +64,7 @@ def run(scene, step_s=0.01, **options) -> Batch:
 
 @dataclass
 class Trace:
-    """What the bench saw: (steps, n) each."""
+    """The rig's motion and forces, (steps, n) each."""
 
     t: np.ndarray
     force: np.ndarray

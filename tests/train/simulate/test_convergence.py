@@ -20,23 +20,23 @@ OBJECTS = (
 def test_halving_the_step_halves_the_error(condition, keys, add):
     scene = make(one_object(conditions=[condition], width_m=0.05, **keys), *add)
     scene.trials["tolerance"] = 1e-9
-    (found,) = measure(scene, list(kinds(scene).values()))
-    assert found.errors[-1] < found.errors[0]
-    assert 0.6 <= found.order <= 1.0
-    assert found.errors[-1] < 0.005
+    (convergence,) = measure(scene, list(kinds(scene).values()))
+    assert convergence.errors[-1] < convergence.errors[0]
+    assert 0.6 <= convergence.order <= 1.0
+    assert convergence.errors[-1] < 0.005
 
 
-def test_a_light_thing_that_swings_within_a_step_is_not_believed():
+def test_a_light_object_that_swings_within_a_step_is_not_within_the_tolerance():
     # From three halvings alone, 2.5 ms would err by 5e-5; the thing swings ten times in that.
     scene = make(movable(1e-4, 0.5, 0.4), lead_s=0.05, after_s=0.15)
     trials = next(iter(kinds(scene).values()))
-    (found,) = measure(scene, [trials])
-    assert not found.within
+    (convergence,) = measure(scene, [trials])
+    assert not convergence.within
     true, step = (
         run_physics(scene, tuple(replace(trial, step_s=step_s) for trial in trials)).force
-        for step_s in (2e-5, found.step_s)
+        for step_s in (2e-5, convergence.step_s)
     )
-    assert found.error >= 0.9 * np.sqrt(np.mean((step - true) ** 2)) / true.max()
+    assert convergence.error >= 0.9 * np.sqrt(np.mean((step - true) ** 2)) / true.max()
 
 
 def test_the_step_follows_the_tolerance():
@@ -44,8 +44,12 @@ def test_the_step_follows_the_tolerance():
     chosen = []
     for tolerance in (0.05, 0.004):
         scene.trials["tolerance"] = tolerance
-        (found,) = measure(scene, list(kinds(scene).values()))
-        within = [s for s, e in zip(found.steps_s, found.errors, strict=False) if e <= tolerance]
-        assert found.step_s == within[0]
-        chosen.append(found.step_s)
+        (convergence,) = measure(scene, list(kinds(scene).values()))
+        within = [
+            s
+            for s, e in zip(convergence.steps_s, convergence.errors, strict=False)
+            if e <= tolerance
+        ]
+        assert convergence.step_s == within[0]
+        chosen.append(convergence.step_s)
     assert chosen[0] > chosen[1]

@@ -17,9 +17,9 @@ from train.simulate.scene_model import Value
 
 def test_newton_on_the_tilt_needs_its_line_search():
     beds, free, c = tilt_cases(600, seed=1)
-    found = tilt_loads(beds, free, c)
-    assert tilt_error(beds, free, c, found).max() < 1e-9
-    assert not found.lost.any()
+    answer = tilt_loads(beds, free, c)
+    assert tilt_error(beds, free, c, answer).max() < 1e-9
+    assert not answer.lost.any()
     loads = tilt_loads(beds, free, c, guarded_rounds=0)
     wrong = tilt_error(beds, free, c, loads) > 1e-6
     assert wrong.sum() >= 1
@@ -39,9 +39,9 @@ def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
     beds, free, (c00, *_) = tilt_cases(600, seed=2)
     lean = np.linspace(-5.0, 5.0, 600)
     c01 = lean * c00
-    found = tilt_loads(beds, free, (c00, c01, lean * c01))
-    assert not found.lost.any()
-    way = c00 * found.force + c01 * found.moment
+    answer = tilt_loads(beds, free, (c00, c01, lean * c01))
+    assert not answer.lost.any()
+    way = c00 * answer.force + c01 * answer.moment
 
     def missing(way):
         force, moment = bed_loads(beds, free[0] - way, free[1] - lean * way)
@@ -56,8 +56,8 @@ def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
     np.testing.assert_allclose(way, 0.5 * (low + high), rtol=0.0, atol=1e-12)
     force, moment = bed_loads(beds, free[0] - way, free[1] - lean * way)
     soft = beds.stiffness[0] < 1e6
-    np.testing.assert_allclose(found.force[soft], force[soft], rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(found.moment[soft], moment[soft], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(answer.force[soft], force[soft], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(answer.moment[soft], moment[soft], rtol=1e-6, atol=1e-6)
 
 
 def bed_loads(springs, y0, y1):

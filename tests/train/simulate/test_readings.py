@@ -1,4 +1,4 @@
-"""What bears nothing is left out until an effect asks for it; what is shown is whole counts."""
+"""Unloaded taxels are left out until an effect asks for them; frames hold whole counts."""
 
 import numpy as np
 import pytest

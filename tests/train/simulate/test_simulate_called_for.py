@@ -163,7 +163,7 @@ def test_6_results_do_not_depend_on_the_batch(sensor):
                 assert read.tobytes() == before.tobytes(), (name, part[0].key)
 
 
-def test_who_called_is_told():
+def test_each_required_effect_has_its_reason():
     one = scene("noise", "stribeck", objects=everything())
     foam = next(o for o in one.objects if o.family == "foam")
     called = required_effects(one, foam, "movable")

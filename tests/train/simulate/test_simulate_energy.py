@@ -111,8 +111,8 @@ def lean(t, mover):
 
 
 def pair_scene(first, second):
-    """A thing that calls for two effects and, as far as that goes, for nothing else; None where no
-    thing can have both."""
+    """A scene whose object calls for two effects and for nothing that they do not need; None where
+    no object can have both."""
     pair = {first, second}
     pair |= {need for name in pair for need in EFFECTS[name].needs}
     families = [set(EFFECTS[n].families) for n in pair if EFFECTS[n].families]
@@ -169,7 +169,7 @@ def test_relaxing_foam_under_a_pivoting_arm_presses_no_harder_than_a_stiff_one()
         assert most(relax_ratio=ratio) <= 1.02 * stiff
 
 
-def test_what_answers_to_speed_never_gives_more_than_it_took():
+def test_a_viscous_contact_gives_back_no_more_energy_than_it_took():
     rng = np.random.default_rng(3)
     n = 200
     ratio, relax_s, loss_s = 10.0 ** rng.uniform([[-1], [-3], [-6]], [[2], [6], [3]], (3, n))

@@ -262,7 +262,7 @@ class TestFriction:
         assert (np.abs(shear.pull) > 0.5).all()
         np.testing.assert_allclose(1e4 * shear.stretch, shear.pull, rtol=1e-3)
 
-    def test_what_is_soft_and_smooth_presses_along_the_forearms_own_normal(self):
+    def test_a_smooth_soft_object_presses_along_the_forearms_normal(self):
         foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
         t = run(make(foam, "tilt")).trials
         push = t.loads[0] * t.normal + t.own["friction"].pull * t.along_face
@@ -318,7 +318,7 @@ class TestTilt:
             np.testing.assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
             t.q[j] -= 1e-6
 
-    def test_what_has_been_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
+    def test_an_object_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
         batch = run(make(movable(0.3, 0.3, 0.25, width_m=2.0, skin_friction=0.3), "tilt"))
         lever = batch.trials.own["tilt"].lever
         assert (batch.traces["slide_m"][:, -1] > 0.2).all()

@@ -1,4 +1,4 @@
-"""What is pushed off its middle turns, a slope helps or hinders, and what tips too far falls."""
+"""Objects pushed beside their middle turn, slopes help or hinder, and tipped objects fall."""
 
 import math
 

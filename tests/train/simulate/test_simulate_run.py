@@ -120,7 +120,7 @@ class TestCommand:
         assert f"8 recordings in {tmp_path}" in err
         assert len(list(tmp_path.iterdir())) == 8
 
-    def test_explain_tells_what_runs_why_and_at_what_cost(self, tmp_path, capsys):
+    def test_explain_lists_effects_reasons_and_costs(self, tmp_path, capsys):
         path = tmp_path / "one.toml"
         path.write_text(
             "[trials]\ncount = 1\nafter_s = 0.3\n[step_s]\nbase = 0.01\n"
@@ -159,7 +159,7 @@ class TestCommand:
             write(demo, tmp_path / "file" / "folder")
 
 
-def test_touches_that_the_skin_does_not_feel_are_told(tmp_path, capsys):
+def test_simulate_counts_touches_that_the_skin_does_not_feel(tmp_path, capsys):
     path = tmp_path / "deaf.toml"
     path.write_text(
         "[trials]\ncount = 2\nafter_s = 0.3\n[step_s]\nbase = 0.01\n[effects.dead_band]\n"
@@ -179,7 +179,7 @@ def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
         assert write(felt, tmp_path).unfelt == unfelt
 
 
-def test_a_step_that_is_too_coarse_for_the_tolerance_is_told(tmp_path, capsys):
+def test_simulate_warns_of_a_step_beyond_the_tolerance(tmp_path, capsys):
     path = tmp_path / "light.toml"
     path.write_text(
         "[trials]\ncount = 1\nlead_s = 0.05\nafter_s = 0.15\n[labels]\nslides_m = 0.0\n[[object]]\n"

@@ -1,4 +1,4 @@
-"""A scene's file: what it may say, and the sentence that each mistake gets."""
+"""The keys of a scene's file, and the sentence that each mistake gets."""
 
 import copy
 import math

@@ -1,4 +1,4 @@
-"""Labels are what happened, whole families can be drawn, and what contradicts itself is refused."""
+"""Trials do what their labels say, and families are drawn from their ranges."""
 
 import math
 from dataclasses import replace
@@ -36,7 +36,7 @@ def scene(*objects, **rest):
 
 
 class TestLabels:
-    def test_what_is_called_movable_moves_within_the_window(self, tmp_path):
+    def test_a_movable_object_slides_within_the_window(self, tmp_path):
         one = scene(BOX, trials={"count": 12, "after_s": 1.4})
         stuck = (run(one).traces["slide_m"][:, :142].max(axis=1) < 0.02).sum()
         assert stuck > 0
@@ -55,11 +55,11 @@ class TestLabels:
         for name, trial in whole.items():
             assert trial.frames.tobytes() == single[name].frames.tobytes()
 
-    def test_what_never_moves_is_refused(self):
+    def test_a_movable_object_that_never_slides_is_refused(self):
         with pytest.raises(InputError, match=r"'box' is labelled movable.* moved 0 mm.*lower"):
             list(simulate(scene({**BOX, "mass_kg": 20.0})))
 
-    def test_what_never_yields_is_refused(self):
+    def test_a_soft_object_that_never_yields_is_refused(self):
         stone = {"name": "stone", "family": "foam", "conditions": ["fixed"], "modulus_pa": 1e9}
         with pytest.raises(InputError, match="'stone' is labelled soft.*lower its stiffness"):
             list(simulate(scene(stone)))
@@ -80,7 +80,7 @@ class TestLabels:
             ({"trials": {"count": 1, "after_s": 0.1}}, r"and the trial ended 0\.\d\d s.*after_s"),
         ],
     )
-    def test_what_cut_a_trial_short_is_told(self, change, says):
+    def test_the_error_says_what_ended_a_trial_early(self, change, says):
         with pytest.raises(InputError, match=r"the last moved \d+ mm, less than 20, " + says):
             list(simulate(scene({**BOX, "mass_kg": 1.0}, **change)))
 

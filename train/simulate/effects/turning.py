@@ -50,13 +50,13 @@ def pass_on(t: Trials, i: Index) -> None:
     turned = pick(own.per_metre, i) * pick(t.own["sliding"].slide, i)
     own.turned[i] = turned
     columns = turned * (t.skin.cols / (2.0 * math.pi))
-    some = (columns != 0.0).nonzero()[0]
-    if not some.size:
+    moving = (columns != 0.0).nonzero()[0]
+    if not moving.size:
         return
-    further = np.floor(columns[some])
-    part, trials, last = columns[some] - further, np.arange(t.n)[i][some], len(t.columns) - 1
+    further = np.floor(columns[moving])
+    part, trials, last = columns[moving] - further, np.arange(t.n)[i][moving], len(t.columns) - 1
     image = t.image.take(trials, -1)
-    moved, every = np.zeros_like(image), np.arange(len(some))
+    moved, every = np.zeros_like(image), np.arange(len(moving))
     for beyond, share in ((0, 1.0 - part), (1, part)):
         shared = image * share
         for column in range(last + 1):
