@@ -29,6 +29,7 @@ from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
+from train.arms import arm_of, joint_angles
 from train.kernels import MOST_TOUCHES, kernel_table
 from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
@@ -193,32 +194,6 @@ class DataSet:
         return {name: measures.feature(name).unit(self.layout) for name in self.names}
 
 
-def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Chain | None:
-    """The recording's arm: its `meta.arm`, else `unnamed`, else Cody's where it has five angles.
-
-    None without joint angles.
-    """
-    if recording.joints is None:
-        return None
-    dof = recording.joints.shape[1]
-    arm = recording.meta.get("arm")
-    if "arm" in recording.meta and arm is None:
-        return None  # the joints are not those of an arm that carries the skin
-    if arm is not None:
-        chain = Chain.from_dict(arm, where=f"{where}: meta.arm")
-    elif unnamed is not None:
-        chain = unnamed
-    else:
-        chain = Chain.cody()
-        if dof != chain.dof or recording.joint_names not in (None, chain.names):
-            raise InputError(f"{where}: has {dof} joint angles and names no arm; give --arm")
-    if recording.joint_names is not None:
-        recording.for_joints(chain.names, where)
-    elif dof != chain.dof:
-        raise InputError(f"{where}: has {dof} joint angles, its arm takes {chain.dof}")
-    return chain
-
-
 def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     """Read recordings, each file once.
 
@@ -302,7 +277,7 @@ def load_trials(
         for own, (_, path) in zip(arms, kept, strict=True):
             if own is not None and own.to_dict() != chain.to_dict():
                 raise InputError(f"{path}: its arm is not that of {kept[0][1]}; train on one arm")
-    joints = _joint_angles(kept) if needed else 0
+    joints = joint_angles(kept) if needed else 0
     names = tuple(feature.name for feature in types)
     settings = TrackSettings()
     trials: list[Trial] = []
@@ -386,17 +361,6 @@ def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None
         begin = round(threshold * ratio) if onset is None else onset
         return replace(layout, threshold_counts=threshold, onset_counts=begin)
     return layout if onset is None else replace(layout, onset_counts=onset)
-
-
-def _joint_angles(kept: Sequence[tuple[Recording, Path]]) -> int:
-    """The number of joint angles, the same for every recording."""
-    counts = [0 if r.joints is None else r.joints.shape[1] for r, _ in kept]
-    for count, (_, path) in zip(counts, kept, strict=True):
-        if count == 0:
-            raise InputError(f"{path}: has no joint angles; leave out the features made of them")
-        if count != counts[0]:
-            raise InputError(f"{path}: has {count} joint angles, {kept[0][1]} has {counts[0]}")
-    return counts[0]
 
 
 def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:

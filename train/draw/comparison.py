@@ -17,7 +17,8 @@ from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
 from edge.touch.track import ContactTracker
-from train.dataset import arm_of, contacts
+from train.arms import arm_of
+from train.dataset import contacts
 from train.draw.recording import curves, units
 
 MOST = 6

@@ -17,7 +17,7 @@ from edge.touch.features import FEATURES, WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
-from train.dataset import arm_of
+from train.arms import arm_of
 from train.draw.sketch import draw_side
 
 FRAMES = 6
