@@ -187,7 +187,7 @@ def _described(choice: Choice, fitted: Fitted) -> str:
     if choice.projection == "lda":
         how += f", shrinkage {choice.shrinkage:g}"
         if choice.targets:
-            how += f", with the discriminants of {' and '.join(choice.targets)} side by side"
+            how += f", with the discriminants of {', '.join(choice.targets)} side by side"
     plural = "s" * (choice.components != 1)
     return f"{how}, {choice.components} component{plural}, k = {choice.k}"
 
