@@ -97,9 +97,7 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
         return file
     baseline = np.zeros(file.layout.rows * file.layout.cols, dtype=np.uint16)
     for chip in file.chips:
-        for taxel in chip.taxels:
-            if taxel != UNUSED:
-                baseline[taxel] = chip.kind.rest(chip)
+        baseline[[taxel for taxel in chip.taxels if taxel != UNUSED]] = chip.kind.rest(chip)
     shape = file.layout.shape
     noise = np.full(shape, noise_counts)
     return replace(file, calibration=TaxelCalibration(baseline.reshape(shape), noise))

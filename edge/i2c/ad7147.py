@@ -151,9 +151,8 @@ class AD7147(Chip):
         yield
         for register, *_ in self._checks:
             if not self.healthy():
-                raise self.wrong(
-                    f"register {register:#04x} of the AD7147 does not keep what is written"
-                )
+                place = f"register {register:#04x} of the AD7147"
+                raise self.wrong(f"{place} does not keep what is written")
             yield
 
     def healthy(self) -> bool:

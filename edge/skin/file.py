@@ -101,8 +101,8 @@ class SkinFile:
     @property
     def uncovered(self) -> int:
         """Number of taxels that no chip serves."""
-        served = {t for chip in self.chips for t in chip.taxels} - {UNUSED}
-        return self.layout.rows * self.layout.cols - len(served)
+        taxels = self.layout.rows * self.layout.cols
+        return taxels - len({taxel for chip in self.chips for taxel in chip.taxels} - {UNUSED})
 
 
 def load(path: str | os.PathLike[str]) -> SkinFile:
