@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -21,11 +20,14 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
-import edge
 from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Touched, simulate
-from edge.commands.summary import wilson
+from edge.commands.replay import decide
+from edge.commands.summary import Summary
 from edge.errors import InputError
+from edge.model.model import Model
+from edge.model.stopping import UNKNOWN
 from edge.recording import load, save
+from edge.statistics import wilson
 from train.progress import bar
 from train.simulate import streams
 
@@ -47,10 +49,6 @@ HABITS: dict[str, dict[str, float]] = {
 SLIDES_M, WINDOW_S = 0.02, 1.2
 """A movable object has moved this far by the end of the window, as in the scenes and the paper."""
 DRAWS = 50
-FALSE_ALARMS = (0.02, 0.05, 0.1)
-
-Answers = dict[str, list[tuple[str, str]]]
-"""{task: (true, decided) of each trial}."""
 
 
 def draw_object(rng: np.random.Generator) -> Thing:
@@ -187,65 +185,39 @@ def _touch_object(
     raise InputError(f"transfer: object {index} was drawn {DRAWS} times and never moved")
 
 
-def decide(model: edge.Model, paths: list[Path]) -> tuple[Answers, list[float]]:
-    """The answers, and the rate of false alarms at which each trial is unknown.
+def score(model: Model, by_habit: Mapping[str, list[Path]]) -> str:
+    """Accuracies in all and by habit, the share called unknown, and each task's confusion.
 
-    A contact without a decision counts as wrong. The rates are empty where the model has no
-    decision points, and so calls nothing unknown.
+    A contact without a decision counts as wrong.
     """
-    answers: Answers = {t: [] for t in TASKS if t in model.info.tasks}
-    novelty, rates = model.info.novelty, []
-    for path in paths:
-        recording = load(path)
-        decided: dict[str, str] = {}
-        for event in edge.Classifier(model).classify(recording):
-            if not isinstance(event, edge.Decided) or event.task in decided:
-                continue
-            decided[event.task] = str(event.label)
-            if novelty is not None and event.task == novelty.task and event.decision:
-                distance = float(event.decision.distances[0])
-                rates.append(novelty.rate(len(novelty.limits) - 1, distance))
-        for task, pairs in answers.items():
-            pairs.append((recording.labels[task], decided.get(task, "no decision")))
-    return answers, rates
+    scored = {task: kind for task, kind in model.info.tasks.items() if task in TASKS}
+    every, unknown = Summary(scored), 0
+    lines = [f"{'right':<20}" + "".join(f"{task:>26}" for task in scored)]
+    for habit, paths in by_habit.items():
+        summary = Summary(scored)
+        for path in paths:
+            recording = load(path)
+            events = decide(model, recording, str(path))
+            unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
+            summary.add(recording.labels, events)
+            every.add(recording.labels, events)
+        if paths:
+            lines.append(row(habit, summary))
+    lines.insert(1, row("all", every))
+    lines.append(f"{'unknown':<20}{share(unknown, every.recordings):>26}")
+    return "\n".join(lines) + "\n\n" + every.text()
+
+
+def row(name: str, summary: Summary) -> str:
+    """A line of the table: the right decisions of each task."""
+    cells = "".join(f"{share(*summary.right(task)):>26}" for task in summary.tasks)
+    return f"{name:<20}{cells} of {summary.recordings}"
 
 
 def share(count: int, total: int) -> str:
     """A percentage with its 95 % interval."""
     low, high = wilson(count, total)
     return f"{100 * count / total:6.1f} %  ({100 * low:.0f} to {100 * high:.0f})"
-
-
-def report(by_habit: dict[str, list[Path]], answers: Answers, rates: list[float]) -> str:
-    """Accuracies in all and by habit, shares called unknown, and the confusion of each task.
-
-    Args:
-        by_habit: the trials, in the order of the answers.
-        answers, rates: of `decide`.
-    """
-    lines = [f"{'right':<20}" + "".join(f"{task:>26}" for task in answers)]
-    first = 0
-    spans = {"all": slice(None)}
-    for habit, paths in by_habit.items():
-        spans[habit] = slice(first, first + len(paths))
-        first += len(paths)
-    for habit, span in spans.items():
-        right = [[true == decided for true, decided in pairs[span]] for pairs in answers.values()]
-        if right[0]:
-            cells = "".join(f"{share(sum(each), len(each)):>26}" for each in right)
-            lines.append(f"{habit:<20}{cells} of {len(right[0])}")
-    lines.append("")
-    for alarms in FALSE_ALARMS if rates else ():
-        count = sum(rate <= alarms for rate in rates)
-        lines.append(f"unknown   {share(count, len(rates))} at {alarms:.0%} false alarms")
-    for task, pairs in answers.items():
-        counts = Counter(pairs)
-        names = sorted({name for pair in pairs for name in pair})
-        lines += ["", f"{task}: true in rows, decided in columns"]
-        lines.append(" " * 16 + "".join(f"{name[:14]:>15}" for name in names))
-        for true in sorted({true for true, _ in pairs}):
-            lines.append(f"{true:<16}" + "".join(f"{counts[true, name]:>15}" for name in names))
-    return "\n".join(lines)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -260,8 +232,7 @@ def main(arguments: list[str] | None = None) -> int:
         paths, again = make_trials(
             options.out / f"seed{options.seed}", options.trials, options.seed
         )
-        model = edge.Model(options.model)
-        text = report(paths, *decide(model, [path for each in paths.values() for path in each]))
+        text = score(Model(options.model), paths)
     except InputError as error:
         print(f"transfer: {error}", file=sys.stderr)
         return 2

@@ -35,6 +35,17 @@ class Summary:
         for task in self._pairs.keys() & labels:
             self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
 
+    @property
+    def tasks(self) -> list[str]:
+        """The tasks that are compared."""
+        return list(self._pairs)
+
+    def right(self, task: str) -> tuple[int, int]:
+        """The number of right decisions, and of labelled recordings, of a task."""
+        pairs = self._pairs[task]
+        right = sum(n for (truth, decided), n in pairs.items() if truth == decided)
+        return right, pairs.total()
+
     def text(self) -> str:
         """One table for each task: a row for each true label, a column for each decided one."""
         paragraphs = [_count(self.recordings, "recording")]
@@ -46,11 +57,10 @@ class Summary:
                 "and `edge-classify info` print, does."
             )
         for task, pairs in self._pairs.items():
-            total, name = pairs.total(), printable(task)
+            name, (right, total) = printable(task), self.right(task)
             if total == 0:
                 paragraphs.append(f"{name}: no recording has a label")
                 continue
-            right = sum(n for (truth, decided), n in pairs.items() if truth == decided)
             low, high = wilson(right, total)
             paragraphs.append(
                 f"{name}: {right} of {total} right, {right / total:.2%} (95 % interval "
