@@ -59,7 +59,7 @@ def loop() -> None:
     for bus in buses:
         bus.__class__ = SlowBus
     page = Page(f"127.0.0.1:{PORT}", file.layout, title="ticks", decides=True)
-    with Skin(file, buses, clock=clock) as skin, page.server:
+    with Skin(file, buses, clock=clock) as skin, closing(page.server):
         skin.start()
         scene.start = clock.now()
         classifier = Classifier(model, skin.layout)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -118,9 +118,7 @@ class Classifier:
                 (0, 1), or the model certifies the error rate for no task.
         """
         check_rate(novelty_rate, "the novelty rate")
-        self._rules: dict[str, StoppingRule | None] = {}
-        if error is not None:
-            self._rules = stopping_rules(model, error)
+        self._rules = {} if error is None else stopping_rules(model, error)
         self.model, self.error, self.novelty_rate = model, error, novelty_rate
         self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
         self.tracker = model.info.tracker(
@@ -145,11 +143,10 @@ class Classifier:
         events: list[Event] = []
         self._end_s = frame.t
         if self._begun == 0:
-            readable = True if frame.valid is None else frame.valid
+            readable = np.True_ if frame.valid is None else frame.valid
             strongest = int(frame.counts.max(initial=0, where=readable))
             self._strongest = max(self._strongest, strongest)
-        if frame.valid is not None and self._begun == 0 and not self._missing_taxels:
-            self._missing_taxels = bool((self.layout.alive & ~frame.valid).any())
+            self._missing_taxels |= bool((self.layout.alive & ~readable).any())
         for contact in self.tracker.push(frame):
             number = self._numbers.get(contact)
             if number is None:
@@ -183,11 +180,8 @@ class Classifier:
     def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
         """Decisions on a stream without contact, for the tasks that have a label for it."""
         near = self._strongest > self.layout.threshold_counts
-        flags = (
-            "no_contact",
-            *(("missing_taxels",) if self._missing_taxels else ()),
-            *(("near_contact",) if near else ()),
-        )
+        raised = {"no_contact": True, "missing_taxels": self._missing_taxels, "near_contact": near}
+        flags = tuple(flag for flag in raised if raised[flag])
         strongest = round(self._strongest / max(self.layout.onset, 1), 3)
         for name, task in self.model.info.tasks.items():
             if task.no_contact is not None:
@@ -209,10 +203,7 @@ class Classifier:
         if not (self._motion_on_skin and recording.joints is None):
             joints = recording.joints
             require_joints(self.model, None if joints is None else joints.shape[1], "the recording")
-        fresh = self._fresh(recording.layout)
-        for frame in recording:
-            yield from fresh.push(frame)
-        yield from fresh.finish()
+        yield from self._afresh(recording.layout, recording)
 
     def watch(
         self, skin: Skin, *, joints: JointSource | None = None, lasts_s: float = math.inf
@@ -232,13 +223,11 @@ class Classifier:
 
         if joints is None and not self._motion_on_skin:
             require_joints(self.model, None, "the skin")
-        fresh = self._fresh(skin.layout)
-        for frame in Loop(skin, joints=joints, lasts_s=lasts_s).frames():
-            yield from fresh.push(frame)
-        yield from fresh.finish()
+        yield from self._afresh(skin.layout, Loop(skin, joints=joints, lasts_s=lasts_s).frames())
 
-    def _fresh(self, layout: SkinLayout) -> Classifier:
-        return Classifier(
+    def _afresh(self, layout: SkinLayout, frames: Iterable[Frame]) -> Iterator[Event]:
+        """The events of a stream of its own, with this classifier's settings."""
+        fresh = Classifier(
             self.model,
             layout,
             error=self.error,
@@ -246,6 +235,9 @@ class Classifier:
             max_contacts=self._max_contacts,
             motion_on_skin=self._motion_on_skin,
         )
+        for frame in frames:
+            yield from fresh.push(frame)
+        yield from fresh.finish()
 
     def _named(self, number: int) -> int | None:
         """The contact's number if several are followed at once, else None."""
@@ -260,17 +252,14 @@ class Classifier:
         window_s = self.model.decision_points_s[decision_point]
         contact, series = waiting.contact, waiting.contact.series()
         longest_s = np.diff(np.minimum(series.t, window_s)).max(initial=0.0)
-        flags = tuple(
-            flag
-            for flag, raised in (
-                ("short", short),
-                ("gap", longest_s > max(GAP_SHARE * window_s, GAP_S)),
-                ("missing_taxels", contact.missing_taxels),
-                ("missing_pose", contact.missing_pose),
-                ("skin_motion", contact.chain is None and info.chain is not None),
-            )
-            if raised
-        )
+        raised = {
+            "short": short,
+            "gap": longest_s > max(GAP_SHARE * window_s, GAP_S),
+            "missing_taxels": contact.missing_taxels,
+            "missing_pose": contact.missing_pose,
+            "skin_motion": contact.chain is None and info.chain is not None,
+        }
+        flags = tuple(flag for flag in raised if raised[flag])
         position = None
         if self._max_contacts > 1 and (at := contact.position()) is not None:
             x, y, z = (round(value, 6) for value in at)
@@ -287,7 +276,10 @@ class Classifier:
         except InputError:
             answers = [replace(answer, flags=(*flags, OUT_OF_RANGE)) for answer in answers]
         else:
-            novel = self._novel(decision_point, decisions)
+            novel, novelty = 1.0, info.novelty
+            if novelty is not None:
+                distance = float(decisions[novelty.task].distances[0])
+                novel = novelty.rate(decision_point, distance)
             for blank in answers:
                 answer = self._answer(waiting, blank, decisions[blank.task], novel)
                 if answer is not None:
@@ -299,13 +291,6 @@ class Classifier:
         latency_ms = round((time.perf_counter() - began) * 1e3, 3)
         return [replace(answer, latency_ms=latency_ms) for answer in answers]
 
-    def _novel(self, decision_point: int, decisions: dict[str, Decision]) -> float:
-        """The smallest novelty rate at which the contact counts as unknown."""
-        novelty = self.model.info.novelty
-        if novelty is None:
-            return 1.0
-        return novelty.rate(decision_point, float(decisions[novelty.task].distances[0]))
-
     def _answer(
         self, waiting: _Waiting, blank: Decided, decision: Decision, novel: float
     ) -> Decided | None:
@@ -315,7 +300,7 @@ class Classifier:
             waiting: the contact.
             blank: the task's answer, without a label yet.
             decision: of the model.
-            novel: from `_novel`.
+            novel: the smallest novelty rate at which the contact counts as unknown.
         """
         if self.model.info.trials:
             names = tuple(map(self.model.info.trial, decision.neighbours.tolist()))

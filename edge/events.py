@@ -142,10 +142,7 @@ def json_line(event: Mapping[str, Any]) -> str:
     >>> json_line({"label": "Bär", "confidence": float("nan")})
     '{"label": "B\\\\u00e4r", "confidence": null}'
     """
-    try:
-        return json.dumps(event, allow_nan=False)
-    except ValueError:
-        return json.dumps(_finite(event), allow_nan=False)
+    return json.dumps(_finite(event), allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

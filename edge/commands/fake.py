@@ -93,10 +93,9 @@ def plug(file: SkinFile, recording: str, noise: float, output: Output) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings and print the commands to rehearse with, or plug the skin in."""
+    file, output = load(arguments.skin), Output.of(arguments)
     if arguments.plug is not None:
-        file, output = load(arguments.skin), Output.of(arguments)
         return plug(file, arguments.plug, arguments.noise, output)
-    file = load(arguments.skin)
     folder, rest = arguments.out / "touches", arguments.out / "still.npz"
     save(rest, still(file, STILL_S))
     paths = []
@@ -112,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
     }
     skin, first = arguments.skin, paths[0]
     frames = round(STILL_S * file.reading.rate_hz)
-    Output.of(arguments).event(
+    output.event(
         event,
         f"{folder}: {len(paths)} labelled touches of 4 objects\n{rest}: no touch\n\n"
         "Rehearse with them:\n"

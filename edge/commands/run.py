@@ -104,10 +104,8 @@ def run(arguments: argparse.Namespace) -> int:
     model = Model(arguments.model)
     check_error(model, arguments.error)
     on_skin = arguments.without_joints == "skin"
-    with (
-        Notifier(now=time.monotonic) as notifier,
-        reading(arguments, model=model, needs_joints=not on_skin, decides=True) as live,
-    ):
+    notifier = Notifier(now=time.monotonic)
+    with reading(arguments, model=model, needs_joints=not on_skin, decides=True) as live:
         classifier = Classifier(
             model,
             live.skin.layout,

@@ -276,6 +276,6 @@ def reading(
             from edge.runtime.page import Page  # a skin without a page needs no web server
 
             live = Page(arguments.web, opened.skin.layout, title=opened.source, **page)
-            stack.enter_context(live.server)
+            stack.callback(live.server.close)
             LOG.info(f"open {live.server.link} in a browser")
         yield Reading(**vars(opened), loop=loop, stop=stop, page=live, output=Output.of(arguments))

@@ -25,16 +25,12 @@ class Notifier:
             now: a clock in seconds that never goes back.
         """
         self._now = now
-        self._socket: socket.socket | None = None
         address = environment.get("NOTIFY_SOCKET", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
-        if address[:1] in ("@", "/"):
-            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
-            self._socket.setblocking(False)
         self.period_s = _watchdog_s(environment) / 2.0
         """Half of the time that the manager allows between two signs of life; infinity if it does
         not watch."""
-        self._due = now()
+        self._due = NEVER if self.period_s == NEVER else now()
 
     def ready(self, status: str = "") -> None:
         """Report that the service is working."""
@@ -42,8 +38,6 @@ class Notifier:
 
     def alive(self) -> None:
         """Send a sign of life if one is due; call it in each round of the loop."""
-        if self.period_s == NEVER:
-            return
         now = self._now()
         if now >= self._due:
             self._due = now + self.period_s
@@ -53,31 +47,19 @@ class Notifier:
         """Report that the service is ending."""
         self._send("STOPPING=1")
 
-    def close(self) -> None:
-        """Close the socket; twice is fine."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-
-    def __enter__(self) -> Notifier:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _send(self, text: str) -> None:
-        if self._socket is not None:
-            # A manager that has gone, or is too busy to listen, must not end the service.
-            with suppress(OSError):
-                self._socket.sendto(text.encode(), self._address)
+        if self._address[:1] not in ("\0", "/"):
+            return
+        kind = socket.SOCK_DGRAM | socket.SOCK_NONBLOCK
+        # A manager that has gone, or is too busy to listen, must not end the service.
+        with suppress(OSError), socket.socket(socket.AF_UNIX, kind) as sender:
+            sender.sendto(text.encode(), self._address)
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float:
     """Longest time in seconds between two signs of life that the manager allows."""
-    if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
+    microseconds = environment.get("WATCHDOG_USEC", "")
+    watched = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+    if not (watched and microseconds.isdecimal() and int(microseconds)):
         return NEVER
-    try:
-        microseconds = int(environment["WATCHDOG_USEC"])
-    except (KeyError, ValueError):
-        return NEVER
-    return microseconds * 1e-6 if microseconds > 0 else NEVER
+    return int(microseconds) * 1e-6

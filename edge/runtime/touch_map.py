@@ -72,13 +72,11 @@ def map_writer(
     if os.path.lexists(name):
         with open_regular(name, LARGEST_BYTES) as former:
             start = former.read(LONGEST_LINE)
+            first = next(_entries(start.split(b"\n"), name), None)
+            if first is not None:
+                _head(name, *first, head)
             # A full disk may have cut the first line short.
-            short = b'{"event": "map"'.startswith(start[:15])
-            for number, entry in _entries(start.split(b"\n"), name):
-                _check_frame(name, number, _head(name, number, entry), head)
-                short = True
-                break
-            if not short:
+            elif not b'{"event": "map"'.startswith(start[:15]):
                 raise InputError(f"{name}: {NOT_A_MAP}")
             former.seek(-min(len(start), 1), os.SEEK_END)
             torn = former.read() not in (b"", b"\n")
@@ -114,23 +112,24 @@ def _entries(lines: Iterable[bytes], name: str) -> Iterator[tuple[int, dict[str,
                 yield number, entry
 
 
-def _head(name: str, number: int, entry: Mapping[str, Any]) -> Head:
-    with suppress(KeyError, TypeError):
-        if entry["event"] == "map":
-            return Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
-    raise _no_line(name, number)
+def _head(name: str, number: int, entry: Mapping[str, Any], former: Head | None = None) -> Head:
+    """The head of a run, which must be in the frame of a former one, if there is one."""
+    try:
+        head = Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
+    except (KeyError, TypeError):
+        raise _no_line(name, number) from None
+    if entry.get("event") != "map":
+        raise _no_line(name, number)
+    if former is not None and head[:2] != former[:2]:
+        raise InputError(
+            f"{name}: line {number} begins a run in the frame {head.frame} ({head.unit}), another "
+            f"is in {former.frame} ({former.unit}); keep a map for each"
+        )
+    return head
 
 
 def _no_line(name: str, number: int) -> InputError:
     return InputError(f"{name}: line {number} is not of a map; give a file that `run --map` wrote")
-
-
-def _check_frame(name: str, number: int, run: Head, first: Head) -> None:
-    if run[:2] != first[:2]:
-        raise InputError(
-            f"{name}: line {number} begins a run in the frame {run.frame} ({run.unit}), another is "
-            f"in {first.frame} ({first.unit}); keep a map for each"
-        )
 
 
 class TouchMap:
@@ -162,9 +161,7 @@ class TouchMap:
         waiting: dict[tuple[int, float], Touch] = {}
         for number, entry in self._entries():
             if entry.get("event") == "map":
-                head = _head(self.path, number, entry)
-                _check_frame(self.path, number, head, self.head)
-                tasks, waiting = head.tasks, {}
+                tasks, waiting = _head(self.path, number, entry, self.head).tasks, {}
                 continue
             try:
                 key = int(entry["contact"]), float(entry["onset_s"])

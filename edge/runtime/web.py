@@ -115,14 +115,6 @@ class WebServer:
         self._http.shutdown()
         self._http.server_close()
 
-    def __enter__(self) -> WebServer:
-        """The server itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop serving."""
-        self.close()
-
     def next_picture(self, seen: int) -> tuple[int, bytes]:
         """The number and the event of the first picture after `seen`; a comment if none comes."""
         with self.changed:

@@ -1,5 +1,7 @@
 """The live page: what it shows of frames, contacts and decisions, and what it does with trials."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,7 @@ def pictures(monkeypatch):
 @pytest.fixture
 def page(tmp_path):
     page = Page("127.0.0.1:0", LAYOUT, title="pad", folder=tmp_path)
-    with page.server:
+    with closing(page.server):
         yield page
 
 
@@ -110,7 +112,7 @@ def test_an_action_that_makes_no_sense_is_refused(page, action):
 
 def test_a_page_without_a_folder_changes_nothing():
     page = Page("127.0.0.1:0", LAYOUT, title="pad")
-    with page.server, pytest.raises(InputError, match="record --web"):
+    with closing(page.server), pytest.raises(InputError, match="record --web"):
         page._act({"do": "labels", "labels": {"object": "box"}})
 
 
@@ -120,7 +122,7 @@ def test_trials_of_the_folder_are_relabelled_and_deleted(tmp_path):
         edge.save(tmp_path / name, trial)
 
     page = Page("127.0.0.1:0", trial.layout, title="pad", folder=tmp_path)
-    with page.server:
+    with closing(page.server):
         page._act({"do": "relabel", "file": "a.npz", "labels": {"object": "sponge"}})
         page._act({"do": "delete", "file": "b.npz"})
 
@@ -160,7 +162,7 @@ class TestInABrowser:
 
     def test_a_wrong_token_shows_nothing(self):
         page = Page("0.0.0.0:0", LAYOUT, title="pad")
-        with page.server, chromium(390) as browser:
+        with closing(page.server), chromium(390) as browser:
             browser.get(f"http://127.0.0.1:{page.server.port}/?token=wrong")
 
             assert browser.find_elements("id", "skin") == []

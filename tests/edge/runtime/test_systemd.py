@@ -40,9 +40,9 @@ def said(listener):
 
 def test_ready_and_stopping_are_one_datagram_each(manager, clock):
     listener, address = manager
-    with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:
-        notifier.ready("reading skin.toml")
-        notifier.stopping()
+    notifier = Notifier({"NOTIFY_SOCKET": address}, now=clock)
+    notifier.ready("reading skin.toml")
+    notifier.stopping()
     assert said(listener) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
 
 
@@ -52,10 +52,10 @@ def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_g
     listener, address = manager
     environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "10000000"}
     environment["WATCHDOG_PID"] = str(os.getpid())
-    with Notifier(environment, now=clock) as notifier:
-        for tick in range(2001):  # 20 s at 100 Hz
-            clock.t = 100.0 + tick / 100
-            notifier.alive()
+    notifier = Notifier(environment, now=clock)
+    for tick in range(2001):  # 20 s at 100 Hz
+        clock.t = 100.0 + tick / 100
+        notifier.alive()
     assert said(listener) == ["WATCHDOG=1"] * 5
 
 
@@ -78,10 +78,10 @@ def test_a_name_in_the_abstract_namespace(clock):
 )
 def test_nobody_watches(manager, clock, environment):
     listener, address = manager
-    with Notifier({**environment, "NOTIFY_SOCKET": address}, now=clock) as notifier:
-        notifier.alive()
-        clock.t += 1000.0
-        notifier.alive()
+    notifier = Notifier({**environment, "NOTIFY_SOCKET": address}, now=clock)
+    notifier.alive()
+    clock.t += 1000.0
+    notifier.alive()
     assert said(listener) == []
 
 
@@ -89,20 +89,18 @@ def test_nobody_watches(manager, clock, environment):
 def test_without_a_manager_no_socket_is_opened(clock, address, monkeypatch):
     opened = []
     monkeypatch.setattr(socket, "socket", lambda *kind: opened.append(kind))
-    with Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1"}, now=clock) as notifier:
-        notifier.ready()
-        notifier.alive()
-        notifier.stopping()
+    notifier = Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1"}, now=clock)
+    notifier.ready()
+    notifier.alive()
+    notifier.stopping()
     assert opened == []
 
 
 def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(tmp_path, clock):
     address = str(tmp_path / "notify")
     environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "2000000"}
-    with (
-        Notifier(environment, now=clock) as notifier,
-        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener,
-    ):
+    notifier = Notifier(environment, now=clock)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         notifier.ready()
         notifier.alive()
         listener.bind(address)
@@ -114,7 +112,7 @@ def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(tmp_p
 
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, clock):
     listener, address = manager
-    with Notifier({"NOTIFY_SOCKET": address}, now=clock) as notifier:
-        for _ in range(10_000):  # far more than a socket's queue takes
-            notifier.stopping()
+    notifier = Notifier({"NOTIFY_SOCKET": address}, now=clock)
+    for _ in range(10_000):  # far more than a socket's queue takes
+        notifier.stopping()
     assert 1 <= len(said(listener)) < 10_000

@@ -4,6 +4,7 @@ import http.client
 import json
 import socket
 import time
+from contextlib import closing
 
 import pytest
 
@@ -38,7 +39,7 @@ def taken():
 
 @pytest.fixture
 def server(taken):
-    with WebServer("127.0.0.1:0", taken.append) as server:
+    with closing(WebServer("127.0.0.1:0", taken.append)) as server:
         yield server
 
 
@@ -101,7 +102,7 @@ def test_what_is_no_action_is_refused(server, taken, body, kind):
 
 
 def test_an_action_that_fails_says_why():
-    with WebServer("127.0.0.1:0", refuse) as server:
+    with closing(WebServer("127.0.0.1:0", refuse)) as server:
         status, _, body = post(server, {"do": "relabel"})
 
     assert (status, body) == (400, b"relabel is not possible")
@@ -112,7 +113,7 @@ class TestElsewhere:
 
     @pytest.fixture
     def server(self):
-        with WebServer("0.0.0.0:0", refuse) as server:
+        with closing(WebServer("0.0.0.0:0", refuse)) as server:
             yield server
 
     def test_without_the_token_nothing_is_served(self, server):
@@ -131,7 +132,7 @@ class TestElsewhere:
         assert ask(server, "/page.js", Cookie=cookie.partition(";")[0])[0] == 200
 
     def test_each_start_has_a_token_of_its_own(self, server):
-        with WebServer("0.0.0.0:0", refuse) as other:
+        with closing(WebServer("0.0.0.0:0", refuse)) as other:
             assert len({server.token, other.token}) == 2
             assert len(server.token) >= 16
 
