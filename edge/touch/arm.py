@@ -17,6 +17,7 @@ from edge.errors import InputError
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
+STEPS = ("origin_xyz", "origin_rpy", "translate")
 MOVING = ("revolute", "continuous", "prismatic")
 
 
@@ -43,9 +44,8 @@ class _Link(NamedTuple):
 
     slides: bool
     direction: Vector
-    turn: tuple[float, ...] | None
-    """(9,) the fixed step's rotation matrix, row by row; None if the step does not turn."""
-    shift: tuple[float, ...]
+    step: tuple[float, ...]
+    """(12,) the first three rows of the fixed step's transform."""
 
 
 class Chain:
@@ -76,14 +76,15 @@ class Chain:
             fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
             if joint.kind != "fixed":
                 self._moving.append(joint)
-                self._links.append(_link(joint, fixed))
+                slides = joint.kind == "prismatic"
+                self._links.append(_Link(slides, _direction(joint), _rows(fixed)))
                 steps.append((fixed, *(fixed @ generator for generator in _generators(joint))))
                 fixed = np.eye(4)
             fixed = fixed @ _transform(joint.translate, ZERO)
         self._steps = np.array(steps).reshape(-1, 3, 4, 4)
         self._after = fixed
-        self._tip = tuple(fixed[:3].ravel().tolist())
-        self._slides = np.array([j.kind == "prismatic" for j in self._moving], dtype=bool)
+        self._tip = _rows(fixed)
+        self._slides = np.array([link.slides for link in self._links], dtype=bool)
 
     @property
     def dof(self) -> int:
@@ -155,13 +156,7 @@ class Chain:
         angles = np.asarray(q).tolist()
         if len(angles) != self.dof or not math.isfinite(sum(map(abs, angles))):
             self.pose(q)  # raises
-        x, y, z = position
-        a, b, c, tx, d, e, h, ty, i, j, k, tz = self._tip
-        x, y, z = (
-            a * x + b * y + c * z + tx,
-            d * x + e * y + h * z + ty,
-            i * x + j * y + k * z + tz,
-        )
+        x, y, z = _moved(self._tip, *position)
         for angle, link in zip(reversed(angles), reversed(self._links), strict=True):
             kx, ky, kz = link.direction
             if link.slides:
@@ -173,24 +168,16 @@ class Chain:
                 x += f * ax + g * (ky * az - kz * ay)
                 y += f * ay + g * (kz * ax - kx * az)
                 z += f * az + g * (kx * ay - ky * ax)
-            if link.turn is not None:
-                a, b, c, d, e, h, i, j, k = link.turn
-                x, y, z = a * x + b * y + c * z, d * x + e * y + h * z, i * x + j * y + k * z
-            tx, ty, tz = link.shift
-            x, y, z = x + tx, y + ty, z + tz
+            x, y, z = _moved(link.step, x, y, z)
         return x, y, z
 
     def to_dict(self) -> dict[str, Any]:
         """The chain as a JSON object, which keeps every number exactly."""
         joints = []
         for j in self.joints:
-            entry: dict[str, Any] = {"name": j.name, "axis": list(j.axis), "type": j.kind}
-            for key in ("origin_xyz", "origin_rpy", "translate"):
-                if getattr(j, key) != ZERO:
-                    entry[key] = list(getattr(j, key))
-            if j.limits is not None:
-                entry["limits"] = list(j.limits)
-            joints.append(entry)
+            more = {key: getattr(j, key) for key in (*STEPS, "limits")}
+            given = {key: list(value) for key, value in more.items() if value not in (ZERO, None)}
+            joints.append({"name": j.name, "axis": list(j.axis), "type": j.kind, **given})
         return {"base": self.base, "tip": self.tip, "joint": joints}
 
     @classmethod
@@ -279,10 +266,6 @@ def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
 
 
 def _check_joint(joint: Joint) -> None:
-    if joint.kind not in (*MOVING, "fixed"):
-        raise InputError(
-            f"joint {joint.name}: type {joint.kind!r} is not one of {', '.join((*MOVING, 'fixed'))}"
-        )
     numbers = (math.hypot(*joint.axis), *joint.origin_xyz, *joint.origin_rpy, *joint.translate)
     if not all(math.isfinite(x) for x in numbers):
         raise InputError(f"joint {joint.name}: a number is not finite")
@@ -295,9 +278,15 @@ def _check_joint(joint: Joint) -> None:
         )
 
 
-def _link(joint: Joint, before: NDArray[np.float64]) -> _Link:
-    turn = None if (before[:3, :3] == np.eye(3)).all() else tuple(before[:3, :3].ravel().tolist())
-    return _Link(joint.kind == "prismatic", _direction(joint), turn, tuple(before[:3, 3].tolist()))
+def _rows(step: NDArray[np.float64]) -> tuple[float, ...]:
+    """The first three rows of a transform as plain numbers (12,)."""
+    return tuple(step[:3].ravel().tolist())
+
+
+def _moved(step: tuple[float, ...], x: float, y: float, z: float) -> Vector:
+    """A point after a fixed step."""
+    a, b, c, tx, d, e, f, ty, g, h, i, tz = step
+    return a * x + b * y + c * z + tx, d * x + e * y + f * z + ty, g * x + h * y + i * z + tz
 
 
 def _direction(joint: Joint) -> Vector:
@@ -336,10 +325,7 @@ def _joint_from(table: ConfigTable, index: int) -> Joint:
     if table.has("name"):
         # The joints of a URDF have no order, so an error names the joint and not its number.
         table.prefix = f"joint {shown(name)}: "
-    steps: dict[str, Vector] = {}
-    for key in ("origin_xyz", "origin_rpy", "translate"):
-        if table.has(key):
-            steps[key] = _vector(table, key)
+    steps = {key: _vector(table, key) for key in STEPS if table.has(key)}
     limits = None
     for key, unit in (("limits", 1.0), ("limits_deg", math.pi / 180.0)):
         if table.has(key):

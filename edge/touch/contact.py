@@ -105,7 +105,7 @@ class _Row(NamedTuple):
 
     t: float
     motion: float
-    force_motion: float
+    force_motion: float | None
     counted: NDArray[np.int64]
     taxels: NDArray[np.int64] | None
     kernel_cells: NDArray[np.int64] | None
@@ -157,7 +157,7 @@ class Contact:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         zones = measurer.measure(active, region)
         plain = [0] * PLAIN
-        motion, force_motion = 0.0, 0.0
+        motion, force_motion = 0.0, 0.0 if measurer.force_motion else None
         if region is not None:
             self.region, self.joints = region, frame.joints
             plain[:2] = region.peak, region.area
@@ -214,7 +214,7 @@ class Contact:
         self, centroid: tuple[float, float], joints: NDArray[np.float64] | None
     ) -> Vector | None:
         """Where a point of the skin lies; None where an arm's joint angles are not known."""
-        point = self.layout.point(*centroid)
+        point = self.layout.position(*centroid)
         if self.chain is None:
             return point
         return None if joints is None else self.chain.point(joints, point)
@@ -231,27 +231,22 @@ class Contact:
 
     def series(self) -> FeatureSeries:
         """What was measured so far; later frames leave it as it is."""
-        measurer, rows = self._measurer, self._rows
-        counted = np.array([row.counted for row in rows]).reshape(-1, PLAIN + measurer.width)
+        measured: dict[str, Any] = {
+            name: None if values[0] is None else np.array(values)
+            for name, values in zip(_Row._fields, zip(*self._rows, strict=True), strict=True)
+        }
+        counted = measured.pop("counted")
         zones = counted[:, PLAIN:]
-        force_motion = np.array([row.force_motion for row in rows])
         return FeatureSeries(
-            t=np.array([row.t for row in rows]),
+            **measured,
             peak=counted[:, 0],
             area=counted[:, 1],
             sums=counted[:, 2:PLAIN],
-            motion=np.array([row.motion for row in rows]),
             counts_per_newton=self.layout.counts_per_newton,
             ended=self.ended,
             release_s=self.layout.release_s,
-            zones={zone: zones[:, columns] for zone, columns in measurer.columns.items()},
-            force_motion=force_motion if measurer.force_motion else None,
+            zones={zone: zones[:, columns] for zone, columns in self._measurer.columns.items()},
             turn=self.layout.cols if self.layout.wraps else None,
-            taxels=np.array([row.taxels for row in rows]) if measurer.cells else None,
-            kernel_cells=(
-                np.array([row.kernel_cells for row in rows]) if measurer.kernel_cells else None
-            ),
-            joints=np.array([row.joints for row in rows]) if measurer.joints else None,
             threshold_counts=self.layout.threshold_counts,
             pitch=self.layout.pitch[0],
         )

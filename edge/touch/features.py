@@ -192,19 +192,16 @@ class _Course:
             values = np.array([self._measured(f) for f in group], dtype=np.float64)
         known = np.isfinite(values)
         complete = known.all(axis=1)
-        if complete.all():
-            sampled = _resample(times, t, values)
-        else:
-            for feature, row in zip(group, values, strict=False):
-                if np.isinf(row).any():
-                    raise InputError(
-                        f"{feature.name} is too large for a number of 64 bits; look at the skin's "
-                        "counts_per_newton and pitch_m"
-                    )
-            sampled = np.zeros((len(values), len(times)))
-            sampled[complete] = _resample(times, t, values[complete])
-            for i in np.flatnonzero(~complete & known.any(axis=1)):
-                sampled[i] = _resample(times, t[known[i]], values[i, known[i]])
+        for feature, row in zip(group, values, strict=False):
+            if np.isinf(row).any():
+                raise InputError(
+                    f"{feature.name} is too large for a number of 64 bits; look at the skin's "
+                    "counts_per_newton and pitch_m"
+                )
+        sampled = np.zeros((len(values), len(times)))
+        sampled[complete] = _resample(times, t, values[complete])
+        for i in np.flatnonzero(~complete & known.any(axis=1)):
+            sampled[i] = _resample(times, t[known[i]], values[i, known[i]])
         if first.quantity == "taxel_force":
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
@@ -368,18 +365,10 @@ def _resample(
     The fraction of a step is computed before it multiplies a difference of values, as a slope over
     a very short step could overflow.
     """
-    after = t.searchsorted(times, side="right")
-    np.maximum(after, 1, out=after)
-    np.minimum(after, max(t.size - 1, 1), out=after)
-    before = after - 1
-    if t.size == 1:
-        after = before
-    start = t[before]
-    step = t[after] - start
+    after = np.clip(t.searchsorted(times, side="right"), 1, t.size - 1)
+    before = np.maximum(after - 1, 0)
+    step = t[after] - t[before]
     step[step == 0.0] = 1.0
-    fraction = times - start
-    fraction /= step
-    np.maximum(fraction, 0.0, out=fraction)
-    np.minimum(fraction, 1.0, out=fraction)
+    fraction = np.clip((times - t[before]) / step, 0.0, 1.0)
     low, high = values.take(before, axis=-1), values.take(after, axis=-1)
     return np.asarray(np.where(fraction == 1.0, high, low + fraction * (high - low)))

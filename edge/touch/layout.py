@@ -104,11 +104,7 @@ class SkinLayout:
         """Distance between taxels along the rows and along the columns; 1 if unknown."""
         return self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
 
-    def position(self, row: float, col: float) -> NDArray[np.float64]:
-        """The result of `point` as an array (3,)."""
-        return np.array(self.point(row, col))
-
-    def point(self, row: float, col: float) -> tuple[float, float, float]:
+    def position(self, row: float, col: float) -> tuple[float, float, float]:
         """(x, y, z) of a point of the surface in the link's frame.
 
         Args:
@@ -155,12 +151,11 @@ class SkinLayout:
             InputError: a value is missing or impossible; `where` names the file.
         """
         table = ConfigTable(skin, where, "skin.")
-        known: dict[str, Any] = {}
-        for name in ("rows", "cols"):
-            known[name] = table.whole(name, allowed=range(65536))
-        for name in ("threshold_counts", "onset_counts"):
-            if table.has(name):
-                known[name] = table.whole(name, allowed=range(65536))
+        known: dict[str, Any] = {
+            name: table.whole(name, allowed=range(65536))
+            for name in ("rows", "cols", "threshold_counts", "onset_counts")
+            if name in ("rows", "cols") or table.has(name)
+        }
         known["wraps"] = table.flag("wraps", False)
         for name in ("radius_m", "counts_per_newton", "release_s"):
             if table.has(name):

@@ -296,16 +296,12 @@ class Measurer:
             half = self._halves.get(zone)
             if half is not None:
                 counts = counts[:, half]
+            lines = self._rows @ counts  # of each column: counts, times row, times row squared
+            cut = best_cut(lines[0].tolist()) if self._wraps and half is None else 0
+            basis = self._cols[cut, slice(None) if half is None else half]
+            (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (
+                lines @ basis
+            ).tolist()
             row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
-            row += self._moments(counts, half)
+            row += force, rows, cols, rows_rows, rows_cols, cols_cols
         return row
-
-    def _moments(self, counts: NDArray[np.uint16], half: slice | None) -> tuple[int, ...]:
-        """`FORCE` to `COLS_COLS` of counts (rows, columns), of a half or of the entire skin."""
-        lines = self._rows @ counts  # of each column: counts, times row, times row squared
-        if half is not None:
-            basis = self._cols[0, half]
-        else:
-            basis = self._cols[best_cut(lines[0].tolist()) if self._wraps else 0]
-        (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (lines @ basis).tolist()
-        return force, rows, cols, rows_rows, rows_cols, cols_cols

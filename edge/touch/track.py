@@ -30,11 +30,6 @@ class TrackSettings:
     """Frames in a row whose peak is above the skin's onset count before a contact is confirmed.
     The first of them is its onset."""
 
-    def __post_init__(self) -> None:
-        value = self.debounce
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1000:
-            raise InputError(f"debounce must be a whole number of 1 to 1000, not {value!r}")
-
 
 class RegionTrack:
     """Follows one region from its onset to the end of its contact.

@@ -68,15 +68,15 @@ def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[s
             "has no angle of its own; choose another base or tip, or make it fixed"
         )
     joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}
-    for tag, keys in (
-        ("axis", {"xyz": "axis"}),
-        ("origin", {"xyz": "origin_xyz", "rpy": "origin_rpy"}),
+    for tag, attribute, key in (
+        ("axis", "xyz", "axis"),
+        ("origin", "xyz", "origin_xyz"),
+        ("origin", "rpy", "origin_rpy"),
     ):
         child = element.find(tag)
-        for attribute, key in keys.items():
-            text = None if child is None else child.get(attribute)
-            if text is not None:
-                joint[key] = _numbers(path, text, f"{tag} of joint {name!r}", 3)
+        if child is not None and attribute in child.attrib:
+            text = child.attrib[attribute]
+            joint[key] = _numbers(path, text, f"{tag} of joint {name!r}", 3)
     limit = element.find("limit")
     if limit is not None and kind in ("revolute", "prismatic"):
         text = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"

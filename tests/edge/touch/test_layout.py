@@ -37,8 +37,8 @@ def test_between_columns_the_shorter_way_round_is_taken():
 
 def test_a_flat_skin_lies_in_the_plane():
     flat = SkinLayout(3, 5, pitch_m=(0.002, 0.003))
-    assert flat.position(2, 4).tolist() == [0.012, 0.004, 0.0]
-    assert SkinLayout(3, 5).position(2, 4).tolist() == [4.0, 2.0, 0.0]
+    assert flat.position(2, 4) == (0.012, 0.004, 0.0)
+    assert SkinLayout(3, 5).position(2, 4) == (4.0, 2.0, 0.0)
 
 
 def test_units_say_what_is_known():

@@ -167,12 +167,6 @@ def test_times_that_are_not_finite_are_refused(t):
         ContactTracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
 
 
-@pytest.mark.parametrize("debounce", [0, 1.5])
-def test_settings_that_make_no_sense_are_named(debounce):
-    with pytest.raises(InputError, match="debounce"):
-        TrackSettings(debounce=debounce)
-
-
 def test_another_scale_brings_the_thresholds_along():
     model = SkinLayout(4, 6, counts_per_newton=1000.0, threshold_counts=100, onset_counts=150)
     device = SkinLayout(4, 6, counts_per_newton=2000.0, threshold_counts=7, dead=(3,))
