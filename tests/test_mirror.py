@@ -59,7 +59,7 @@ THROUGH = {
     "train/simulate/effects/turning.py": "train/simulate/test_simulate_pushing.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
     "train/simulate/scene_model.py": "train/simulate/test_simulate_scene.py",
-    "train/simulate/base.py": "train/simulate/test_simulate_oracles.py",
+    "train/simulate/effects/base.py": "train/simulate/test_simulate_oracles.py",
     "train/simulate/trials.py": "train/simulate/test_simulate_oracles.py",
 }
 """{module, or folder of a report's sections: the test file that specifies it with others}."""

@@ -131,7 +131,7 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
         if mask.any():
             calls[name] = mask
     everyone = np.ones(len(effects), dtype=bool)
-    modules = [("base", import_module("train.simulate.base"), everyone)]
+    modules = [("base", module_of("base"), everyone)]
     modules += [(name, module_of(name), mask) for name, mask in calls.items()]
     stages: dict[str, list[Call]] = {stage: [] for stage in STAGES}
     for stage, hooks in stages.items():

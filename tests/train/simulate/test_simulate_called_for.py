@@ -1,6 +1,5 @@
 """An effect that is not called for costs nothing and changes nothing: six proofs."""
 
-import importlib
 import json
 import subprocess
 import sys
@@ -15,7 +14,7 @@ from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run_batch
 from train.simulate.convergence import kinds
 from train.simulate.engine import values_of
-from train.simulate.plan import INSTEAD, STAGES, make_plan, required_effects
+from train.simulate.plan import INSTEAD, STAGES, make_plan, module_of, required_effects
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
 
@@ -64,7 +63,7 @@ def test_1_an_effect_not_called_for_is_not_loaded():
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    assert json.loads(done.stdout) == []
+    assert json.loads(done.stdout) == ["train.simulate.effects.base"]
 
 
 @pytest.mark.parametrize("add", [(), ("noise", "tilt")])
@@ -123,10 +122,6 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     np.testing.assert_array_equal(first, second)
 
 
-def module(name):
-    return importlib.import_module(f"train.simulate.{'' if name == 'base' else 'effects.'}{name}")
-
-
 def test_5_each_trial_runs_its_own_hooks_and_no_other():
     implied = ("foundation", "lateral", "bottoming", "relaxation", "pop", "stems")
     one = scene(*[n for n in EFFECTS if n not in implied], objects=everything())
@@ -137,7 +132,7 @@ def test_5_each_trial_runs_its_own_hooks_and_no_other():
         owners = ["base", *shared, *effects]
         for stage in STAGES:
             ran = [call.owner for call in plan.stages[stage] if call.which[i]]
-            have = [name for name in owners if hasattr(module(name), stage)]
+            have = [name for name in owners if hasattr(module_of(name), stage)]
             assert ran == (have[-1:] if stage in INSTEAD else have), (effects, stage)
         seen |= set(effects)
     assert seen == set(EFFECTS)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from tests.train.simulate.scenes import make, one_object, run
-from train.simulate import base
 from train.simulate.contact import GRAVITY
-from train.simulate.effects import sliding, stribeck, tipping
+from train.simulate.effects import base, sliding, stribeck, tipping
 from train.simulate.plan import ALL
 
 MU, MASS = 0.4, 1.0

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate import base
 from train.simulate.contact import share_out, spring_loads
+from train.simulate.effects import base
 from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
 SLOPES = (1.0, 4.0, 16.0)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from train.simulate import streams
-from train.simulate.base import FAR_M
 from train.simulate.contact import bed_law
+from train.simulate.effects.base import FAR_M
 from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate import base
 from train.simulate.arm import cross, dot
 from train.simulate.contact import by_depth, covered, curve_gap
+from train.simulate.effects import base
 from train.simulate.pivot_solver import Pivots, search
 from train.simulate.trials import Array, Index, Places, Trials, pick, total
 
