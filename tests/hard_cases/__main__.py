@@ -14,17 +14,10 @@ from edge.files import write_whole
 from tests.hard_cases import margins
 from tests.hard_cases.registry import CASES
 
-COLUMNS = (
-    "case",
-    "oracle",
-    "measured",
-    "bound",
-    "worst seen",
-    "where",
-    "the usual tools",
-    "margin",
-    "price",
+COLUMNS = tuple(
+    "case, oracle, measured, bound, worst seen, where, the usual tools, margin, price".split(", ")
 )
+INDENT = {"initial_indent": " " * 5, "subsequent_indent": " " * 7}
 
 
 def number(value: float) -> str:
@@ -38,12 +31,6 @@ def place(at: Mapping[str, Any]) -> str:
         f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
         for name, value in at.items()
     )
-
-
-def say(text: str) -> None:
-    """Print a paragraph under a case."""
-    if text:
-        print(textwrap.fill(text, 96, initial_indent="     ", subsequent_indent=" " * 7))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,17 +48,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         worst = case.worst()
         within = worst.error <= case.bound
         beyond += not within
-        error, bound, tried = number(worst.error), number(case.bound), f"{worst.tried} tried"
-        where = f"{place(worst.at)} ({tried})" if worst.error else f"none of {tried}"
-        usual, far, cost = case.theirs(), margins.margin(case), margins.price(case)
-        rows.append((case.key, case.oracle, case.unit, bound, error, where, usual, far, cost))
+        where = f"{place(worst.at) if worst.error else 'none'} ({worst.tried} tried)"
+        row = (case.key, case.oracle, case.unit, number(case.bound), number(worst.error), where)
+        rows.append((*row, case.theirs(), margins.margin(case), margins.price(case)))
         took = time.perf_counter() - began
         print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
-        say(f"{case.unit}: worst {error}, bound {bound}; oracle: {case.oracle}")
-        say(f"worst at {where}" if worst.error else f"{tried}")
-        say(usual and f"the usual tools: {usual}")
-        say(f"margin: {far}")
-        say(cost and f"price: {cost}")
+        for name, text in zip(COLUMNS[1:], rows[-1][1:], strict=True):
+            print(textwrap.fill(f"{name}: {text or '-'}", 96, **INDENT))
     lines = [COLUMNS, tuple("---" for _ in COLUMNS), *rows]
     markdown = "".join("| " + " | ".join(c.replace("|", "\\|") for c in r) + " |\n" for r in lines)
     with write_whole(arguments.out / "table.md") as file:

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, settings, target
+from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits
 
 EXAMPLES = 12
 """Examples that a search tries around a case; the same ones in every run."""
+SEEDS = st.integers(0, 10**6)
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,12 @@ def decades(first: float, last: float, each: int = 2) -> list[float]:
     return [10.0**e for e in np.linspace(first, last, count)]
 
 
-def seeded(name: str, **more: Any) -> Callable[[float], Mapping[str, Any]]:
+def powers_of_ten(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers between two powers of ten, by their exponents."""
+    return st.floats(low, high).map(lambda e: 10.0**e)
+
+
+def seeded(name: str, /, **more: Any) -> Callable[[float], Mapping[str, Any]]:
     """A function that puts a value under a name, beside fixed parameters."""
     return lambda value: {name: value, **more}
 

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import scipy.ndimage
 from hypothesis import strategies as st
 
-from edge.touch.contact import FeatureSeries
+from edge.touch.contact import Contact
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, TrackSettings
 from tests.edge.touch.test_region import SHAPES, by_scipy, by_us
-from tests.hard_cases.cases import Case, Ladder, decades, seeded
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
 
-SEEDS = st.integers(0, 10**6)
 FULL_SCALE = "3554 and 24331"
 FOREARM = SkinLayout(16, 24, True, (0.0108, 0.01205), 0.046, threshold_counts=50, onset_counts=50)
 
@@ -54,14 +55,11 @@ def seam_usual() -> str:
     return f"scipy.ndimage.label: {n} regions, column {col:.2f}; ours column {ours.centroid[1]:.2f}"
 
 
-def series_of(frames: list[np.ndarray], layout: SkinLayout = FOREARM) -> FeatureSeries:
-    tracker = ContactTracker(layout, TrackSettings(debounce=1))
-    found = None
-    for i, counts in enumerate(frames):
-        (contact,) = tracker.push(Frame(0.01 * i, counts)) or [None]
-        found = found or contact
-    assert found is not None
-    return found.series()
+def contact_of(frames: Iterable[Frame], layout: SkinLayout = FOREARM, **options: Any) -> Contact:
+    """The first contact of some frames."""
+    tracker = ContactTracker(layout, TrackSettings(debounce=1), **options)
+    contact, *_ = [contact for frame in frames for contact in tracker.push(frame)]
+    return contact
 
 
 def taxels(*places: tuple[int, int], value: int = 100) -> np.ndarray:
@@ -83,7 +81,8 @@ def flicker_frames(seed: int) -> list[np.ndarray]:
 
 def flicker_error(seed: int) -> float:
     """Metres that the followed centroid moves though nothing does."""
-    return float(np.abs(series_of(flicker_frames(seed)).motion).max())
+    frames = (Frame(0.01 * i, counts) for i, counts in enumerate(flicker_frames(seed)))
+    return float(np.abs(contact_of(frames).series().motion).max())
 
 
 def flicker_usual() -> str:
@@ -126,15 +125,10 @@ def times_error(seed: int, shortest: float) -> float:
     steps = 10.0 ** rng.uniform(math.log10(shortest), -0.5, 40)
     readings = np.cumsum(np.concatenate([[0.0], np.repeat(steps, rng.integers(1, 3, 40))]))
     readings = np.sort(np.concatenate([readings, readings[::5]]))  # some instants twice
-    tracker = ContactTracker(FOREARM, TrackSettings(debounce=1))
-    latest: dict[float, int] = {}
-    contact = None
-    for t in readings.tolist():
-        peak = int(rng.integers(51, 65536))
-        latest[t] = peak
-        (contact,) = tracker.push(Frame(t, taxels((3, 3), value=peak))) or [contact]
-    assert contact is not None
+    read = [(t, int(rng.integers(51, 65536))) for t in readings.tolist()]
+    contact = contact_of(Frame(t, taxels((3, 3), value=peak)) for t, peak in read)
     vector = feature_vector(contact.series(), 1.2)[:40]
+    latest = dict(read)
     t, peaks = list(latest), list(latest.values())
     worst = 0.0
     for sample, time in zip(vector.tolist(), (np.arange(40) * (1.2 / 39)).tolist(), strict=True):
@@ -199,7 +193,7 @@ CASES = [
         1e-15,
         times_error,
         [{"seed": 0, "shortest": 1e-12}],
-        {"seed": SEEDS, "shortest": st.floats(-12, -2).map(lambda e: 10.0**e)},
+        {"seed": SEEDS, "shortest": powers_of_ten(-12, -2)},
         Ladder("shortest step, s", decades(-3, -16), seeded("shortest", seed=0), "0.018, 0.010 s"),
     ),
 ]

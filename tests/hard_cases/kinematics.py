@@ -12,11 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from edge.runtime.joint_stream import Joints
 from edge.touch.arm import Chain, Joint
-from tests.hard_cases.cases import Case, Ladder, decades, seeded
-from tests.hard_cases.frames import SEEDS
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, seeded
 
 
-def limits_usual() -> str:
+def turn_usual() -> str:
     angle = np.array([1.0, 1.0 + 1000 * 2.0 * math.pi])
     turns = Rotation.from_rotvec(angle[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
     off = np.abs(turns[0] - turns[1]).max() / 1000
@@ -61,17 +60,6 @@ def turn_error(angle: float, seed: int) -> float:
     return worst
 
 
-def wrapped_error(turns: int, seed: int) -> float:
-    """Metres between a pose and the same with one angle some turns further."""
-    chain = Chain.cody()
-    low, high = np.array([p or (-3.0, 3.0) for p in chain.limits]).T
-    rng = np.random.default_rng(seed)
-    q = np.where(rng.random(5) < 0.5, low, high)  # every joint at a limit
-    moved = q.copy()
-    moved[seed % 5] += turns * 2.0 * math.pi
-    return float(np.abs(chain.pose(q) - chain.pose(moved)).max()) / max(1, abs(turns))
-
-
 def line_error(angle: float, step: float) -> float:
     """Error of the pose midway between two lines of a sender that wraps its angles."""
 
@@ -105,27 +93,21 @@ CASES = [
     ),
     Case(
         "kinematics",
-        "large and tiny angles",
+        "large and tiny angles, and limits of joints wrapped by 2 pi",
         "Rodrigues' formula in 400 digits",
         "error of an entry, off the diagonal over a tiny angle",
         1e-15,
         turn_error,
-        [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)],
+        [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)]
+        + [
+            {"angle": limit + 2.0 * math.pi * turns, "seed": 0}
+            for limit in {limit for limits in Chain.cody().limits for limit in limits or ()}
+            for turns in (-1000, 0, 1)
+        ],
         {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
         Ladder("radians", decades(0, 300, 0.1), seeded("angle", seed=0)),
+        turn_usual,
         examples=25,
-    ),
-    Case(
-        "kinematics",
-        "joint angles at their limits, wrapped by 2 pi",
-        "the same pose",
-        "metres and entries a turn",
-        5e-15,
-        wrapped_error,
-        [{"turns": 1, "seed": s} for s in range(5)],
-        {"turns": st.integers(-1000, 1000), "seed": SEEDS},
-        Ladder("turns", [10, 10**3, 10**5, 10**7, 10**9], seeded("turns", seed=0)),
-        limits_usual,
     ),
     Case(
         "kinematics",

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker, TrackSettings
-from tests.hard_cases.cases import Case, Ladder, decades, seeded
-from tests.hard_cases.frames import FOREARM
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
+from tests.hard_cases.frames import FOREARM, contact_of
 from train.projection import Projection
 
 
@@ -47,17 +46,10 @@ def clock_error(start: float) -> float:
     begin = float(np.floor(start))
     vectors = []
     for origin in (0.0, begin):
-        tracker = ContactTracker(FOREARM, TrackSettings(debounce=1), horizon_s=1.2)
-        contact = None
-        for i in range(200):
-            counts = np.zeros((16, 24), np.uint16)
-            if i > 10:
-                counts[4 : 6 + i // 50, 5:8] = 200 + 7 * i
-            for seen in tracker.push(Frame(origin + i / 128.0, counts)):
-                contact = contact or seen
-        if contact is None:
-            return float("inf")
-        vectors.append(feature_vector(contact.series(), 1.2))
+        frames = [Frame(origin + i / 128.0, np.zeros((16, 24), np.uint16)) for i in range(200)]
+        for i in range(11, 200):
+            frames[i].counts[4 : 6 + i // 50, 5:8] = 200 + 7 * i
+        vectors.append(feature_vector(contact_of(frames, horizon_s=1.2).series(), 1.2))
     scale = np.maximum(np.abs(vectors[0]), 1.0)
     return float((np.abs(vectors[1] - vectors[0]) / scale).max())
 
@@ -69,10 +61,10 @@ COURSES = ("log_max_force", "sqrt_max_force", "log_right_force", "sqrt_right_for
 def transform_error(counts: int, scale: float) -> float:
     """Largest error of a logarithm or root of a constant force, over the larger of it and 1."""
     layout = replace(FOREARM, counts_per_newton=scale)
-    tracker = ContactTracker(layout, TrackSettings(debounce=1), horizon_s=1.2, features=COURSES)
     frame = np.zeros((16, 24), np.uint16)
     frame[4:6, 5:8] = counts
-    contact, *_ = (c for i in range(130) for c in tracker.push(Frame(i / 100.0, frame)))
+    frames = (Frame(i / 100.0, frame) for i in range(130))
+    contact = contact_of(frames, layout, horizon_s=1.2, features=COURSES)
     seen = feature_vector(contact.series(), 1.2, 8, COURSES).reshape(4, 8)
     with mpmath.workdps(50):
         force = mpmath.mpf(int(counts)) / mpmath.mpf(scale)
@@ -104,8 +96,7 @@ CASES = [
         0,
         skin_error,
         [
-            *({"side": side, "across": True} for side in (16, 64, 256)),
-            *({"side": side, "across": False} for side in (16, 64, 256)),
+            *({"side": side, "across": a} for side in (16, 64, 256) for a in (True, False)),
             {"side": 256, "across": False, "full": True},
         ],
         {"side": st.integers(4, 64).map(lambda n: 4 * n), "across": st.booleans()},
@@ -124,7 +115,7 @@ CASES = [
         0,
         clock_error,
         [{"start": start} for start in (1.0, 1e5, 1.7e9)],
-        {"start": st.floats(0.0, 9.2).map(lambda e: 10.0**e)},
+        {"start": powers_of_ten(0.0, 9.2)},
         Ladder(
             "seconds",
             decades(3, 18, 1),
@@ -142,10 +133,7 @@ CASES = [
         1e-15,
         transform_error,
         [{"counts": 51, "scale": 1.0}, {"counts": 65535, "scale": 2250.0}],
-        {
-            "counts": st.integers(51, 65535),
-            "scale": st.floats(-12.0, 12.0).map(lambda e: 10.0**e),
-        },
+        {"counts": st.integers(51, 65535), "scale": powers_of_ten(-12.0, 12.0)},
         Ladder("counts in a newton", decades(3, -300, 0.1), seeded("scale", counts=51)),
         guard="features",
     ),
@@ -157,7 +145,7 @@ CASES = [
         0,
         column_error,
         [{"columns": columns, "seed": 0} for columns in (128, 129, 4096)],
-        {"columns": st.integers(6, 600), "seed": st.integers(0, 10**6)},
+        {"columns": st.integers(6, 600), "seed": SEEDS},
         Ladder(
             "values",
             [120, 512, 2048, 4096, 8192],

@@ -12,9 +12,8 @@ from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker, TrackSettings
 from tests.hard_cases.cases import Case, Ladder
-from tests.hard_cases.frames import FOREARM
+from tests.hard_cases.frames import contact_of
 from tests.hard_cases.models import (
     Ours,
     converted,
@@ -34,9 +33,8 @@ def failure(case: Case, ladder: Ladder, value: float) -> str:
     """How a case fails at a value; "" if it holds."""
     at = ladder.at(value)
     for seed in SEEDS if "seed" in at else SEEDS[:1]:
-        parameters = {**at, "seed": seed} if "seed" in at else at
         try:
-            if not case.error(**parameters) <= case.bound:
+            if not case.error(**at | ({"seed": seed} if "seed" in at else {})) <= case.bound:
                 return FAILED
         except EdgeError:
             return REFUSED
@@ -66,17 +64,15 @@ def prices() -> Mapping[str, str]:
     """The cost of the guards of each group of cases."""
     X, x = features(160), features(1, 1)
     ours, pipe = Ours(X), usual_pipeline(X, 6, 5, labels_for(X))
-    exported, theirs, narrow = session(ours.data), converted(pipe, X), x.astype(np.float32)
+    exported, theirs = session(ours.data), converted(pipe, X)
     counts = np.zeros((16, 24), np.uint16)
     counts[4:12, 20:24] = counts[4:12, 0:4] = 65535
-    tracker = ContactTracker(FOREARM, TrackSettings(debounce=1))
-    contact = [c for i in range(4) for c in tracker.push(Frame(0.01 * i, counts))][-1]
-    series = contact.series()
+    series = contact_of(Frame(0.01 * i, counts) for i in range(4)).series()
     chain = Chain.cody()
     graph, usual, region, vector, finite, pose = microseconds(
         [
             lambda: exported.run(["t_label", "t_neighbours"], {"features": x}),
-            lambda: theirs.run(None, {"X": narrow}),
+            lambda: theirs(x),
             lambda: largest_region(counts, 50),
             lambda: feature_vector(series, 0.03),
             lambda: np.isfinite(x).all(),

@@ -6,7 +6,6 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from sklearn.decomposition import PCA
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
-from edge.errors import InputError
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
 from edge.touch.features import FEATURES
@@ -130,10 +128,16 @@ def session(data: bytes, level: Any = None, threads: int = 1) -> Any:
     return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
 
 
-def converted(pipe: Any, X: Array) -> Any:
-    """The default skl2onnx conversion: float32 in, its own k-NN."""
+def converted(pipe: Any, X: Array) -> Callable[[Array], NDArray[Any]]:
+    """The answers of the default skl2onnx conversion: float32 in, its own k-NN."""
     proto = convert(pipe, X[:1].astype(np.float32), options={"zipmap": False})
-    return session(proto.SerializeToString())
+    theirs = session(proto.SerializeToString())
+    return lambda queries: np.ravel(theirs.run(None, {"X": queries.astype(np.float32)})[0])
+
+
+def answers_of_usual(pipe: Any, X: Array, queries: Array) -> dict[str, NDArray[Any]]:
+    """The answers of scikit-learn and of its conversion."""
+    return {"scikit-learn": pipe.predict(queries), "skl2onnx": converted(pipe, X)(queries)}
 
 
 def microseconds(calls: Sequence[Callable[[], object]], rounds: int = 40) -> list[float]:
@@ -155,14 +159,8 @@ def usual_neighbours(X: Array, queries: Array, components: int = 6) -> str:
     pca = pipe[0]
     both = exact.unrounded(np.concatenate([X, queries]), pca.mean_, pca.components_.T)
     truth = [exact.nearest(both[: len(X)], point, 1)[0][0] for point in both[len(X) :]]
-    with np.errstate(all="ignore"):
-        narrow = queries.astype(np.float32)
-        said = {
-            "scikit-learn": pipe.predict(queries),
-            "skl2onnx": np.ravel(converted(pipe, X).run(None, {"X": narrow})[0]),
-        }
-    with suppress(InputError):  # a scale that is refused
-        ours = Ours(X, choice=Choice("none", components, 1))
-        said["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]
+    said = answers_of_usual(pipe, X, queries)
+    ours = Ours(X, choice=Choice("none", components, 1))
+    said["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]
     shares = ", ".join(f"{name} {np.mean(v != truth):.0%}" for name, v in said.items())
     return f"wrong nearest: {shares}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from decimal import Decimal, localcontext
 from fractions import Fraction
-from typing import Any
 
 import mpmath
 import numpy as np
@@ -14,9 +13,8 @@ from numpy.typing import NDArray
 from edge.model.stopping import margin
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
-from edge.touch.track import ContactTracker, TrackSettings
 from tests.hard_cases.cases import Case, Ladder, seeded
-from tests.hard_cases.frames import FOREARM, FULL_SCALE
+from tests.hard_cases.frames import FOREARM, FULL_SCALE, contact_of
 
 MOMENTS = ("skin_length", "skin_width", "skin_spread_along", "skin_slant")
 BAND = 12
@@ -62,11 +60,7 @@ def moments(counts: NDArray[np.uint16]) -> list[mpmath.mpf]:
 def moment_error(name: str, value: int, seed: int) -> float:
     """Largest error of a moment, in the skin's larger side (its square for the slant)."""
     counts = shape(name, value, seed)
-    tracker = ContactTracker(FOREARM, TrackSettings(debounce=1), features=MOMENTS)
-    contact = None
-    for i in range(3):
-        (contact,) = tracker.push(Frame(0.01 * i, counts)) or [None]
-    assert contact is not None
+    contact = contact_of((Frame(0.01 * i, counts) for i in range(3)), features=MOMENTS)
     seen = feature_vector(contact.series(), 0.02, 3, MOMENTS).reshape(len(MOMENTS), 3)
     side = max(FOREARM.shape)
     worst = 0.0
@@ -89,11 +83,6 @@ def evidence_error(power: int, labels: int, seed: int) -> float:
     return worst
 
 
-def steep(value: float) -> dict[str, Any]:
-    """Parameters of the shape that is hardest to resolve."""
-    return {"name": "steep", "value": value, "seed": 0}
-
-
 CASES = [
     Case(
         "features",
@@ -112,7 +101,9 @@ CASES = [
             "value": st.integers(60, 65535),
             "seed": st.integers(0, 999),
         },
-        Ladder("counts", [60, 4095, 16383, 65535], steep, FULL_SCALE),
+        Ladder(
+            "counts", [60, 4095, 16383, 65535], seeded("value", name="steep", seed=0), FULL_SCALE
+        ),
     ),
     Case(
         "early stopping",

@@ -19,10 +19,11 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, taxels
-from tests.hard_cases.models import Ours, converted, features, labels_for, usual_pipeline
+from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
 from train.crossval import leave_one_out
 from train.importers.csv_frames import trials
 from train.pipeline import Choice, ContactClassifier
+from train.projection import Projection
 
 BAD = (float("nan"), float("inf"), float("-inf"))
 
@@ -55,12 +56,6 @@ def small_model() -> Ours:
     return Ours(features(30), choice=Choice("none", 5, 3))
 
 
-def vector(bad: float) -> None:
-    x = features(1)[0]
-    x[43] = bad
-    small_model().model.decide(x)
-
-
 def graph(bad: float) -> None:
     """Every position in one batch; the graph itself answers -1 and votes for nothing."""
     queries = np.repeat(features(1, 1), 121, axis=0)
@@ -71,16 +66,11 @@ def graph(bad: float) -> None:
         raise InputError("label -1")
 
 
-def fit(bad: float) -> None:
-    X = features(12)
-    X[3, 3] = bad
-    ContactClassifier({"t": Choice("none", 2, 1)}).fit(X, {"t": labels_for(X)})
-
-
-def left_out(bad: float) -> None:
-    X = features(12)
-    X[3, 3] = bad
-    leave_one_out(X, labels_for(X))
+def spoiled(bad: float, count: int = 12) -> Array:
+    """Vectors of which one has a bad value."""
+    X = features(count)
+    X[0, 43] = bad
+    return X
 
 
 def csv_frames(bad: float) -> None:
@@ -106,27 +96,26 @@ ENTRIES: dict[str, Callable[[float], object]] = {
         {"rows": 2, "cols": 2, "counts_per_newton": bad}
     ),
     "a skin's pitch": lambda bad: SkinLayout.from_dict({"rows": 2, "cols": 2, "pitch_m": bad}),
-    "a feature vector": vector,
+    "a feature vector": lambda bad: small_model().model.decide(spoiled(bad, 1)[0]),
     "the graph": graph,
-    "a training vector": fit,
-    "leave-one-out": left_out,
+    "a training vector": lambda bad: ContactClassifier({"t": Choice("none", 2, 1)}).fit(
+        spoiled(bad), {"t": labels_for(features(12))}
+    ),
+    "leave-one-out": lambda bad: leave_one_out(spoiled(bad), labels_for(features(12))),
     "the names of CSV frames": csv_frames,
 }
 
 
+SIZES: dict[str, Callable[[float], object]] = {
+    "a vector, infinite once scaled": lambda size: small_model().model.decide(np.full(120, size)),
+    "units of training vectors": lambda size: Projection("none", 3).fit(features(20) * size),
+}
+
+
 def let_in(entry: str, bad: float) -> float:
-    """1 where an entry takes a value that is not finite."""
+    """1 where an entry takes a value that is not finite, or that float64 cannot hold scaled."""
     try:
-        ENTRIES[entry](bad)
-    except InputError:
-        return 0.0
-    return 1.0
-
-
-def beyond_error(size: float) -> float:
-    """1 where a finite vector that is infinite once scaled gets a label."""
-    try:
-        small_model().model.decide(np.full(120, size))
+        (ENTRIES | SIZES)[entry](bad)
     except InputError:
         return 0.0
     return 1.0
@@ -135,9 +124,9 @@ def beyond_error(size: float) -> float:
 def usual() -> str:
     X = features(30)
     pipe = usual_pipeline(X, 5, 1, np.arange(30))
-    queries = np.repeat(features(1, 1), 3, axis=0).astype(np.float32)
+    queries = np.repeat(features(1, 1), 3, axis=0)
     queries[:, 43] = BAD
-    said = np.ravel(converted(pipe, X).run(None, {"X": queries})[0]).tolist()
+    said = converted(pipe, X)(queries).tolist()
     try:
         pipe.predict(queries)
         raises = "answers"
@@ -159,11 +148,17 @@ CASES = [
     ),
     Case(
         "refusals",
-        "finite, but infinite once scaled",
+        "finite, but beyond float64 once scaled",
         "one sentence, no result",
         "let in",
         0,
-        beyond_error,
-        [{"size": s} for s in (1e303, -1e305, 1.7e308)],
+        let_in,
+        [
+            {"entry": entry, "bad": size}
+            for entry, sizes in zip(
+                SIZES, [(1e303, -1e305, 1.7e308), (1e-300, 1e-40, 1e105, 1e300)], strict=True
+            )
+            for size in sizes
+        ],
     ),
 ]

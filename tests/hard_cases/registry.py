@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from tests.hard_cases import (
-    everywhere,
-    frames,
-    kinematics,
-    limits,
-    moments,
-    neighbours,
-    refusals,
-    scaling,
-    simulator,
-)
+from importlib import import_module
+
 from tests.hard_cases.cases import Case
 
+GROUPS = "neighbours scaling frames kinematics moments limits refusals everywhere simulator"
 CASES: list[Case] = [
-    *neighbours.CASES,
-    *scaling.CASES,
-    *frames.CASES,
-    *kinematics.CASES,
-    *moments.CASES,
-    *limits.CASES,
-    *refusals.CASES,
-    *everywhere.CASES,
-    *simulator.CASES,
+    case for name in GROUPS.split() for case in import_module(f"tests.hard_cases.{name}").CASES
 ]

@@ -12,18 +12,6 @@ from train.simulate.contact import GRAVITY
 MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
 
 
-def cases():
-    """Stiffness x mass x step x friction: 1320 cases in one batch."""
-    grid = np.meshgrid(
-        10.0 ** np.arange(-3, 16, 2, dtype=float),
-        10.0 ** np.arange(-9, 10, 1.8),
-        [0.001, 0.01, 0.02, 0.05, 0.1, 0.2],
-        [0.05, 1.0],
-        indexing="ij",
-    )
-    return [g.ravel() for g in grid]
-
-
 def judge(trace, stiffness, mass, h, mu_s, mu_k):
     """What must hold of any trace; returns the complaints."""
     complaints = []
