@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.model import Model
-from edge.model.verify import first_series, outputs, outputs_at_points, parts
+from edge.model.verify import answers, first_series
 from edge.recording import Recording, save_arrays
 from train.dataset import DataSet
 
@@ -57,11 +57,6 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     )
 
 
-def wanted(model: Model) -> list[tuple[str, str]]:
-    """(task, part) of each output of the model."""
-    return [(task, part) for task in model.info.tasks for part in parts(model)]
-
-
 def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
     """Run the exported model on trials and vectors, and store its outputs.
 
@@ -101,10 +96,8 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     }
     if info.dof is not None:
         arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
-    answers = outputs(model, vectors)
-    arrays |= {f"{task}_{part}": answers[f"{task}_{part}"] for task, part in wanted(model)}
     if info.decision_points_s:
-        arrays["decision_point_vectors"] = at_decision_points = np.stack(
+        at_decision_points = np.stack(
             [
                 np.stack([info.vector(s, window) for _, s in contacts])
                 for window in info.decision_points_s
@@ -112,17 +105,11 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         )
         # Besides the trials, which were trained with, points between them.
         between = 0.5 * (at_decision_points + np.roll(at_decision_points, 1, axis=1))
-        arrays["decision_point_vectors"] = at_decision_points = np.concatenate(
-            [at_decision_points, between], axis=1
-        )
-        seen = outputs_at_points(model, at_decision_points)
-        arrays |= {
-            f"{task}_decision_point_{part}": seen[f"{task}_{part}"] for task, part in wanted(model)
-        }
+        arrays["decision_point_vectors"] = np.concatenate([at_decision_points, between], axis=1)
     bounds = {
         key: bound
         for key, bound in BOUNDS.items()
         if info.has_label_distances or key != "label_distances"
     }
     meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
-    save_arrays(path, arrays, meta, compress=True)
+    save_arrays(path, arrays | answers(model, arrays), meta, compress=True)

@@ -23,7 +23,7 @@ gives others.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,15 +102,9 @@ def _trials(name: str, arrays: dict[str, NDArray[Any]], meta: dict[str, Any]) ->
     for i, (a, b) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
         if not 0 <= a < b <= len(arrays["t"]):
             raise InputError(f"{name}: trial {i} has no frames; export it again")
-        valid = arrays.get("valid")
+        parts = {key: arrays[key][a:b] for key in ("joints", "valid") if key in arrays}
         trials.append(
-            Recording(
-                t=arrays["t"][a:b],
-                frames=arrays["frames"][a:b],
-                joints=arrays["joints"][a:b] if "joints" in arrays else None,
-                valid=None if valid is None else valid[a:b],
-                meta={"skin": meta["skin"]},
-            )
+            Recording(arrays["t"][a:b], arrays["frames"][a:b], meta={"skin": meta["skin"]}, **parts)
         )
     SkinLayout.from_dict(meta["skin"], where=name)
     return trials
@@ -158,7 +152,7 @@ def _graph(
 ) -> Iterator[Line]:
     """The graph's outputs for the stored vectors."""
     info = model.info
-    vectors = np.ascontiguousarray(arrays["vectors"], dtype=np.float64)
+    vectors = arrays["vectors"]
     if vectors.ndim != 2 or vectors.shape[1] != info.width:
         raise InputError(
             f"{name}: its vectors are {vectors.shape[1:]} long, "
@@ -174,38 +168,40 @@ def _graph(
             f"{name}: is for the tasks {', '.join(tasks) or 'none'}, {model.path} answers "
             f"{', '.join(sorted(info.tasks))}; export both together"
         )
-    answers = {"": outputs(model, vectors)}
     if info.decision_points_s:
-        at_points = np.ascontiguousarray(arrays["decision_point_vectors"], dtype=np.float64)
-        if at_points.shape[::2] != (len(info.decision_points_s), info.width):
+        shape = len(info.decision_points_s), info.width
+        if arrays["decision_point_vectors"].shape[::2] != shape:
             raise InputError(
                 f"{name}: has no vectors for the model's decision points; export both together"
             )
-        answers["decision_point_"] = outputs_at_points(model, at_points)
-    for prefix, seen in answers.items():
-        for task in info.tasks:
-            for part in parts(model):
-                key = f"{task}_{prefix}{part}"
-                yield key, seen[f"{task}_{part}"], arrays[key], bounds.get(part, 0.0)
+    for key, seen in answers(model, arrays).items():
+        bound = next((bounds[part] for part in bounds if key.endswith(f"_{part}")), 0.0)
+        yield key, seen, arrays[key], bound
 
 
-def parts(model: Model) -> tuple[str, ...]:
-    """Outputs of a model for a task."""
-    return (*PARTS, "label_distances") if model.info.has_label_distances else PARTS
+def answers(model: Model, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """{key: the graph's output} for the vectors of a golden file, each at its decision point."""
+    parts = (*PARTS, "label_distances") if model.info.has_label_distances else PARTS
+    seen = {"": _outputs(model, arrays["vectors"])}
+    if model.info.decision_points_s:
+        rows = enumerate(arrays["decision_point_vectors"])
+        points = [_outputs(model, vectors, point) for point, vectors in rows]
+        seen["decision_point_"] = {key: np.stack([p[key] for p in points]) for key in points[0]}
+    return {
+        f"{task}_{prefix}{part}": outputs[f"{task}_{part}"]
+        for prefix, outputs in seen.items()
+        for task in model.info.tasks
+        for part in parts
+    }
 
 
-def outputs(
+def _outputs(
     model: Model, vectors: NDArray[np.float64], decision_point: int | None = None
 ) -> dict[str, NDArray[Any]]:
     """The graph's outputs for vectors (n, width), asked one by one as the board does."""
+    vectors = np.ascontiguousarray(vectors, np.float64)
     single = [model.run(vectors[i : i + 1], decision_point) for i in range(len(vectors))]
     return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
-
-
-def outputs_at_points(model: Model, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-    """The graph's outputs for vectors (decision points, n, width), each at its decision point."""
-    seen = [outputs(model, rows, point) for point, rows in enumerate(vectors)]
-    return {key: np.stack([answers[key] for answers in seen]) for key in seen[0]}
 
 
 def renew(
@@ -226,15 +222,10 @@ def renew(
     meta = {**load_meta(os.fspath(path), arrays), "model": model.info.data_digest}
     del arrays["meta"]
     arrays["vectors"] = np.concatenate([arrays["vectors"], vectors[-1]])
-    seen = {"": outputs(model, arrays["vectors"])}
     if model.info.decision_points_s:
-        early = np.concatenate([arrays["decision_point_vectors"], vectors], axis=1)
-        arrays["decision_point_vectors"] = early
-        seen["decision_point_"] = outputs_at_points(model, early)
-    for prefix, answers in seen.items():
-        for task in model.info.tasks:
-            arrays |= {f"{task}_{prefix}{p}": answers[f"{task}_{p}"] for p in parts(model)}
-    save_arrays(target, arrays, meta, compress=True)
+        early = arrays["decision_point_vectors"]
+        arrays["decision_point_vectors"] = np.concatenate([early, vectors], axis=1)
+    save_arrays(target, arrays | answers(model, arrays), meta, compress=True)
 
 
 def compared(name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float) -> Check:
