@@ -31,6 +31,8 @@ INK, DECISION = "#1f4e79", "#b03a2e"
 DARK_INK, DARK_DECISION = "#79b8ff", "#ff9080"
 PAPER, LINES = "#0d1117", "#c9d1d9"
 """Background and lines on a dark page."""
+PAINTED = ("figure", "axes", "savefig")
+INKED = ("text.", "axes.label", "axes.edge", "xtick.", "ytick.")
 
 
 def draw(
@@ -57,34 +59,28 @@ def draw(
 
     if len(recordings) > MOST:
         raise InputError(f"{len(recordings)} recordings are too many side by side; give {MOST}")
-    contacts = [contact_of(name, recording) for name, recording in recordings]
-    horizon = WINDOW_S if model is None else model.info.window_s
     style: dict[Any, Any] = {"font.size": 12, "axes.prop_cycle": cycler(color=[INK, DECISION])}
     if dark:
-        lines = ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")
         style |= {"axes.prop_cycle": cycler(color=[DARK_INK, DARK_DECISION])}
-        style |= {"figure.facecolor": PAPER, "axes.facecolor": PAPER, "savefig.facecolor": PAPER}
-        style |= dict.fromkeys(lines, LINES)
+        style |= dict.fromkeys((f"{part}.facecolor" for part in PAINTED), PAPER)
+        style |= dict.fromkeys((f"{part}color" for part in INKED), LINES)
     with rc_context(style):
-        _draw(recordings, contacts, horizon, out, model)
+        _draw(recordings, out, model)
 
 
-def _draw(
-    recordings: Sequence[tuple[str, Recording]],
-    contacts: Sequence[tuple[float, FeatureSeries]],
-    horizon: float,
-    out: Path,
-    model: Model | None,
-) -> None:
+def _draw(recordings: Sequence[tuple[str, Recording]], out: Path, model: Model | None) -> None:
     from matplotlib.figure import Figure
 
+    contacts = [contact_of(name, recording) for name, recording in recordings]
+    horizon = WINDOW_S if model is None else model.info.window_s
     figure = Figure(figsize=(2.6 * len(recordings) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
         4, len(recordings), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
     )
-    strongest = max(float(_force(r)[_within(r, f[0], horizon)].max())
-                    for (_, r), f in zip(recordings, contacts, strict=True))  # fmt: skip
-    image = None
+    strongest = max(
+        float(_force(r)[_within(r, onset, horizon)].max())
+        for (_, r), (onset, _) in zip(recordings, contacts, strict=True)
+    )
     for column, ((name, recording), (onset, series)) in enumerate(
         zip(recordings, contacts, strict=True)
     ):
@@ -105,9 +101,8 @@ def _draw(
     for row in (1, 2, 3):
         axes[row, 0].set_ylim(bottom=0.0)
     axes[0, 0].set_ylabel("row, elbow to wrist")
-    if image is not None:
-        bar = figure.colorbar(image, ax=axes[0, :], pad=0.01, shrink=0.9)
-        bar.set_label(f"{recordings[0][1].layout.force_unit} per taxel")
+    bar = figure.colorbar(image, ax=axes[0, :], pad=0.01, shrink=0.9)
+    bar.set_label(f"{recordings[0][1].layout.force_unit} per taxel")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=100, bbox_inches="tight")
 

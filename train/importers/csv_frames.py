@@ -40,19 +40,9 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
     labels = labels_beside(path / "labels.csv")
     for number, folder in enumerate(folders):
         t, frames = _frames(folder, rate)
-        yield (
-            folder.name,
-            Recording(
-                t=t - t[0],
-                frames=frames,
-                meta={
-                    "labels": labels.get(folder.name, {}),
-                    "skin": {"rows": frames.shape[1], "cols": frames.shape[2], **skin},
-                    "source": path.name,
-                    "trial": number,
-                },
-            ),
-        )
+        meta = {"labels": labels.get(folder.name, {}), "source": path.name, "trial": number}
+        meta["skin"] = {"rows": frames.shape[1], "cols": frames.shape[2], **skin}
+        yield folder.name, Recording(t - t[0], frames, meta=meta)
 
 
 def labels_beside(path: Path) -> dict[str, dict[str, str]]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -62,8 +63,12 @@ class Log:
     path: Path
     beside: dict[str, Any]
     arm: Chain | None = None
-    _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(default_factory=dict)
-    _joints: dict[str, dict[str, list[tuple[float, float]]]] = field(default_factory=dict)
+    _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+    _joints: dict[str, dict[str, list[tuple[float, float]]]] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(list))
+    )
     """{topic: {joint: [(time, angle)]}}"""
 
     @classmethod
@@ -84,15 +89,13 @@ class Log:
     def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
         """Take in a ROS message; kinds other than frames and joint angles are ignored."""
         stamp = getattr(getattr(message, "header", None), "stamp", None)
-        t = logged_s if stamp is None else stamp.sec + stamp.nanosec * 1e-9
-        if t == 0.0:  # the driver leaves its stamp empty
-            t = logged_s
+        # Some drivers leave the stamp empty, which is the time 0.
+        t = (0.0 if stamp is None else stamp.sec + stamp.nanosec * 1e-9) or logged_s
         if kind in JOINTS:
             self._pose(topic, t, list(message.name), np.asarray(message.position))
-        elif kind == FRAMES[0]:
-            self._frames.setdefault(topic, []).append((t, self._image(topic, message)))
-        elif kind == FRAMES[1]:
-            self._frames.setdefault(topic, []).append((t, self._array(topic, message)))
+        elif kind in FRAMES:
+            read = self._image if kind == FRAMES[0] else self._array
+            self._frames[topic].append((t, read(topic, message)))
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
@@ -103,38 +106,34 @@ class Log:
                 q = np.asarray(message["q"], dtype=np.float64)
                 self._pose(topic, t, list(map(str, message.get("names", ()))), q)
             elif "counts" in message:
-                counts = self._counts(topic, np.asarray(message["counts"]))
-                self._frames.setdefault(topic, []).append((t, counts))
+                self._frames[topic].append((t, self._counts(topic, np.asarray(message["counts"]))))
 
     def _pose(self, topic: str, t: float, names: list[str], q: NDArray[np.float64]) -> None:
         """Take in a message's angles; joints without names get their positions as names."""
+        where = f"{self.path}: a message of {topic}"
         if q.ndim != 1 or (names and len(names) != len(q)):
-            raise InputError(
-                f"{self.path}: in a message of {topic}, names are {len(names)} and angles {q.size}"
-            )
+            raise InputError(f"{where}: its names are {len(names)} and angles {q.size}")
         if len(set(names)) < len(names):
-            raise InputError(f"{self.path}: a message of {topic} names a joint twice")
+            raise InputError(f"{where} names a joint twice")
         if not np.isfinite(q).all():
-            raise InputError(f"{self.path}: an angle of {topic} is not finite")
-        joints = self._joints.setdefault(topic, {})
+            raise InputError(f"{where} has an angle that is not finite")
         for name, angle in zip(names or map(str, range(len(q))), q.tolist(), strict=True):
-            joints.setdefault(name, []).append((t, angle))
+            self._joints[topic][name].append((t, angle))
 
     def _image(self, topic: str, message: Any) -> NDArray[np.uint16]:
         kinds = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
         size = kinds.get(message.encoding)
         if size is None:
+            known = ", ".join(kinds)
             raise InputError(
-                f"{self.path}: the images of {topic} are {message.encoding}; they must be "
-                f"{', '.join(kinds)}"
+                f"{self.path}: the images of {topic} are {message.encoding}; they must be {known}"
             )
         raw = np.asarray(message.data, dtype=np.uint8)
         if raw.size != message.height * message.step or message.step < message.width * size:
             raise InputError(f"{self.path}: an image of {topic} does not have its stated size")
         lines = raw.reshape(message.height, message.step)[:, : message.width * size]
         order = ">" if message.is_bigendian else "<"
-        pixels = np.ascontiguousarray(lines).view(f"{order}u{size}")
-        return pixels.astype(np.uint16)
+        return np.ascontiguousarray(lines).view(f"{order}u{size}").astype(np.uint16)
 
     def _array(self, topic: str, message: Any) -> NDArray[np.uint16]:
         shape = [int(dimension.size) for dimension in message.layout.dim]
@@ -180,23 +179,17 @@ class Log:
         if len(shapes) > 1:
             raise InputError(f"{self.path}: frames of {name} have the shapes {sorted(shapes)}")
         t = np.array([at for at, _ in frames])
-        meta: dict[str, Any] = {
-            key: self.beside[key] for key in ("labels", "skin") if key in self.beside
-        }
         joints, names = self._angles(t)
-        if names is not None:
-            meta["joint_names"] = list(names)
-        if self.arm is not None:
-            meta["arm"] = self.arm.to_dict()
         rows, cols = shapes.pop()
-        meta["skin"] = {"rows": rows, "cols": cols, **meta.get("skin", {})}
-        meta["source"] = f"{self.path.name} {name}"
-        return Recording(
-            t=t - t[0],
-            frames=np.stack([picture for _, picture in frames]),
-            joints=joints,
-            meta=meta,
-        )
+        meta: dict[str, Any] = {
+            **({"labels": self.beside["labels"]} if "labels" in self.beside else {}),
+            "skin": {"rows": rows, "cols": cols, **self.beside.get("skin", {})},
+            **({} if names is None else {"joint_names": list(names)}),
+            **({} if self.arm is None else {"arm": self.arm.to_dict()}),
+            "source": f"{self.path.name} {name}",
+        }
+        pictures = np.stack([picture for _, picture in frames])
+        return Recording(t=t - t[0], frames=pictures, joints=joints, meta=meta)
 
     def _angles(
         self, t: NDArray[np.float64]
