@@ -27,6 +27,10 @@ from train.tradeoff import front as fronts
 
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
 """Options that would make another model than the one that a point was measured with."""
+FORWARDED = tuple(
+    "features projection scaling components k samples tasks leave_out threshold onset jobs".split()
+)
+"""Options that `fit` takes as they are."""
 DECISION_POINTS = "0.2:1.2:0.1"
 LONGEST_S = 60.0
 """Longest window."""
@@ -43,15 +47,12 @@ def parser() -> argparse.ArgumentParser:
         "for each task: the smallest model within one standard error of the best in "
         "cross-validation.",
     )
-    top.add_argument(
-        "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
-    )
-    top.add_argument(
-        "--out", type=Path, default=Path("build"), help="folder (default: %(default)s)"
-    )
-    top.add_argument("--name", help="of the model (default: that of the folder of the recordings)")
-    top.add_argument("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
-    top.add_argument(
+    option = top.add_argument
+    option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
+    option("--out", type=Path, default=Path("build"), help="folder (default: %(default)s)")
+    option("--name", help="of the model (default: that of the folder of the recordings)")
+    option("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
+    option(
         "--features",
         nargs="+",
         metavar="NAME",
@@ -59,56 +60,44 @@ def parser() -> argparse.ArgumentParser:
         f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
         f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
     )
-    top.add_argument(
-        "--projection",
-        choices=KINDS,
-        help="fix the projection: principal components or discriminants",
-    )
-    top.add_argument(
-        "--samples",
-        type=within(int, 2, 1000),
-        default=SAMPLES,
-        help="values of each feature (default: %(default)s)",
-    )
-    top.add_argument("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
-    top.add_argument("--components", type=count, help="fix the number of principal components")
-    top.add_argument("-k", "--k", type=count, help="fix the number of neighbours")
-    top.add_argument(
+    text = "fix the projection: principal components or discriminants"
+    option("--projection", choices=KINDS, help=text)
+    text = "values of each feature (default: %(default)s)"
+    option("--samples", type=within(int, 2, 1000), default=SAMPLES, help=text)
+    option("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
+    option("--components", type=count, help="fix the number of principal components")
+    option("-k", "--k", type=count, help="fix the number of neighbours")
+    option(
         "--leave-out",
         default=LEAVE_OUT,
         metavar="KEY",
         help="choose and score a task with entire groups of this label left out, if each of its "
         f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out single trials",
     )
-    top.add_argument(
-        "--quick", action="store_true", help="for a first look: few candidates, five folds"
-    )
-    top.add_argument(
+    option("--quick", action="store_true", help="for a first look: few candidates, five folds")
+    option(
         "--window",
         type=within(float, 0.01, LONGEST_S),
         help=f"seconds from onset that a decision is based on (default: {WINDOW_S:g}, or more if "
         "touches last longer and a longer window is much more accurate)",
     )
-    top.add_argument(
+    option(
         "--decision-points",
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
         f"seconds from onset, or at a list a,b,c, or `none` (default: {DECISION_POINTS} with "
         f"{FEWEST} to {MOST_TRIALS} trials, and fewer points if the model would exceed 1 MB)",
     )
-    top.add_argument(
-        "--threshold", type=within(int, 0, 65534), help="counts above which a taxel is in contact"
-    )
-    top.add_argument(
-        "--onset", type=within(int, 0, 65534), help="counts above which a contact begins"
-    )
-    top.add_argument(
+    counts = within(int, 0, 65534)
+    option("--threshold", type=counts, help="counts above which a taxel is in contact")
+    option("--onset", type=counts, help="counts above which a contact begins")
+    option(
         "--front",
         metavar="WHAT",
         help="the quick choice at the window of a point of `make tradeoff`: fast, balanced, "
         "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
     )
-    top.add_argument(
+    option(
         "--fronts",
         type=Path,
         metavar="front.json",
@@ -116,12 +105,9 @@ def parser() -> argparse.ArgumentParser:
         help="the file with the points (default: %(default)s)",
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
-    top.add_argument(
-        "--report", action="store_true", help="also write OUT/report.html, as `make export` does"
-    )
-    top.add_argument(
-        "--jobs", type=count, default=cpu_count(), help="processes (default: all cores)"
-    )
+    text = "also write OUT/report.html, as `make export` does"
+    option("--report", action="store_true", help=text)
+    option("--jobs", type=count, default=cpu_count(), help="processes (default: all cores)")
     top.set_defaults(run=run)
     return top
 
@@ -134,25 +120,14 @@ def run(arguments: argparse.Namespace) -> int:
     points = arguments.decision_points
     if window_s is None and points not in (None, "none"):
         window_s = WINDOW_S
+    early = None if points is None else parse_decision_points(points, window_s or WINDOW_S)
     fitted = fit(
         arguments.data,
-        features=arguments.features,
-        projection=arguments.projection,
-        scaling=arguments.scaling,
-        components=arguments.components,
-        k=arguments.k,
+        **{name: getattr(arguments, name) for name in FORWARDED},
         window_s=window_s,
-        samples=arguments.samples,
-        tasks=arguments.tasks,
-        leave_out=arguments.leave_out,
-        decision_points_s=None
-        if points is None
-        else parse_decision_points(points, window_s or WINDOW_S),
-        threshold=arguments.threshold,
-        onset=arguments.onset,
+        decision_points_s=early,
         arm=open_arm(arguments),
         quick=quick,
-        jobs=arguments.jobs,
         progress=True,
     )
     path = arguments.out / "model.onnx"

@@ -30,6 +30,7 @@ from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, ContactClassifier, squared_distances
 from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
+from train.report.score import interval
 from train.stopping import SequentialClassifier
 
 MISSING_SHARE = 0.02
@@ -87,6 +88,11 @@ def describe(
         name: of the model; that of the recordings' folder where None.
     """
     folder, trials = names(dataset)
+
+    def no_contact(task: str) -> str | None:
+        labels = {*classifier.classes_[task], *dataset.untouched_labels(task)}
+        return NO_CONTACT if NO_CONTACT in labels else None
+
     return ModelInfo(
         tasks={
             task: Task(
@@ -98,7 +104,7 @@ def describe(
                 projection=choice.projection,
                 features=choice.features,
                 left_out=chosen[task].left_out if task in chosen else TRIAL,
-                no_contact=NO_CONTACT if NO_CONTACT in _labels(dataset, task) else None,
+                no_contact=no_contact(task),
                 factors=classifier.products_.get(task, {}),
             )
             for task, choice in classifier.choices.items()
@@ -143,12 +149,6 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
     return folder.name, tuple(trials)
 
 
-def _labels(dataset: DataSet, task: str) -> set[str]:
-    if task not in dataset.tasks:
-        return set()
-    return {*dataset.labels(task).tolist(), *dataset.untouched_labels(task)}
-
-
 def report(fitted: Fitted, prices: Sequence[tuple[float, float]] | None = None) -> str:
     """The candidates, the choice of each task, notes and warnings, in lines."""
     lines = [*_table(fitted, prices), ""]
@@ -178,8 +178,7 @@ def _accuracy(chosen: Chosen) -> str:
 
 
 def _percent(result: Result) -> str:
-    low, high = result.interval
-    return f"{result.accuracy:.1%} ({100 * low:.0f} to {100 * high:.0f})"
+    return f"{result.accuracy:.1%} ({interval(result)})"
 
 
 def _described(choice: Choice, fitted: Fitted) -> str:
@@ -193,10 +192,8 @@ def _described(choice: Choice, fitted: Fitted) -> str:
 
 
 def _name(choice: Choice, candidates: Sequence[Candidate]) -> str:
-    for candidate in candidates:
-        if any(grid.features == choice.features for grid in candidate.grids):
-            return candidate.name
-    return " ".join(choice.features)
+    known = {grid.features: c.name for c in reversed(candidates) for grid in c.grids}
+    return known.get(choice.features, " ".join(choice.features))
 
 
 def _table(fitted: Fitted, prices: Sequence[tuple[float, float]] | None) -> list[str]:

@@ -13,6 +13,7 @@ import logging
 import statistics
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -125,28 +126,16 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
             "float32": (single, np.float32),
             "int8 matrices": (in_int8(single, Path(folder)), np.float32),
         }
-    rows: list[dict[str, Any]] = []
-    expected = None
-    for name, (graph, dtype) in formats.items():
-        labels, microseconds = answers(graph, vectors.astype(dtype), tasks)
-        expected = labels if expected is None else expected
-        others = float((labels != expected).mean())
-        rows.append(
-            {
-                "format": name,
-                "decision us": round(microseconds, 1),
-                "size kB": round(graph.ByteSize() / 1e3, 1),
-                "other labels %": round(100 * others, 2),
-            }
-        )
-    return rows
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the program's options."""
-    parser.add_argument("--model", type=Path, required=True, help="model.onnx")
-    parser.add_argument("--golden", type=Path, required=True, help="its golden.npz")
-    parser.add_argument("--out", type=Path, required=True, help="the JSON file to write")
+    found = [answers(graph, vectors.astype(dtype), tasks) for graph, dtype in formats.values()]
+    return [
+        {
+            "format": name,
+            "decision us": round(microseconds, 1),
+            "size kB": round(graph.ByteSize() / 1e3, 1),
+            "other labels %": round(100 * float((labels != found[0][0]).mean()), 2),
+        }
+        for (name, (graph, _)), (labels, microseconds) in zip(formats.items(), found, strict=True)
+    ]
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -159,8 +148,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-if __name__ == "__main__":
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program; returns 0 for success, 2 for bad usage or input."""
     top = argparse.ArgumentParser(prog="export.arithmetic", description=__doc__)
-    add_options(top)
+    top.add_argument("--model", type=Path, required=True, help="model.onnx")
+    top.add_argument("--golden", type=Path, required=True, help="its golden.npz")
+    top.add_argument("--out", type=Path, required=True, help="the JSON file to write")
     top.set_defaults(run=run)
-    raise SystemExit(dispatch(top, None))
+    return dispatch(top, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

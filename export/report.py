@@ -202,8 +202,9 @@ def _file(task: str) -> str:
 
 
 def _wrong(exported: Exported) -> Section:
-    """The trials told wrong, and a picture of one for each task."""
-    fitted, figures, rows = exported.fitted, [], []
+    """The trials told wrong, and a picture of one."""
+    figures: list[Figure] = []
+    fitted, rows = exported.fitted, []
     trials = names(fitted.measured)[1]
     for task, answer in exported.answers.items():
         for trial in answer.wrong:
@@ -220,13 +221,13 @@ def _wrong(exported: Exported) -> Section:
                     "pulled by": next(iter(why.pulls), ""),
                 }
             )
-        figures += [_picture(fitted, trials, task, answer) for _ in answer.wrong[:1]]
+        if answer.wrong and not figures:
+            figures.append(_picture(fitted, trials, task, answer))
     text = [
         "Each of these trials was told wrong by a model that had not seen it. The last column "
         "names the feature that tells most between the wrong answer and the nearest trial of the "
-        "right label. A wrong label or a touch that failed often stands out here. One of each "
-        "task is drawn; `edge-classify explain` and `python -m train show` say the same of any "
-        "recording."
+        "right label. A wrong label or a touch that failed often stands out here. One is "
+        "drawn; `edge-classify explain` and `python -m train show` say the same of any recording."
     ]
     tables = [Table("wrong", "Trials told wrong", rows)]
     return Section("Trials told wrong", text if rows else ["None."], tables, figures)
@@ -275,13 +276,10 @@ def _learning(exported: Exported) -> Section:
     n = len(exported.fitted.dataset.trials)
     folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
     sizes = [round(n * (1.0 - 1.0 / folds) * part / PARTS) for part in range(1, PARTS + 1)]
-    results = {
-        task: [
-            Result(int((said == truth)[truth != ""].sum()), int((truth != "").sum()))
-            for said in every
-        ]
-        for task, truth, every in ((t, a.truth, a.said) for t, a in exported.answers.items())
-    }
+    results = {}
+    for task, answer in exported.answers.items():
+        hits = (answer.said == answer.truth)[:, answer.truth != ""]
+        results[task] = [Result(int(part.sum()), part.size) for part in hits]
     rows: list[Row] = [
         {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}
         for i, size in enumerate(sizes)

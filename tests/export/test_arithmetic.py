@@ -56,10 +56,7 @@ def test_the_copy_in_float32_has_no_float64_left():
 def test_what_the_program_writes_the_report_reads(tmp_path, monkeypatch, rows, capsys):
     monkeypatch.setattr(arithmetic, "compare", lambda *_: rows)
     path = tmp_path / "formats.json"
-    top = ["--model", "m", "--golden", "g", "--out", str(path)]
-    parser = arithmetic.argparse.ArgumentParser()
-    arithmetic.add_options(parser)
 
-    assert arithmetic.run(parser.parse_args(top)) == 0
+    assert arithmetic.main(["--model", "m", "--golden", "g", "--out", str(path)]) == 0
     assert read_formats(path) == json.loads(path.read_text()) == rows
     assert capsys.readouterr().out.count("\n") == 3
