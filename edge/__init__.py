@@ -40,16 +40,14 @@ _PUBLIC = {
     "edge.touch.features": ["feature_vector"],
     "edge.touch.region": ["find_regions", "largest_region"],
 }
-_HOMES = {name: module for module, names in _PUBLIC.items() for name in names}
-__all__ = sorted(_HOMES)
+__all__ = sorted(name for names in _PUBLIC.values() for name in names)
 
 
 def __getattr__(name: str) -> Any:
-    home = _HOMES.get(name)
-    if home is None:
-        raise AttributeError(f"module 'edge' has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(home), name)
-    return value
+    for module, names in _PUBLIC.items():
+        if name in names:
+            return getattr(import_module(module), name)
+    raise AttributeError(f"module 'edge' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

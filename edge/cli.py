@@ -11,7 +11,7 @@ import logging
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from importlib import import_module
 
 from edge import __version__
@@ -73,7 +73,8 @@ def add_commands(
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse the arguments and run the command; returns the exit status.
 
-    An expected error becomes one sentence on stderr and exit status 2 or 3. A shell that asks for
+    An expected error becomes one sentence on stderr and exit status 2 or 3. Meanwhile, log messages
+    are printed to stderr, one line each. A shell that asks for
     completions gets them, if argcomplete is installed.
     """
     if "_ARGCOMPLETE" in os.environ:
@@ -84,22 +85,15 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     arguments = top.parse_args(argv)
     quieter = logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
     level = logging.DEBUG if getattr(arguments, "verbose", False) else quieter
-    with messages(top.prog, level):
-        return _run(top, arguments)
-
-
-@contextmanager
-def messages(prog: str, level: int = logging.INFO) -> Iterator[None]:
-    """Within the block, print log messages of this level and above to stderr, one line each."""
     handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter(f"{prog}: %(message)s"))
+    handler.setFormatter(logging.Formatter(f"{top.prog}: %(message)s"))
     loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
     before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.addHandler(handler)
         logger.setLevel(level)
     try:
-        yield
+        return _run(top, arguments)
     finally:
         for logger, former in zip(loggers, before, strict=True):
             logger.removeHandler(handler)

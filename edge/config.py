@@ -184,14 +184,13 @@ class ConfigTable:
         high: float = math.inf,
         *,
         open_low: bool = False,
+        value: object = REQUIRED,
     ) -> float:
-        """A finite number from `low` (or above it where `open_low`) to `high`."""
-        return self.as_number(key, self.get(key, default), low, high, open_low=open_low)
+        """A finite number from `low` (or above it where `open_low`) to `high`.
 
-    def as_number(
-        self, key: str, value: object, low: float, high: float, *, open_low: bool = False
-    ) -> float:
-        """A value that belongs to a key, such as an entry of its list, checked as in `number`."""
+        It is the key's, or a given value that belongs to the key, such as an entry of its list.
+        """
+        value = self.get(key, default) if value is REQUIRED else value
         number = math.nan
         if isinstance(value, int | float) and not isinstance(value, bool):
             with suppress(OverflowError):  # a whole number larger than any float
@@ -221,7 +220,7 @@ class ConfigTable:
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or count not in (None, len(value)):
             raise self.fail(key, f"a list of {'' if count is None else f'{count} '}numbers")
-        return tuple(self.as_number(key, x, low, high, open_low=open_low) for x in value)
+        return tuple(self.number(key, 0, low, high, open_low=open_low, value=x) for x in value)
 
     def flag(self, key: str, default: Any = REQUIRED) -> bool:
         """True or false."""

@@ -13,7 +13,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -178,7 +178,7 @@ def run(arguments: argparse.Namespace) -> int:
         # Angles go by the real clock.
         reading(arguments, arm=arm, dof=dof, real_time=arguments.joints is not None,
                 folder=folder, labels=labels) as live,
-        live.lines() as lines,
+        closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
     ):  # fmt: skip
         if arm is not None and arguments.joints is None and live.dof != dof:
@@ -216,18 +216,18 @@ def run(arguments: argparse.Namespace) -> int:
             saved = recorder.save(frames, complete=True)
             if page is not None and saved is not None:
                 page.saved(*saved)
-            if recorder.saved == (arguments.trials if folder else 1):
+            if len(recorder.paths) == (arguments.trials if folder else 1):
                 break
         else:
             recorder.save(trials.rest(), complete=False)
-    if not recorder.saved:
+    if not recorder.paths:
         silent = int((skin.invalid_for > 0).sum())
         where = f"; taxels without a valid value: {silent}" if silent else ""
         LOG.warning(f"there was no contact; nothing was saved{where}")
     elif arguments.joints is not None and not recorder.any_joints:
         LOG.error("--joints gave no angles at the times of the frames")
         return 1
-    return 0 if recorder.saved else 1
+    return 0 if recorder.paths else 1
 
 
 @dataclass
@@ -240,7 +240,7 @@ class Recorder:
         meta: further metadata of every trial.
         names: the joints' names, or None if they are unknown.
         lines: where the `saved` and `deleted` events go.
-        paths: the trials saved so far.
+        paths: the trials saved so far and not deleted.
         any_joints: whether a saved frame had joint angles.
     """
 
@@ -251,11 +251,6 @@ class Recorder:
     lines: Lines
     paths: list[Path] = field(default_factory=list)
     any_joints: bool = False
-
-    @property
-    def saved(self) -> int:
-        """Number of trials saved and not deleted."""
-        return len(self.paths)
 
     def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
         """Take a key: the number of a label holds it from now on, d deletes the last trial."""

@@ -11,6 +11,7 @@ import argparse
 import logging
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from typing import Any
 
 from edge.classifier import Classifier
@@ -114,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
             motion_on_skin=on_skin,
         )
         maps = [] if arguments.map is None else [map_writer(arguments.map, model.info)]
-        with live.lines(arguments.udp, maps) as lines:
+        with closing(live.lines(arguments.udp, maps)) as lines:
             notifier.ready(f"reading {live.source}")
             frames, unknown_touches = 0, UnknownTouches(arguments.model)
             for frame, faults in live.frames():

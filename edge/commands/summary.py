@@ -48,10 +48,11 @@ class Summary:
 
     def text(self) -> str:
         """One table for each task: a row for each true label, a column for each decided one."""
-        paragraphs = [_count(self.recordings, "recording")]
+        recordings = f"{self.recordings} recording{'s' * (self.recordings != 1)}"
+        paragraphs = [recordings]
         if self.as_trained:
             paragraphs.append(
-                f"{self.as_trained} of {_count(self.recordings, 'recording')} match a training "
+                f"{self.as_trained} of {recordings} match a training "
                 "trial to the last bit, so they are most likely training data, and the accuracy "
                 "below does not apply to new touches. The nested accuracy, which `make export` "
                 "and `edge-classify info` print, does."
@@ -67,10 +68,6 @@ class Summary:
                 f"{low:.1%} to {high:.1%})\n" + _matrix(pairs)
             )
         return "\n\n".join(paragraphs)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def _matrix(pairs: Counter[tuple[str, str]]) -> str:

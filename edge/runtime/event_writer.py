@@ -123,9 +123,7 @@ class LineWriter:
                 self._changed.notify_all()
 
     def close(self) -> None:
-        """Give the waiting lines a second to leave, or as long as patience lasts; twice is fine."""
-        if self._closed:
-            return
+        """Give the waiting lines a second to leave, or as long as patience lasts."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -142,8 +140,9 @@ class Lines:
 
     >>> import io
     >>> out = io.StringIO()
-    >>> with Lines(out) as lines:
-    ...     lines.write([{"event": "onset", "onset_s": 1.5}])
+    >>> lines = Lines(out)
+    >>> lines.write([{"event": "onset", "onset_s": 1.5}])
+    >>> lines.close()
     >>> out.getvalue()
     '{"event": "onset", "onset_s": 1.5}\\n'
     """
@@ -205,12 +204,6 @@ class Lines:
             if writer.lost:
                 lost = f"{writer.lost} lines could not be sent to {writer.name}: {writer.problem}"
                 print(f"edge-classify: {lost}", file=sys.stderr)
-
-    def __enter__(self) -> Lines:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _line_by_line(out: TextIO) -> Callable[[bytes], None]:

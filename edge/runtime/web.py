@@ -106,9 +106,7 @@ class WebServer:
             self.changed.notify_all()
 
     def close(self) -> None:
-        """Stop serving; more than once is fine."""
-        if self.closed:
-            return
+        """Stop serving."""
         with self.changed:
             self.closed = True
             self.changed.notify_all()

@@ -48,7 +48,8 @@ class SceneTable(ConfigTable):
         if len(ends) != 2:
             raise self.fail(key, "one number or a range [low, high]")
         low, high = (
-            self.as_number(key, end, field.low, field.high, open_low=field.open_low) for end in ends
+            self.number(key, 0, field.low, field.high, open_low=field.open_low, value=end)
+            for end in ends
         )
         if low > high:
             raise self.fail(key, f"a range with its lower limit first, [{high:g}, {low:g}]")

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +36,7 @@ def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp
 
 @contextmanager
 def recorder(folder, out=None, *, names=None):
-    with Lines(out or io.StringIO()) as lines:
+    with closing(Lines(out or io.StringIO())) as lines:
         yield Recorder(str(folder), {"object": "box"}, {}, names, lines)
 
 

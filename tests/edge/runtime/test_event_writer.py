@@ -6,7 +6,7 @@ import os
 import socket
 import threading
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import pytest
 
@@ -26,7 +26,7 @@ def listener():
 def test_each_event_is_a_line_and_the_same_line_a_datagram(listener):
     out = io.StringIO()
     events = [{"event": "onset", "onset_s": 1.5}, {"event": "decision", "label": "Kissen für 2"}]
-    with Lines(out, udp=f"127.0.0.1:{listener.getsockname()[1]}") as lines:
+    with closing(Lines(out, udp=f"127.0.0.1:{listener.getsockname()[1]}")) as lines:
         lines.write(events)
         received = [listener.recv(65536).decode() for _ in events]
     assert "".join(received) == out.getvalue()
@@ -39,7 +39,7 @@ def test_where_nobody_listens_lines_are_counted_and_the_file_is_whole():
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
     out = io.StringIO()
-    with Lines(out, udp=f"127.0.0.1:{port}") as lines:
+    with closing(Lines(out, udp=f"127.0.0.1:{port}")) as lines:
         for n in range(20):
             lines.write([{"n": n}])
     assert [json.loads(line)["n"] for line in out.getvalue().splitlines()] == list(range(20))
@@ -99,7 +99,7 @@ def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
     with os.fdopen(writing, "w") as out:
         reader = threading.Thread(target=read)
         reader.start()
-        with Lines(out, patient=lambda: True) as lines:
+        with closing(Lines(out, patient=lambda: True)) as lines:
             for n in range(20_000):
                 lines.write([{"n": n}])
     reader.join()
@@ -111,7 +111,7 @@ def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
 def test_a_reader_that_has_gone_is_known_and_no_traceback(capsys):
     reading, writing = os.pipe()
     os.close(reading)
-    with os.fdopen(writing, "w") as out, Lines(out) as lines:
+    with os.fdopen(writing, "w") as out, closing(Lines(out)) as lines:
         for _ in range(1000):
             lines.write([{"n": 1}])
             if lines.unheard:
