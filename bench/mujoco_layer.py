@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -89,8 +90,6 @@ class Rub:
 
     def hold(self, data: Any, loads: NDArray[np.float64]) -> None:
         """Set the pull of this step on arm and thing, from the pads' loads (n,)."""
-        import mujoco
-
         data.qfrc_applied[:] = 0.0
         most = self.friction * float(loads.sum())
         if most == 0.0:
@@ -101,20 +100,13 @@ class Rub:
         slips = along @ (self._speed(data, self.arm, point) - self._speed(data, self.thing, point))
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
         pull = min(max(pull, -most), most)
-        self.stretch = min(
-            max(self.stretch + slips * self.model.opt.timestep, -most / SHEAR_N_M),
-            most / SHEAR_N_M,
-        )
-        none = np.zeros(3)
-        for body, sign in ((self.arm, -1.0), (self.thing, 1.0)):
-            mujoco.mj_applyFT(
-                self.model, data, sign * pull * along, none, point, body, data.qfrc_applied
-            )
+        stretch, longest = self.stretch + slips * self.model.opt.timestep, most / SHEAR_N_M
+        self.stretch = min(max(stretch, -longest), longest)
+        for body, force in ((self.arm, -pull * along), (self.thing, pull * along)):
+            mujoco.mj_applyFT(self.model, data, force, np.zeros(3), point, body, data.qfrc_applied)
 
     def _speed(self, data: Any, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
         """(3,) m/s of a point of a body."""
-        import mujoco
-
         spatial = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, body, spatial, 0)
         return np.asarray(spatial[3:] + np.cross(spatial[:3], point - data.xpos[body]))

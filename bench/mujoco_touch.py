@@ -9,14 +9,15 @@ elastic layer (`mujoco_layer`); a plant is a set of hinged stems.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from bench import mujoco_layer
-from edge.errors import InputError
+from bench.mujoco_layer import ABOVE_FLOOR_M, SOLIMP
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
@@ -34,10 +35,8 @@ FACING_DEG = 76.0
 PAD_M, PAD_FLAT_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.0035, 0.02, 0.0015
 """A pad's radius around the forearm and half its straight part along it (flat over a taxel's 9 mm,
 to 0.1 mm); its mass; its damping divided by its stiffness."""
-SOLIMP, RIGID = 0.95, "-1e6 -2e3"
+RIGID = "-1e6 -2e3"
 """MuJoCo's contact is SOLIMP / (1 - SOLIMP) times as stiff as solref times the mass."""
-ABOVE_FLOOR_M = 0.30
-"""Height of the middle of the contact."""
 RIGID_KINDS = ("box", "drum", "drawer", "door")
 FOOT_M = 0.16
 """Length of a thing's foot along the push."""
@@ -118,7 +117,7 @@ class Touched:
 
     recording: Recording
     force: NDArray[np.float64]
-    moved_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    moved_m: NDArray[np.float64]
 
 
 def is_layer(touch: Touch) -> bool:
@@ -229,15 +228,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
 
 
 def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, int]]]:
-    """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are.
-
-    Raises:
-        InputError: MuJoCo is not installed.
-    """
-    try:
-        import mujoco
-    except ImportError:
-        raise InputError("transfer needs MuJoCo: pip install --group bench") from None
+    """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
     # It warns, and writes a file, of each face that only a layer's knots hold.
     mujoco.set_mju_user_warning(lambda text: None)
     chain = Chain.cody()
@@ -283,14 +274,8 @@ def lag(rate: NDArray[np.float64], touch: Touch) -> NDArray[np.float64]:
 
 
 def simulate(touch: Touch) -> Touched:
-    """One touch, as the board would have recorded it.
-
-    Raises:
-        InputError: MuJoCo is not installed.
-    """
+    """One touch, as the board would have recorded it."""
     model, start, where = model_of(touch)
-    import mujoco
-
     chain, thing = Chain.cody(), touch.thing
     rate, dof = swing(chain, touch), chain.dof
     data = mujoco.MjData(model)
@@ -323,28 +308,13 @@ def simulate(touch: Touch) -> Touched:
             mujoco.mj_step(model, data)
     condition = "fixed" if touch.fixed else "movable"
     soft = "soft" if thing.soft else "rigid"
-    meta = {
-        "labels": {
-            "category": f"{soft}-{condition}",
-            "mobility": condition,
-            "softness": soft,
-            "object": thing.kind,
-        },
-        "skin": {
-            **CODY_SKIN,
-            "counts_per_newton": COUNTS_PER_NEWTON,
-            "threshold_counts": THRESHOLD_COUNTS,
-            "onset_counts": ONSET_COUNTS,
-        },
-        "arm": chain.to_dict(),
-        "source": "MuJoCo, bench/mujoco_touch.py",
-    }
-    recording = Recording(
-        t=np.arange(len(frames)) / RATE_HZ,
-        frames=np.array(frames),
-        joints=np.array(joints),
-        valid=None,
-        meta=meta,
-    )
+    labels = {"category": f"{soft}-{condition}", "mobility": condition}
+    labels |= {"softness": soft, "object": thing.kind}
+    skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
+    skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
+    source = "MuJoCo, bench/mujoco_touch.py"
+    meta = {"labels": labels, "skin": skin, "arm": chain.to_dict(), "source": source}
+    t = np.arange(len(frames)) / RATE_HZ
+    recording = Recording(t, np.array(frames), joints=np.array(joints), meta=meta)
     place = np.array(places) - places[0]
     return Touched(recording, np.array(forces), np.hypot(place[:, 0], place[:, 1]))

@@ -21,6 +21,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from edge import demo
 from edge.classifier import Classifier
@@ -32,19 +33,8 @@ from edge.skin.loop import Loop
 from edge.touch.track import MAX_CONTACTS
 from tests.faulty import Fault, faulty_skin
 
-PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 GROWTH_KB = 2048
 """Allowed after the first tenth: pages that the allocator keeps, no more with more hours."""
-
-
-def resident_kb() -> int:
-    """Resident memory of this process."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_KB
-
-
-def descriptors() -> int:
-    """Files that this process has open."""
-    return len(os.listdir("/proc/self/fd"))
 
 
 def main() -> int:
@@ -53,7 +43,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--every", type=float, default=1.0, help="minutes between two lines")
     arguments = parser.parse_args()
-    model = Model(demo.MODEL)
+    model, process = Model(demo.MODEL), psutil.Process()
     touches = np.random.default_rng(0).integers(0, 3000, (50, 16, 24)).astype(np.uint16)
     touches[::2] = 0  # a second of contact, a second without
     faults = [Fault(code=code, rate=0.0005) for code in (errno.EREMOTEIO, errno.EIO)]
@@ -90,7 +80,7 @@ def main() -> int:
                         pass
             if frames % every == 0:
                 gc.collect()
-                now = resident_kb(), descriptors()
+                now = process.memory_info().rss // 1024, process.num_fds()
                 largest = max(largest, now[0])
                 if before is None or frames <= arguments.minutes * 600:
                     before = now

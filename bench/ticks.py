@@ -55,9 +55,7 @@ def loop() -> None:
     file = calibrated(skinfile.load(skinfile.shipped("cody")))
     file = replace(file, reading=replace(file.reading, rate_hz=RATE_HZ))
     clock, scene, model = PacedClock(), Playback(touch, loop=True), Model(demo.MODEL)
-    buses = fake_buses(file, scene, clock)
-    for bus in buses:
-        bus.__class__ = SlowBus
+    buses = fake_buses(file, scene, clock, make=SlowBus)
     page = Page(f"127.0.0.1:{PORT}", file.layout, title="ticks", decides=True)
     with Skin(file, buses, clock=clock) as skin, closing(page.server):
         skin.start()
