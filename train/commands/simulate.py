@@ -12,26 +12,19 @@ import sys
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("scene", help="a TOML file like train/scenes/cody18.toml")
-    parser.add_argument("--out", metavar="DIR", help="folder for the recordings")
-    parser.add_argument(
-        "--explain",
-        action="store_true",
-        help="print the effects that run, the reason for each, and its cost",
-    )
-    parser.add_argument("--seed", type=int, help="seed, instead of the scene's")
-    parser.add_argument(
-        "--trials",
-        type=int,
-        metavar="N",
-        help="trials of each object in each condition, instead of the scene's",
-    )
-    parser.add_argument("--batch", type=int, default=400, help="most trials simulated side by side")
-    parser.add_argument("--jobs", type=int, default=1, help="processes; -1 for all cores")
-    parser.add_argument(
-        "--backend", choices=("local", "dask"), default="local", help="where the batches run"
-    )
-    parser.add_argument("--address", help="address of a Dask scheduler, like tcp://127.0.0.1:8786")
+    option = parser.add_argument
+    option("scene", help="a TOML file like train/scenes/cody18.toml")
+    option("--out", metavar="DIR", help="folder for the recordings")
+    text = "print the effects that run, the reason for each, and its cost"
+    option("--explain", action="store_true", help=text)
+    option("--seed", type=int, help="seed, instead of the scene's")
+    text = "trials of each object in each condition, instead of the scene's"
+    option("--trials", type=int, metavar="N", help=text)
+    option("--batch", type=int, default=400, help="most trials simulated side by side")
+    option("--jobs", type=int, default=1, help="processes; -1 for all cores")
+    text = "where the batches run"
+    option("--backend", choices=("local", "dask"), default="local", help=text)
+    option("--address", help="address of a Dask scheduler, like tcp://127.0.0.1:8786")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -53,36 +46,26 @@ def run(arguments: argparse.Namespace) -> int:
 
         print(explain(scene))
     if arguments.out:
-        from train.progress import bar as progress_bar
+        from train.progress import bar
         from train.simulate.run import total_trials, write
 
-        with progress_bar(
-            total=total_trials(scene), unit="trial", desc=scene.name, file=sys.stderr
-        ) as bar:
-            written = write(
-                scene,
-                arguments.out,
-                batch=arguments.batch,
-                jobs=arguments.jobs,
-                address=arguments.address,
-                progress=bar.update,
-            )
-        print(f"{len(written.paths)} recordings in {arguments.out}", file=sys.stderr)
+        given = {name: getattr(arguments, name) for name in ("batch", "jobs", "address")}
+        with bar(total=total_trials(scene), unit="trial", desc=scene.name) as shown:
+            written = write(scene, arguments.out, **given, progress=shown.update)
+        lines = [f"{len(written.paths)} recordings in {arguments.out}"]
         if written.redrawn:
-            print(
-                f"{written.redrawn} of them were drawn again until they fitted their labels",
-                file=sys.stderr,
+            lines.append(
+                f"{written.redrawn} of them were drawn again until they fitted their labels"
             )
         if written.unfelt:
-            print(
+            lines.append(
                 f"in {written.unfelt} of them no taxel rises above skin.onset_counts "
-                f"({scene.skin.onset}), so no touch is felt",
-                file=sys.stderr,
+                f"({scene.skin.onset}), so no touch is felt"
             )
         for key, error in written.rough.items():
-            print(
+            lines.append(
                 f"{key} and its kind: no step is within trials.tolerance; the step taken errs by "
-                f"{100.0 * error:.2g} % of the peak force (see --explain)",
-                file=sys.stderr,
+                f"{100.0 * error:.2g} % of the peak force (see --explain)"
             )
+        print("\n".join(lines), file=sys.stderr)
     return 0

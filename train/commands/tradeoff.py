@@ -15,21 +15,13 @@ from pathlib import Path
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders"
-    )
-    parser.add_argument(
-        "--board",
-        required=True,
-        metavar="board.json",
-        help="what `edge-classify bench` wrote of a model that was fitted on these recordings",
-    )
-    parser.add_argument(
-        "--formats",
-        metavar="formats.json",
-        help="what `python -m export.arithmetic` wrote of that model: adds its number formats",
-    )
-    parser.add_argument(
+    option = parser.add_argument
+    option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
+    text = "what `edge-classify bench` wrote of a model that was fitted on these recordings"
+    option("--board", required=True, metavar="board.json", help=text)
+    text = "what `python -m export.arithmetic` wrote of that model: adds its number formats"
+    option("--formats", metavar="formats.json", help=text)
+    option(
         "--cost",
         type=cost,
         default=(10.0, 1.0),
@@ -37,19 +29,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="what a wrong decision and a second's wait cost you: the report names the window of "
         "least cost (default: wrong=10,second=1)",
     )
-    parser.add_argument(
-        "--scene", help="the scene that they were simulated from: adds the physical limit"
-    )
-    parser.add_argument(
-        "--task",
-        help="task of front.json (default: category, or else the first)",
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("build/tradeoff"), help="folder (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
-    )
+    option("--scene", help="the scene that they were simulated from: adds the physical limit")
+    option("--task", help="task of front.json (default: category, or else the first)")
+    option("--out", type=Path, default=Path("build/tradeoff"), help="folder (default: %(default)s)")
+    option("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
 
 
 def cost(text: str) -> tuple[float, float]:
