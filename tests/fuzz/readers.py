@@ -15,10 +15,13 @@ from random import Random
 from typing import Any
 
 import numpy as np
+from mcap.writer import CompressionType
 
 from edge.cli import main as edge_main
 from edge.errors import InputError
 from tests.fuzz import mutate
+from tests.train.importers.test_importers import dsa
+from tests.train.importers.test_log_importers import FRAMES, STORES, array, write_bag, write_mcap
 from train.__main__ import main as train_main
 
 ROOT = Path(__file__).parents[2]
@@ -186,21 +189,7 @@ def beside_a_scene(path: Path) -> None:
 
 def grasps() -> list[bytes]:
     """The XML of a small grasp of the SDH-2 hand."""
-    matrices = "".join(
-        f'<matrix index="{i}"><cells_x>6</cells_x><cells_y>{13 if i % 2 else 14}</cells_y>'
-        "<texel_width>3.4</texel_width></matrix>"
-        for i in range(6)
-    )
-    frames = "".join(
-        f"<frame><time_stamp>{1000 + 32 * i}</time_stamp><frame_data>{data}</frame_data></frame>"
-        # 486 zeros; then 100 zeros, a count of 600, 385 zeros.
-        for i, data in enumerate(["C3F30000", "C2C8000044160000C3C08000"])
-    )
-    angle = "<angle><time_stamp>1000</time_stamp><angle_data>1,2,3,4,5,6,7</angle_data></angle>"
-    return [
-        f"<root><sensor>{matrices}</sensor><data>{frames}</data>"
-        f"<joint_angles>{angle}</joint_angles></root>".encode()
-    ]
+    return [dsa().encode()]
 
 
 def read_grasp(path: Path) -> None:
@@ -211,45 +200,23 @@ def read_grasp(path: Path) -> None:
     importing("sdh2")(folder)
 
 
+def made(write: Callable[[Path], Path]) -> bytes:
+    """The bytes of a file that a function writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        return write(Path(folder) / "log").read_bytes()
+
+
 def logs() -> list[bytes]:
     """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
-    from mcap.writer import CompressionType, Writer
-
-    out = []
-    for options in ({"use_chunking": False}, {}, {"compression": CompressionType.LZ4}):
-        file = io.BytesIO()
-        writer = Writer(file, **options)
-        writer.start()
-        schema = writer.register_schema("frame", "jsonschema", b"{}")
-        for topic, message in (("/skin", {"counts": [[1, 2], [3, 4]]}), ("/q", {"q": [0.1, 0.2]})):
-            channel = writer.register_channel(topic, "json", schema)
-            for i in range(3):
-                data = json.dumps(message | {"t": 100.0 + i}).encode()
-                writer.add_message(channel, i * 10**9, data, i * 10**9)
-        writer.finish()
-        out.append(file.getvalue())
-    return out
+    ways: tuple[dict[str, Any], ...]
+    ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
+    return [made(lambda path, way=way: write_mcap(path, cdr=False, **way)) for way in ways]
 
 
 def bags() -> list[bytes]:
     """A ROS 1 bag of arrays."""
-    from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    types = get_typestore(Stores.ROS1_NOETIC)
-    kind = "std_msgs/msg/UInt16MultiArray"
-    dimension = types.types["std_msgs/msg/MultiArrayDimension"]
-    layout = types.types["std_msgs/msg/MultiArrayLayout"](
-        dim=[dimension(label=n, size=2, stride=0) for n in ("rows", "cols")], data_offset=0
-    )
-    message = types.types[kind](layout=layout, data=np.arange(4, dtype=np.uint16))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "a.bag"
-        with Writer(path) as bag:
-            connection = bag.add_connection("/skin", kind, typestore=types)
-            for i in range(3):
-                bag.write(connection, i * 10**9, types.serialize_ros1(message, kind))
-        return [path.read_bytes()]
+    messages = [array(STORES[1], frame) for frame in FRAMES]
+    return [made(lambda path: write_bag(path.with_suffix(".bag"), 1, messages, joints=False))]
 
 
 FRAME_FILES = [

@@ -3,15 +3,9 @@
 import numpy as np
 
 from edge.touch.feature_sets import expand
+from tests.train.test_agreement import TASKS
 from train.candidates import PLAIN, WITH_JOINTS, candidates, costs
 from train.pipeline import Choice
-
-TASKS = {
-    "category": np.array(["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]),
-    "mobility": np.array(["fixed", "movable", "fixed", "movable"]),
-    "object": np.array(["wall", "box", "pillow", "ball"]),
-    "softness": np.array(["rigid", "rigid", "soft", "soft"]),
-}
 
 
 def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():

@@ -12,13 +12,6 @@ from train.choose import groupable, kinds_of, without_folds
 from train.evaluate import AnswerTable
 from train.pipeline import Choice
 
-TASKS = {
-    "category": np.array(["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]),
-    "mobility": np.array(["fixed", "movable", "fixed", "movable"]),
-    "object": np.array(["wall", "box", "pillow", "ball"]),
-    "softness": np.array(["rigid", "rigid", "soft", "soft"]),
-}
-
 
 def test_whole_objects_can_be_left_out_where_each_class_has_several():
     objects = np.array(list("aabbccddeeff"))

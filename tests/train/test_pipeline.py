@@ -7,16 +7,9 @@ from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
+from tests.hard_cases.models import features
 from train.pipeline import Choice, ContactClassifier, NearestNeighbours, vote
 from train.projection import Projection
-
-
-def data(n=30, seed=0):
-    rng = np.random.default_rng(seed)
-    X = rng.gamma(2.0, size=(n, 120))
-    X[:, 40:80] *= 30
-    X[:, 80:] *= 0.02
-    return X
 
 
 def test_votes_and_ties():
@@ -36,7 +29,7 @@ def test_equal_distances_go_to_the_earlier_row():
 
 
 def test_the_estimators_work_in_a_scikit_learn_pipeline():
-    X, y = data(), np.repeat(["a", "b"], 15)
+    X, y = features(30), np.repeat(["a", "b"], 15)
     for kind in ("pca", "lda"):
         pipe = make_pipeline(Projection("IV", 3, kind=kind), NearestNeighbours(1))
         assert (pipe.fit(X, y).predict(X) == y).all()
@@ -46,7 +39,7 @@ def test_the_estimators_work_in_a_scikit_learn_pipeline():
 
 
 def test_a_classifier_answers_every_task_by_the_rules():
-    X = data()
+    X = features(30)
     y = {"kind": np.repeat(["a", "b"], 15), "object": np.tile(["x", "y", "z"], 10)}
     choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
     model = ContactClassifier(choices).fit(X, y)
@@ -68,4 +61,4 @@ def test_a_classifier_answers_every_task_by_the_rules():
 )
 def test_choices_that_make_no_sense_are_named(choice, word):
     with pytest.raises(InputError, match=word):
-        ContactClassifier({"t": choice}).fit(data(), {"t": np.repeat(["a", "b"], 15)})
+        ContactClassifier({"t": choice}).fit(features(30), {"t": np.repeat(["a", "b"], 15)})

@@ -8,20 +8,13 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from tests.hard_cases import exact
+from tests.hard_cases.models import features
 from train.projection import Projection, Spectrum, coordinate_bits, principal_axes
 from train.scaling import SCALINGS
 
 
-def data(n=30, seed=0):
-    rng = np.random.default_rng(seed)
-    X = rng.gamma(2.0, size=(n, 120))
-    X[:, 40:80] *= 30
-    X[:, 80:] *= 0.02
-    return X
-
-
 def test_components_match_long_double_and_have_a_fixed_sign():
-    X = data(n=50)
+    X = features(50)
     _, axes, values = principal_axes(X)
     centred = (X - X.mean(axis=0)).astype(np.longdouble)
     covariance = centred.T @ centred
@@ -48,7 +41,7 @@ def test_the_sign_does_not_hang_on_rounding():
 
 
 def test_components_stop_at_the_rank():
-    X = data(n=12)
+    X = features(12)
     fitted = Projection(components=20).fit(X)
     assert (fitted.weights_.shape[1], fitted.rank_) == (11, 11)
     rank_two = np.outer(np.arange(30.0), X[0]) + np.outer(np.arange(30.0) ** 2, X[1])
@@ -56,7 +49,7 @@ def test_components_stop_at_the_rank():
 
 
 def test_a_column_without_variance_gets_no_weight():
-    X = data()
+    X = features(30)
     X[:, 7] = 0.1
     X[:, 90] = 0.0
     _, axes, _ = principal_axes(X)
@@ -71,7 +64,7 @@ def test_a_column_without_variance_gets_no_weight():
     spread=st.sampled_from([1e-6, 1.0, 1e6]),
 )
 def test_coordinates_are_those_of_whole_numbers_in_any_order(seed, scaling, offset, spread):
-    X = data(seed=seed) * spread + offset
+    X = features(30, seed) * spread + offset
     p = Projection(scaling, 4).fit(X)
     z = p.transform(X)
     assert (z / p.grid_.unit).tolist() == exact.coordinates(X, p, 4).tolist()
@@ -103,14 +96,14 @@ def test_squared_distances_stay_below_2_to_the_53(components, bits):
 @pytest.mark.parametrize("components", [1, 5, 19, 20])
 def test_the_grid_of_principal_components_does_not_depend_on_their_number(components):
     """So that leave-one-out serves every number with one decomposition."""
-    X = data(40)
+    X = features(40)
     many, few = Projection("IV", 20).fit(X), Projection("IV", components).fit(X)
     assert few.grid_ == many.grid_
     assert (few.transform(X) == many.transform(X)[:, :components]).all()
 
 
 def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
-    X = data()
+    X = features(30)
     p = Projection("none", 20).fit(X)
     _, axes, _ = principal_axes(X)
     true = (X - p.mean_).astype(np.longdouble) @ axes[:20].T.astype(np.longdouble)
@@ -180,13 +173,13 @@ def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
 
 
 def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
-    X, labels = data(60), np.repeat([0, 1, 2], 20)
+    X, labels = features(60), np.repeat([0, 1, 2], 20)
     X[labels == 1, :40] += 3.0
     X[labels == 2, 40:80] += 90.0
     weights = Spectrum(X).discriminants(labels, 1e-9)
     top = weights[np.abs(weights).argmax(axis=0), np.arange(2)]
     assert (top > 0).all()
-    wide = data(900, seed=3)[:, ::7]
+    wide = features(900, seed=3)[:, ::7]
     labels = np.repeat([0, 1, 2], 300)
     wide[labels == 1] += 0.1
     z = wide @ Spectrum(wide).discriminants(labels, 1e-9)
@@ -196,7 +189,7 @@ def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
 
 
 def test_the_discriminants_of_several_tasks_stand_side_by_side():
-    X = data(40)
+    X = features(40)
     one, two = np.repeat(["a", "b"], 20), np.tile(["x", "y", "z", "z"], 10)
     both = Projection("IV", kind="lda").fit(X, np.column_stack([one, two]))
     apart = [Projection("IV", kind="lda").fit(X, y).weights_ for y in (one, two)]
@@ -212,9 +205,9 @@ def test_trials_that_are_all_equal_have_no_discriminant(value):
 
 def test_discriminants_without_labels_and_unknown_projections_are_refused():
     with pytest.raises(InputError, match="needs labels"):
-        Projection(kind="lda").fit(data())
+        Projection(kind="lda").fit(features(30))
     with pytest.raises(InputError, match="one of pca, lda, not 'nca'"):
-        Projection(kind="nca").fit(data())
+        Projection(kind="nca").fit(features(30))
 
 
 @pytest.mark.parametrize("offset", [1e6, 1e9])

@@ -2,19 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from edge.recording import load, save
 from edge.touch.track import ContactTracker
+from tests.train.test_dataset import twice
 from train.__main__ import main
 from train.dataset import contacts
-
-
-def twice(recording):
-    gap = np.zeros((50, *recording.frames.shape[1:]), dtype=np.uint16)
-    frames = np.concatenate([recording.frames, gap, recording.frames])
-    t = np.arange(len(frames)) / 100.0
-    return replace(recording, t=t, frames=frames, joints=None)
 
 
 def test_each_contact_becomes_a_recording_with_its_own_labels(make_touch, tmp_path, capsys):

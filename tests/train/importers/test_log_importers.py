@@ -205,33 +205,31 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
     assert np.array_equal(imported(tmp_path, "rosbag", path).frames, FRAMES)
 
 
-def write_mcap(path, *, cdr):
+def write_mcap(path, *, cdr, **options):
+    types = STORES[2]
+
+    def data(kind, message, fields):
+        return types.serialize_cdr(message, kind) if cdr else json.dumps(fields).encode()
+
+    frames = [
+        data("sensor_msgs/msg/Image", image(types, t, f), {"counts": f.tolist()})
+        for t, f in zip(T, FRAMES, strict=True)
+    ]
+    poses = [
+        data("sensor_msgs/msg/JointState", joint_state(types, t, q), {"q": q.tolist()})
+        for t, q in zip(JOINT_T, JOINTS, strict=True)
+    ]
     with path.open("wb") as file:
-        writer = McapWriter(file)
+        writer = McapWriter(file, **options)
         writer.start()
-        types = STORES[2]
-        if cdr:
-            frame_kind, joint_kind = "sensor_msgs/msg/Image", "sensor_msgs/msg/JointState"
-            frames = [
-                types.serialize_cdr(image(types, *x), frame_kind)
-                for x in zip(T, FRAMES, strict=True)
-            ]
-            poses = [
-                types.serialize_cdr(joint_state(types, *x), joint_kind)
-                for x in zip(JOINT_T, JOINTS, strict=True)
-            ]
-        else:
-            frame_kind, joint_kind = "frame", "joints"
-            frames = [json.dumps({"counts": f.tolist()}).encode() for f in FRAMES]
-            poses = [json.dumps({"q": q.tolist()}).encode() for q in JOINTS]
-        for topic, kind, times, data in (
-            ("/skin", frame_kind, T, frames),
-            ("/joints", joint_kind, JOINT_T, poses),
+        for topic, kind, times, messages in (
+            ("/skin", "Image", T, frames),
+            ("/joints", "JointState", JOINT_T, poses),
         ):
             encoding = ("ros2msg", "cdr") if cdr else ("jsonschema", "json")
-            schema = writer.register_schema(kind, encoding[0], b"{}")
+            schema = writer.register_schema(f"sensor_msgs/msg/{kind}", encoding[0], b"{}")
             channel = writer.register_channel(topic, encoding[1], schema)
-            for t, message in zip(times, data, strict=True):
+            for t, message in zip(times, messages, strict=True):
                 writer.add_message(channel, nanoseconds(t), bytes(message), nanoseconds(t))
         writer.finish()
     return path
