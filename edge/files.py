@@ -171,8 +171,7 @@ def write_whole(
     # The target's own name may already have the greatest length that the file system allows.
     temporary = folder / f".edge-classify-{os.urandom(8).hex()}"
     try:
-        if not folder.is_dir():
-            folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         with open(temporary, "xb") as file:
             yield file
             file.flush()

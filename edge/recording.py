@@ -177,11 +177,10 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         return isinstance(texts, list) and all(isinstance(x, str) and x != "" for x in texts)
 
     if isinstance(labels, dict) and labels:
-        labels = {
+        meta["labels"] = labels = {
             task: str(label) if type(label) is int or isinstance(label, np.integer) else label
             for task, label in labels.items()
         }
-        meta["labels"] = labels
     if not isinstance(labels, dict) or not are_names([*labels, *labels.values()]):
         fail("meta.labels must map task names to labels, both text")
     names = meta.get("joint_names")
@@ -383,13 +382,9 @@ def find(paths: list[str]) -> list[Path]:
         InputError: a path does not exist, or a folder holds no recording.
     """
     files: list[Path] = []
-    for text in paths:
-        path = Path(text)
-        if path.is_dir():
-            inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
-            if not inside:
-                raise InputError(f"{path}: no .npz recording in this folder")
-            files += inside
-        else:
-            files.append(path)
+    for path in map(Path, paths):
+        inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
+        if path.is_dir() and not inside:
+            raise InputError(f"{path}: no .npz recording in this folder")
+        files += inside if path.is_dir() else [path]
     return files

@@ -39,10 +39,8 @@ def ending_signals() -> list[int]:
     SIGHUP, sent when an ssh session drops, is one unless it was ignored from the start, as under
     nohup.
     """
-    signals: list[int] = [signal.SIGINT, signal.SIGTERM]
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
-        signals.append(signal.SIGHUP)
-    return signals
+    hangup = [] if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else [signal.SIGHUP]
+    return [signal.SIGINT, signal.SIGTERM, *hangup]
 
 
 def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:

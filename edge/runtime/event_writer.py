@@ -199,9 +199,8 @@ class Lines:
         if self._socket is not None:
             self._socket.close()
         for writer in self._writers:
-            if writer is self._out and writer.problem == os.strerror(errno.EPIPE):
-                continue  # the reader had enough
-            if writer.lost:
+            enough = writer is self._out and writer.problem == os.strerror(errno.EPIPE)
+            if writer.lost and not enough:
                 lost = f"{writer.lost} lines could not be sent to {writer.name}: {writer.problem}"
                 print(f"edge-classify: {lost}", file=sys.stderr)
 

@@ -157,10 +157,8 @@ class Joints:
             t, q = pose["t"], pose["q"]
         except (InputError, KeyError, TypeError):
             return self._bad('a line is not {"t": seconds, "q": [angles]}')
-        numbers = [t, *q] if isinstance(q, list) else []
-        if not numbers or any(
-            isinstance(x, bool) or not isinstance(x, int | float) for x in numbers
-        ):
+        numbers = [t, *q] if isinstance(q, list) else [None]
+        if any(type(x) not in (int, float) for x in numbers):
             return self._bad("a time or an angle is not a number")
         names = pose.get("names")
         if names is not None and self._names is not None:

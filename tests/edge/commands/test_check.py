@@ -1,13 +1,9 @@
 """`edge-classify check`: skins that cannot work, and what may be meant so."""
 
-import json
-import shutil
-
 import numpy
 import pytest
 
 from edge import __version__
-from edge.cli import main
 from edge.model.info import FORMAT
 from edge.runtime import board as board_module
 from edge.skin import file as skinfile
@@ -22,22 +18,14 @@ chips = [{ address = 0x5A, first = [0, 0], block = [3, 4] }]
 """
 
 
-@pytest.fixture
-def check(tmp_path, capsys):
-    def run(text):
-        path = tmp_path / "skin.toml"
-        path.write_text(text)
-        status = main(["check", str(path)])
-        out = capsys.readouterr()
-        return status, json.loads(out.out)["remarks"] if out.out else out.err
-
-    return run
-
-
-def test_a_pad_that_says_little_is_told_what_is_missing(check):
-    status, remarks = check(PAD)
+def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
+    (tmp_path / "skin.toml").write_text(PAD)
+    status, (event,), _ = edge("check", tmp_path / "skin.toml")
     assert status == 0
-    assert [r.split(":")[0] for r in remarks] == ["pitch_m is missing", "not calibrated yet"]
+    assert [r.split(":")[0] for r in event["remarks"]] == [
+        "pitch_m is missing",
+        "not calibrated yet",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -61,9 +49,10 @@ def test_a_pad_that_says_little_is_told_what_is_missing(check):
         ),
     ],
 )
-def test_a_skin_that_cannot_work_is_exit_1(check, old, new, said):
-    status, remarks = check(PAD.replace(old, new, 1))
-    assert said in " ".join(remarks)
+def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, old, new, said):
+    (tmp_path / "skin.toml").write_text(PAD.replace(old, new, 1))
+    status, (event,), _ = edge("check", tmp_path / "skin.toml")
+    assert said in " ".join(event["remarks"])
     assert status == (0 if "missing" in said else 1)
 
 
@@ -102,25 +91,22 @@ def test_check_says_where_the_wires_are_too_slow(edge, skin, more, status, rate,
 
 
 @pytest.mark.parametrize("name", ["cody", "mpr121", "matrix"])
-def test_a_skin_file_that_comes_with_the_program_works(name, tmp_path, capsys):
-    path = tmp_path / "skin.toml"
-    shutil.copy(skinfile.shipped(name), path)
-    assert main(["check", str(path)]) == 0
-    event = json.loads(capsys.readouterr().out)
+def test_a_skin_file_that_comes_with_the_program_works(edge, name):
+    status, (event,), _ = edge("check", skinfile.shipped(name))
+    assert status == 0
     assert "not calibrated yet" in event["remarks"][-1]
 
 
-def test_a_person_is_told_each_thing_once(tmp_path, capsys, monkeypatch):
+def test_a_person_is_told_each_thing_once(edge, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     path = tmp_path / "skin.toml"
     path.write_text(PAD)
-    assert main(["check", str(path)]) == 0
-    out = capsys.readouterr()
-    assert out.err == ""
-    first, *_, last = out.out.splitlines()
+    status, text, err = edge("check", path, text=True)
+    assert (status, err) == (0, "")
+    first, *_, last = text.splitlines()
     assert first == f"{path}: skin, 3 x 4 taxels on 1 chip"
     assert last.startswith("Remark: not calibrated yet")
-    assert out.out.count("pitch_m") == 1
+    assert text.count("pitch_m") == 1
 
 
 @pytest.fixture
