@@ -383,8 +383,10 @@ def find(paths: list[str]) -> list[Path]:
     """
     files: list[Path] = []
     for path in map(Path, paths):
-        inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
-        if path.is_dir() and not inside:
+        inside = [path]
+        if path.is_dir():
+            inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
+        if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
-        files += inside if path.is_dir() else [path]
+        files += inside
     return files

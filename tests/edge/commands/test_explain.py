@@ -1,16 +1,15 @@
 """`edge-classify explain`: the nearest trials by name, the features' pulls, the least changes."""
 
-import json
+from dataclasses import replace
 
 import pytest
 
-from edge.cli import main
+from edge.recording import save
 
 
-def test_a_program_gets_the_trials_by_name_and_the_parts(exported, recordings, capsys):
-    words = ["explain", str(exported / "model.onnx"), str(recordings / "hard_0.npz")]
-    assert main(words) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+def test_a_program_gets_the_trials_by_name_and_the_parts(edge, exported, recordings):
+    status, lines, _ = edge("explain", exported / "model.onnx", recordings / "hard_0.npz")
+    assert status == 0
     assert [line["task"] for line in lines] == ["category", "object"]
     category = lines[0]
     assert category["label"] == "rigid-fixed"
@@ -22,10 +21,11 @@ def test_a_program_gets_the_trials_by_name_and_the_parts(exported, recordings, c
     assert category["changes"][0]["label"] == "soft-fixed"
 
 
-def test_a_person_gets_lines_that_fit(exported, recordings, capsys, monkeypatch):
+def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    assert main(["explain", str(exported / "model.onnx"), str(recordings / "soft_1.npz")]) == 0
-    out = capsys.readouterr().out
+    given = (exported / "model.onnx", recordings / "soft_1.npz")
+    status, out, _ = edge("explain", *given, text=True)
+    assert status == 0
     assert "category: soft-fixed, by " in out
     assert "soft_1, soft-fixed\n" in out
     assert ", rigid-fixed, the nearest of another label\n" in out
@@ -34,10 +34,8 @@ def test_a_person_gets_lines_that_fit(exported, recordings, capsys, monkeypatch)
     assert max(map(len, out.splitlines()[1:])) <= 80
 
 
-def test_a_recording_without_contact_is_one_sentence(exported, recordings, capsys, tmp_path):
-    from edge.recording import Recording, load, save
-
-    touch = load(recordings / "hard_0.npz")
-    save(tmp_path / "a.npz", Recording(touch.t, 0 * touch.frames, touch.joints, meta=touch.meta))
-    assert main(["explain", str(exported / "model.onnx"), str(tmp_path / "a.npz")]) == 2
-    assert capsys.readouterr().err.endswith("a.npz: holds no contact\n")
+def test_a_recording_without_contact_is_one_sentence(edge, exported, make_touch, tmp_path):
+    touch = make_touch()
+    save(tmp_path / "a.npz", replace(touch, frames=0 * touch.frames))
+    status, _, err = edge("explain", exported / "model.onnx", tmp_path / "a.npz")
+    assert (status, err.endswith("a.npz: holds no contact\n")) == (2, True)

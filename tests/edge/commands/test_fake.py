@@ -1,6 +1,5 @@
 """`edge-classify fake`: a skin of any size is rehearsed without hardware."""
 
-import json
 import signal
 from contextlib import contextmanager
 
@@ -22,7 +21,7 @@ def test_what_to_rehearse_next_is_said_at_a_terminal(tmp_path, monkeypatch, caps
     assert int(frames.split()[-1]) == len(load(still).t)
 
 
-def test_plug_serves_the_skin_until_a_signal_and_names_each_device(monkeypatch, capsys):
+def test_plug_serves_the_skin_until_a_signal_and_names_each_device(edge, monkeypatch):
     plugged = []
 
     @contextmanager
@@ -33,23 +32,20 @@ def test_plug_serves_the_skin_until_a_signal_and_names_each_device(monkeypatch, 
         plugged.clear()
 
     monkeypatch.setattr(fake, "plugged", pretended)
-    assert main(["fake", "--skin", str(skinfile.shipped("mpr121")), "--plug"]) == 0
-    assert json.loads(capsys.readouterr().out) == {
-        "event": "plugged",
-        "bus": "/dev/i2c-1",
-        "device": "/dev/i2c-7",
-    }
+    status, (event,), _ = edge("fake", "--skin", skinfile.shipped("mpr121"), "--plug")
+    assert (status, event.pop("event")) == (0, "plugged")
+    assert event == {"bus": "/dev/i2c-1", "device": "/dev/i2c-7"}
     assert plugged == []
 
 
-def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(tmp_path, capsys):
+def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(edge, tmp_path):
     skin = tmp_path / "serial.toml"
     skin.write_text(
         "[skin]\nname = 'x'\nrows = 1\ncols = 2\nthreshold_counts = 5\n[[bus]]\n"
         "serial = '/dev/ttyACM0'\nkind = 'block'\nchips = [{ first = [0, 0], block = [1, 2] }]\n"
     )
-    assert main(["fake", "--skin", str(skin), "--plug"]) == 2
-    assert "/dev/ttyACM0 is a serial port" in capsys.readouterr().err
-    touch = str(demo.recordings()[0])
-    assert main(["fake", "--skin", str(skinfile.shipped("mpr121")), "--plug", touch]) == 2
-    assert "name its own skin file" in capsys.readouterr().err
+    status, _, err = edge("fake", "--skin", skin, "--plug")
+    assert (status, "/dev/ttyACM0 is a serial port" in err) == (2, True)
+    given = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])
+    status, _, err = edge("fake", *given)
+    assert (status, "name its own skin file" in err) == (2, True)

@@ -1,15 +1,12 @@
 """`edge-classify info`: what a model says of itself."""
 
-import json
-
 from edge import demo
-from edge.cli import main
 from edge.model.model import Model
 
 
-def test_a_program_gets_the_metadata_with_size_and_time(capsys):
-    assert main(["info", str(demo.MODEL)]) == 0
-    said = json.loads(capsys.readouterr().out)
+def test_a_program_gets_the_metadata_with_size_and_time(edge):
+    status, (said,), _ = edge("info", demo.MODEL)
+    assert status == 0
     info = Model(demo.MODEL).info
     assert said["bytes"] == demo.MODEL.stat().st_size
     assert said["decision_us"] > 0
@@ -19,10 +16,10 @@ def test_a_program_gets_the_metadata_with_size_and_time(capsys):
     }
 
 
-def test_a_person_gets_sentences(capsys, monkeypatch):
+def test_a_person_gets_sentences(edge, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    assert main(["info", str(demo.MODEL)]) == 0
-    out = capsys.readouterr().out
+    status, out, _ = edge("info", demo.MODEL, text=True)
+    assert status == 0
     info = Model(demo.MODEL).info
     for name, task in info.tasks.items():
         assert f"{name}: {task.accuracy:.1%} accurate (nested)" in out
@@ -31,24 +28,24 @@ def test_a_person_gets_sentences(capsys, monkeypatch):
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_two_models_are_compared_by_what_differs(exported, capsys, monkeypatch):
-    pair = [str(exported / "model.onnx"), str(demo.MODEL)]
-    assert main(["info", *pair]) == 0
-    changes = json.loads(capsys.readouterr().out)["changes"]
+def test_two_models_are_compared_by_what_differs(edge, exported, monkeypatch):
+    pair = [exported / "model.onnx", demo.MODEL]
+    status, (comparison,), _ = edge("info", *pair)
+    changes = comparison["changes"]
+    assert status == 0
     infos = [Model(path).info for path in pair]
     assert changes["rows"] == [info.rows for info in infos]
     assert changes["data_digest"] == [info.data_digest for info in infos]
     assert changes["tasks.category.labels"] == [list(i.tasks["category"].labels) for i in infos]
     assert "window_s" not in changes
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    assert main(["info", *pair]) == 0
-    out = " ".join(capsys.readouterr().out.split())
+    out = " ".join(edge("info", *pair, text=True)[1].split())
     assert "tasks.category.labels (2 -> 4): + rigid-movable, soft-movable" in out
     assert f"rows: 16 -> {infos[1].rows}" in out
     accuracies = [info.tasks["object"].accuracy for info in infos]
     assert f"tasks.object.accuracy: {accuracies[0]:.1%} -> {accuracies[1]:.1%}" in out
 
 
-def test_a_model_differs_from_itself_in_nothing(capsys):
-    assert main(["info", str(demo.MODEL), str(demo.MODEL)]) == 0
-    assert json.loads(capsys.readouterr().out) == {"event": "comparison", "changes": {}}
+def test_a_model_differs_from_itself_in_nothing(edge):
+    said = edge("info", demo.MODEL, demo.MODEL)
+    assert said == (0, [{"event": "comparison", "changes": {}}], "")

@@ -1,11 +1,9 @@
 """Labels of recordings, listed and changed."""
 
-import json
 from dataclasses import replace
 
 import pytest
 
-from edge.cli import main
 from edge.recording import load, save
 
 
@@ -19,15 +17,9 @@ def folder(make_touch, tmp_path):
     return tmp_path
 
 
-def label(capsys, *arguments):
-    """The exit status, and the JSON lines printed."""
-    status = main(["label", *map(str, arguments), "--json"])
-    return status, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-
-
-def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, capsys):
+def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, edge):
     before = (folder / "a.npz").read_bytes()
-    status, lines = label(capsys, folder)
+    status, lines, _ = edge("label", folder)
     assert status == 0
     assert lines[0] == {
         "event": "labels",
@@ -37,9 +29,10 @@ def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, caps
     assert (folder / "a.npz").read_bytes() == before
 
 
-def test_a_file_is_relabelled_and_keeps_all_else(folder, capsys):
+def test_a_file_is_relabelled_and_keeps_all_else(folder, edge):
     before = load(folder / "a.npz")
-    _, lines = label(capsys, folder / "a.npz", "--set", "object=brick", "--set", "softness=rigid")
+    new = ("--set", "object=brick", "--set", "softness=rigid")
+    _, lines, _ = edge("label", folder / "a.npz", *new)
     after = load(folder / "a.npz")
     assert lines[0]["labels"] == after.labels
     assert after.labels == {"category": "rigid-fixed", "object": "brick", "softness": "rigid"}
@@ -47,8 +40,8 @@ def test_a_file_is_relabelled_and_keeps_all_else(folder, capsys):
     assert {**after.meta, "labels": before.labels} == before.meta
 
 
-def test_a_task_is_renamed_also_in_the_labels_of_contacts(folder, capsys):
-    label(capsys, folder, "--rename", "object=thing")
+def test_a_task_is_renamed_also_in_the_labels_of_contacts(folder, edge):
+    edge("label", folder, "--rename", "object=thing")
     assert load(folder / "a.npz").labels == {"category": "rigid-fixed", "thing": "hard 0"}
     assert load(folder / "b.npz").meta["contacts"] == [{"thing": "hard 1"}, {"thing": "hard 2"}]
 
@@ -60,8 +53,8 @@ def test_a_task_is_renamed_also_in_the_labels_of_contacts(folder, capsys):
         (("--set", "object=x"), "b.npz: its contacts have labels of their own for object"),
     ],
 )
-def test_what_cannot_be_changed_leaves_every_file_as_it_was(change, sentence, folder, capsys):
+def test_what_cannot_be_changed_leaves_every_file_as_it_was(change, sentence, folder, edge):
     before = (folder / "a.npz").read_bytes()
-    assert main(["label", str(folder), *change]) == 2
-    assert sentence in capsys.readouterr().err
+    status, _, err = edge("label", folder, *change)
+    assert (status, sentence in err) == (2, True)
     assert (folder / "a.npz").read_bytes() == before
