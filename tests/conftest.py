@@ -43,6 +43,7 @@ def touch(
     layout: SkinLayout = FOREARM,
     arm: bool = True,
     rate: float = 100.0,
+    labels: dict[str, str] | None = None,
 ) -> Recording:
     """A contact that grows: a hard one in force, a soft one in area. It imitates no physics."""
     rng = np.random.default_rng([seed, len(kind)])
@@ -64,11 +65,9 @@ def touch(
         joints = np.tile([0.2, 0.1, 0.0, 1.2, 0.0], (n, 1))
         joints[:, 0] += 0.3 * t * slope
         assert joints.shape[1] == chain.dof
-    labels = {
-        "category": "rigid-fixed" if kind == "hard" else "soft-fixed",
-        "object": f"{kind} {seed % 2}",
-    }
-    meta = {"labels": labels, "skin": layout.to_dict(), "source": "test", "trial": seed}
+    own = {"category": f"{'rigid' if kind == 'hard' else 'soft'}-fixed"}
+    own["object"] = f"{kind} {seed % 2}"
+    meta = {"labels": labels or own, "skin": layout.to_dict(), "source": "test", "trial": seed}
     return Recording(t=t, frames=frames, joints=joints, meta=meta)
 
 
@@ -76,6 +75,14 @@ def touch(
 def make_touch():
     """The function that makes a contact."""
     return touch
+
+
+def save_touches(folder: Path, count: int, **more) -> Path:
+    """The folder, with so many hard and so many soft touches."""
+    for kind in ("hard", "soft"):
+        for seed in range(count):
+            save(folder / f"{kind}_{seed:02d}.npz", touch(kind=kind, seed=seed, **more))
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,7 @@ import pytest
 import edge
 from edge import demo
 from edge.fake.player import play, skin_file
+from tests.conftest import save_touches
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 PACKAGE = EXAMPLES / "ros2" / "edge_classify_ros"
@@ -40,10 +41,8 @@ def test_a_recording_is_classified(monkeypatch, capsys):
 
 
 def test_a_model_is_fitted_and_exported(monkeypatch, capsys, make_touch, tmp_path):
-    for kind in ("hard", "soft"):
-        for seed in range(5):
-            edge.save(tmp_path / "trials" / f"{kind}-{seed}.npz", make_touch(kind=kind, seed=seed))
-    run(monkeypatch, capsys, "fit_and_export.py", tmp_path / "trials", tmp_path / "model.onnx")
+    trials = save_touches(tmp_path / "trials", 5)
+    run(monkeypatch, capsys, "fit_and_export.py", trials, tmp_path / "model.onnx")
     model = edge.Model(tmp_path / "model.onnx")
     events = edge.Classifier(model).classify(make_touch(kind="hard", seed=9))
     decided = {event.task: event.label for event in events if isinstance(event, edge.Decided)}

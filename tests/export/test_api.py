@@ -1,6 +1,7 @@
 """Fit and export from Python, and the sentences that go with a model."""
 
 import hashlib
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -89,17 +90,13 @@ def test_a_row_a_candidate_says_what_it_gives_and_costs(fitted):
     prices = measure(fitted)
     assert all(us > 0 and kilobytes > 1 for us, kilobytes in prices)
     lines = report(fitted, prices).splitlines()
-    assert lines[0].split()[-5:] == ["us", "a", "decision", "kB"] or lines[0].endswith("kB")
+    assert lines[0].endswith("kB")
     assert lines[1].startswith("paper  ")
 
 
 def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
-    still = make_touch(seconds=0.0)
-    save(tmp_path / "still.npz", still)
-    odd = make_touch()
-    save(
-        tmp_path / "odd.npz", replace(odd, meta={**odd.meta, "labels": {"category": "soft-fixed"}})
-    )
+    save(tmp_path / "still.npz", make_touch(seconds=0.0))
+    save(tmp_path / "odd.npz", make_touch(labels={"category": "soft-fixed"}))
     paths = [str(recordings), str(tmp_path)]
     fitted = train.fit(paths, features=["paper"], projection="pca", window_s=9.0, jobs=1)
     text = report(fitted)
@@ -110,9 +107,8 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
 
 
 def test_recordings_of_no_contact_are_decided_as_such(recordings, make_touch, tmp_path):
-    still = make_touch(seconds=0.0)
-    labels = {"category": "none", "object": "hard 0"}
-    save(tmp_path / "still.npz", replace(still, meta={**still.meta, "labels": labels}))
+    still = make_touch(seconds=0.0, labels={"category": "none", "object": "hard 0"})
+    save(tmp_path / "still.npz", still)
     paths = [str(recordings), str(tmp_path)]
     fitted = train.fit(paths, features=["paper"], projection="pca", jobs=1)
     assert not any("no contact" in line for line in warnings(fitted))
@@ -146,9 +142,8 @@ def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
 
 def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     """One touch stored under three names, twice with its own label and once with another."""
-    for path in sorted(recordings.glob("*.npz")):
-        save(tmp_path / path.name, load(path))
-    touch = load(path)
+    shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
+    touch = load(recordings / "soft_7.npz")
     save(tmp_path / "again.npz", touch)
     other = {**touch.labels, "object": "another"}
     save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
@@ -157,13 +152,11 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     assert [line.split(" have")[0] for line in said] == ["warning: object: 3 trials"]
 
 
-def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings, tmp_path):
+def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings):
     """A skin that was stored with a scale of its own: one trial of newtons a million times too
     many leaves a few steps for all others."""
-    for path in sorted(recordings.glob("*.npz")):
-        save(tmp_path / path.name, load(path))
     fixed = {"features": ["paper"], "projection": "pca", "scaling": "none", "jobs": 1, "k": 1}
-    fitted = train.fit(str(tmp_path), components=5, **fixed)
+    fitted = train.fit(str(recordings), components=5, **fixed)
     assert not any("steps" in line for line in warnings(fitted))
     outlier = fitted.X.copy()
     outlier[7] *= 3e6

@@ -20,24 +20,39 @@ from edge.touch.features import FEATURES
 from export.__main__ import main as export
 from export.api import save as save_model
 from export.graph import to_onnx
+from tests.conftest import PAPER, save_touches
 from train.dataset import load_trials
 from train.pipeline import Choice
 from train.stopping import SequentialClassifier
 
 POINTS = "0.3,0.6,1.2"
-PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")
 
 
 @pytest.fixture(scope="module")
-def early(make_touch, tmp_path_factory):
+def early(tmp_path_factory):
     """A model with decision points, and the recordings that it was fitted on."""
     folder = tmp_path_factory.mktemp("early")
-    for kind in ("hard", "soft"):
-        for seed in range(15):
-            save(folder / "data" / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
-    given = ["--data", str(folder / "data"), "--out", str(folder / "out"), *PAPER]
+    given = ["--data", str(save_touches(folder / "data", 15)), "--out", str(folder / "out"), *PAPER]
     assert export([*given, "--decision-points", POINTS, "--scaling", "IV"]) == 0
     return Model(folder / "out" / "model.onnx"), folder
+
+
+@pytest.fixture
+def error(early):
+    """The smallest error that is certified for category."""
+    return early[0].info.stopping["category"].smallest_error
+
+
+def written(path, data):
+    """The model of these bytes."""
+    path.write_bytes(data)
+    return Model(path)
+
+
+def decided(model, recording, error):
+    """{task: the decision} of a recording."""
+    events = Classifier(model, recording.layout, error=error).classify(recording)
+    return {event.task: event for event in events if isinstance(event, Decided)}
 
 
 def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
@@ -52,8 +67,7 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     info = replace(
         info, stopping=sequential.stopping_, novelty=sequential.novelty_, rows=132, trials=()
     )
-    (tmp_path / "model.onnx").write_bytes(to_onnx(sequential, info))
-    model = Model(tmp_path / "model.onnx")
+    model = written(tmp_path / "model.onnx", to_onnx(sequential, info))
     for point, fitted in enumerate(sequential.decision_points_):
         for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
             own = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
@@ -71,53 +85,42 @@ def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early):
     assert {f"{task}_decision_point_label" for task in model.info.tasks} <= named
 
 
-def test_the_board_stops_where_the_rule_does(early, make_touch):
+def test_the_board_stops_where_the_rule_does(early, make_touch, error):
     model, _ = early
-    error = model.info.stopping["category"].smallest_error
     rule = stopping_rules(model, error)["category"]
     for seed in (50, 51, 52):
-        recording = make_touch(kind="soft", seed=seed)
-        classifier = Classifier(model, recording.layout, error=error)
-        lines = [event.to_dict() for event in classifier.classify(recording)]
-        (decision,) = (line for line in lines if line.get("task") == "category")
+        decision = decided(model, make_touch(kind="soft", seed=seed), error)["category"].to_dict()
         assert decision["window_s"] in model.decision_points_s[: rule.last + 1]
         assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
 
 
-def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(early, make_touch):
+def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(early, make_touch, error):
     model, _ = early
-    recording = make_touch(kind="soft", seed=50, seconds=0.25)
-    classifier = Classifier(
-        model, recording.layout, error=model.info.stopping["category"].smallest_error
-    )
-    decided = [event for event in classifier.classify(recording) if isinstance(event, Decided)]
-    assert [event.task for event in decided] == list(model.info.tasks)
-    assert all("short" in event.flags for event in decided)
+    events = decided(model, make_touch(kind="soft", seed=50, seconds=0.25), error)
+    assert list(events) == list(model.info.tasks)
+    assert all("short" in event.flags for event in events.values())
 
 
 def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule(
-    early, make_touch, monkeypatch
+    early, make_touch, monkeypatch, error
 ):
     model, _ = early
-    error = model.info.stopping["category"].smallest_error
     rule = replace(stopping_rules(model, error)["category"], confidence=2.0, last=1)
     waits = replace(model.info.stopping["category"], rules=(rule,))
     monkeypatch.setitem(model.info.stopping, "category", waits)
-    events = Classifier(model, error=error).classify(make_touch(seed=50))
-    (category,) = (e for e in events if isinstance(e, Decided) and e.task == "category")
+    category = decided(model, make_touch(seed=50), error)["category"]
     assert (category.window_s, category.stopped_by) == (model.decision_points_s[1], "window")
 
 
-def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch):
+def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch, error):
     model, _ = early
-    error = model.info.stopping["category"].smallest_error
     stopping = model.info.stopping["object"]
     never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
     monkeypatch.setitem(model.info.stopping, "object", never)
-    events = Classifier(model, error=error).classify(make_touch(seed=50))
-    flags = {e.task: "uncertified" in e.flags for e in events if isinstance(e, Decided)}
+    events = decided(model, make_touch(seed=50), error)
+    flags = {task: "uncertified" in event.flags for task, event in events.items()}
     assert flags == {"category": False, "object": True}
 
 
@@ -131,30 +134,17 @@ def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is
     known = make_touch(kind="hard", seed=50)
     strange = replace(known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535))
     error = max(stopping.smallest_error for stopping in model.info.stopping.values())
-    decided = {
-        name: {
-            e.task: e
-            for e in Classifier(model, error=asked).classify(touch)
-            if isinstance(e, Decided)
-        }
-        for name, touch, asked in (
-            ("known", known, error),
-            ("strange", strange, error),
-            ("waited", strange, None),
-        )
-    }
-    at = {name: {e.window_s for e in by_task.values()} for name, by_task in decided.items()}
-    assert at == {"known": {0.3}, "strange": {1.2}, "waited": {1.2}}
-    assert all("unknown" in e.flags for e in decided["waited"].values())
-    assert decided["waited"]["object"].label != "unknown"
+    met, unmet, waited = (
+        decided(model, touch, asked)
+        for touch, asked in ((known, error), (strange, error), (strange, None))
+    )
+    at = [{event.window_s for event in events.values()} for events in (met, unmet, waited)]
+    assert at == [{0.3}, {1.2}, {1.2}]
     assert model.info.novelty.task == "object"
-    assert {e.task: "unknown" in e.flags for e in decided["strange"].values()} == {
-        "category": True,
-        "object": True,
-    }
-    assert decided["strange"]["object"].label == "unknown"
-    assert decided["strange"]["category"].label == "rigid-fixed"
-    assert not any("unknown" in e.flags for e in decided["known"].values())
+    assert all("unknown" in event.flags for event in (*unmet.values(), *waited.values()))
+    assert not any("unknown" in event.flags for event in met.values())
+    assert unmet["object"].label == "unknown" != waited["object"].label
+    assert unmet["category"].label == "rigid-fixed"
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
@@ -173,10 +163,9 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early)
         options.graph_optimization_level = getattr(onnxruntime.GraphOptimizationLevel, level)
         session = onnxruntime.InferenceSession(model.path, options)
         names = [output.name for output in session.get_outputs()]
-        seen = dict(zip(names, session.run(None, {"features": X}), strict=True))
-        assert {name: values.tolist() for name, values in seen.items()} == {
-            name: values.tolist() for name, values in expected.items()
-        }
+        seen = session.run(names, {"features": X})
+        assert [v.tolist() for v in seen] == [expected[name].tolist() for name in names]
+        assert set(names) == set(expected)
 
 
 def pressed(make_touch, seeds):
@@ -206,10 +195,9 @@ def test_no_decision_contradicts_another(agreeing, make_touch, asked):
     _, model = agreeing
     assert model.info.products.keys() == {"category"}
     for recording in pressed(make_touch, range(50, 55)):
-        events = Classifier(model, error=asked).classify(recording)
-        decided = {event.task: event for event in events if isinstance(event, Decided)}
-        parts = [decided[task] for task in ("softness", "mobility")]
-        category = decided["category"]
+        events = decided(model, recording, asked)
+        parts = [events[task] for task in ("softness", "mobility")]
+        category = events["category"]
         assert category.label == "-".join(part.label for part in parts)
         assert category.decision.label == category.label
         assert category.window_s == max(part.window_s for part in parts)
@@ -231,8 +219,7 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(agreeing,
     for task, course in courses.items():
         at, wrong = course.under(model.info.stopping[task].rule(error))
         for i, recording in enumerate(recordings):
-            events = Classifier(model, error=error).classify(recording)
-            (event,) = (e for e in events if isinstance(e, Decided) and e.task == task)
+            event = decided(model, recording, error)[task]
             assert event.window_s == model.decision_points_s[at[i]]
             assert (event.label != truth[task][i]) == wrong[i]
 
@@ -256,10 +243,9 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
         rows=45,
         trials=(),
     )
-    (tmp_path / "model.onnx").write_bytes(to_onnx(sequential, info))
+    model = written(tmp_path / "model.onnx", to_onnx(sequential, info))
     labels = [{"t": "c", "u": "y"}, {"t": "a", "u": "strange"}, {"u": "x", "t": "b"}]
-    data = taught(Model(tmp_path / "model.onnx"), ["one", "two", "three"], more, labels)
-    (tmp_path / "taught.onnx").write_bytes(data)
+    data = taught(model, ["one", "two", "three"], more, labels)
     for point, vectors in zip(sequential.decision_points_, more, strict=True):
         for task, known in (("t", [0, 1, 2]), ("u", [0, 2])):
             before, after = point.spaces_[task], (*point.spaces_[task], task)
@@ -272,8 +258,8 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
             new = [sorted(set(y[task])).index(labels[i][task]) for i in known]
             point.labels_[task] = np.array([*point.labels_[task], *new])
         del point.projections_[before]
-    (tmp_path / "oracle.onnx").write_bytes(to_onnx(sequential, replace(info, rows=48)))
-    model, oracle = Model(tmp_path / "taught.onnx"), Model(tmp_path / "oracle.onnx")
+    oracle = written(tmp_path / "oracle.onnx", to_onnx(sequential, replace(info, rows=48)))
+    model = written(tmp_path / "taught.onnx", data)
     for point in range(3):
         for vectors in (queries[point], more[point]):
             expected = oracle.run(vectors, point)

@@ -7,8 +7,7 @@ import pytest
 
 from edge.model.model import Model
 from export.__main__ import main
-
-PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
+from tests.conftest import PAPER
 
 
 def test_the_report_says_what_was_chosen_among_and_what_was_chosen(recordings, tmp_path, capsys):
@@ -32,7 +31,7 @@ def test_the_report_says_what_was_chosen_among_and_what_was_chosen(recordings, t
 
 
 def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
-    command = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "2", *PAPER]
+    command = ["--data", str(recordings), "--out", str(tmp_path), *PAPER, "--jobs", "2"]
     assert main(command) == 0
     for name in ("model.onnx", "golden.npz"):
         assert (tmp_path / name).read_bytes() == (exported / name).read_bytes()

@@ -163,18 +163,14 @@ def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
             assert answers[f"{task}_distances"].tolist() == distances.tolist()
 
 
-@pytest.mark.parametrize("scaling", SCALINGS)
-def test_every_scaling_agrees_with_the_estimators(export, scaling):
-    X = features(60)
-    fitted, model = export(X, {"t": Choice(scaling, 7, 3)})
-    assert differences(fitted, model, np.concatenate([X, features(40, seed=1)])) == []
-
-
-@pytest.mark.parametrize("k", [1, 2, 3, 4, 7, 8, 40])
-def test_every_number_of_voters_agrees_down_to_the_last_tie(export, k):
+@pytest.mark.parametrize(
+    "choice",
+    [*(Choice(s, 7, 3) for s in SCALINGS), *(Choice("IV", 3, k) for k in (1, 2, 3, 4, 7, 8, 40))],
+)
+def test_every_scaling_and_number_of_voters_agree_down_to_the_last_tie(export, choice):
     X = features(40)
-    fitted, model = export(X, {"t": Choice("IV", 3, k)})
-    assert differences(fitted, model, features(100, seed=1)) == []
+    fitted, model = export(X, {"t": choice})
+    assert differences(fitted, model, np.concatenate([X, features(100, seed=1)])) == []
 
 
 def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):

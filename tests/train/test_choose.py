@@ -25,9 +25,9 @@ def drawn_touches(make_touch, kinds=("box", "bin", "post"), numbered=True):
     touches = {}
     for seed, (category, kind, i) in enumerate(product(("hard", "soft"), kinds, (1, 2))):
         thing = f"{category} {kind} {i:02d}" if numbered else f"{category} {kind} {'ab'[i - 1]}"
-        one = make_touch(kind=category, seed=seed)
         labels = {"category": category, "object": thing}
-        touches[thing] = replace(one, meta={**one.meta, "labels": labels, "simulation": {}})
+        touches[thing] = make_touch(kind=category, seed=seed, labels=labels)
+        touches[thing].meta["simulation"] = {}
     return touches
 
 
@@ -70,11 +70,11 @@ FEW = {"features": ["max_force"], "projection": "pca", "scaling": "none", "k": 1
 def touches(make_touch, folder, seconds, late_s):
     """Touches of two kinds that differ from `late_s` after onset on."""
     for seed in range(20):
-        one = make_touch(seed=seed, seconds=seconds, arm=False, rate=25.0)
+        labels = {"kind": "ab"[seed % 2]}
+        one = make_touch(seed=seed, seconds=seconds, arm=False, rate=25.0, labels=labels)
         frames = np.minimum(one.frames, 700)
         frames[one.t > 0.2 + late_s] //= 1 + seed % 2
-        meta = {**one.meta, "labels": {"kind": "ab"[seed % 2]}}
-        save(folder / f"{seed}.npz", replace(one, frames=frames, meta=meta))
+        save(folder / f"{seed}.npz", replace(one, frames=frames))
     return str(folder)
 
 

@@ -1,6 +1,5 @@
 """From recordings to a fitted model, from Python."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,9 +45,8 @@ def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
 def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_path):
     for kind in ("hard", "soft"):
         for seed in range(9):
-            one = make_touch(kind=kind, seed=seed)
             labels = {"category": kind, "object": f"{kind} {seed % 3}"}
-            save(tmp_path / f"{kind}{seed}.npz", replace(one, meta={**one.meta, "labels": labels}))
+            save(tmp_path / f"{kind}{seed}.npz", make_touch(kind=kind, seed=seed, labels=labels))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     assert fitted.chosen["category"].left_out == "object"
     assert fitted.chosen["object"].left_out == "trial"
@@ -57,10 +55,9 @@ def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_
 def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     recordings, make_touch, tmp_path
 ):
-    still = make_touch(seconds=0.0)
     for name, label in (("missed", "rigid-fixed"), ("empty", "none")):
         labels = {"category": label, "object": "hard 0"}
-        save(tmp_path / f"{name}.npz", replace(still, meta={**still.meta, "labels": labels}))
+        save(tmp_path / f"{name}.npz", make_touch(seconds=0.0, labels=labels))
     paths = [str(recordings), str(tmp_path)]
     both = train.fit(paths, features=["paper"], projection="pca", scaling="IV", jobs=1)
     alone = train.fit(paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1)

@@ -3,13 +3,13 @@
 import csv
 import re
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from edge.recording import save
 from tests import browser
+from tests.conftest import save_touches
 from train.__main__ import main
 from train.evaluate import Result
 from train.study import methods
@@ -91,12 +91,8 @@ def test_what_a_wrong_object_says_of_the_category():
 
 
 @pytest.fixture(scope="module")
-def studied(make_touch, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("touches")
-    for kind in ("hard", "soft"):
-        for seed in range(12):
-            touch = make_touch(kind=kind, seed=seed, seconds=1.3, rate=25.0)
-            save(folder / f"{kind}_{seed:02d}.npz", touch)
+def studied(tmp_path_factory):
+    folder = save_touches(tmp_path_factory.mktemp("touches"), 12, seconds=1.3, rate=25.0)
     out = tmp_path_factory.mktemp("study")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(methods, "TREES", 10)
@@ -172,9 +168,8 @@ def test_bad_input_is_one_sentence(given, sentence, recordings, tmp_path, capsys
 
 def test_trials_of_one_class_are_nothing_to_study(make_touch, tmp_path, capsys):
     for seed in range(20):
-        touch = make_touch(kind="hard", seed=seed, seconds=0.3, rate=25.0)
-        alone = replace(touch, meta={**touch.meta, "labels": {"mobility": "fixed"}})
-        save(tmp_path / f"{seed:02d}.npz", alone)
+        touch = make_touch(seed=seed, seconds=0.3, rate=25.0, labels={"mobility": "fixed"})
+        save(tmp_path / f"{seed:02d}.npz", touch)
     assert main(["study", "--data", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
     assert "every trial has the same mobility: there is nothing to distinguish" in last

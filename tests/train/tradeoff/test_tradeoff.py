@@ -13,12 +13,12 @@ import pytest
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.stopping import StoppingRule
-from edge.recording import save
 from edge.skin import file as skinfile
 from edge.statistics import wilson
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export
 from tests import browser
+from tests.conftest import save_touches
 from train.__main__ import main as train
 from train.choose import Chosen
 from train.commands.tradeoff import cost
@@ -217,11 +217,9 @@ class TestEarly:
         assert decisions.gain[0] == 0.0
         assert (decisions.mean_s, decisions.early, decisions.unknown) == (0.6, 1.0, 0.0)
 
-    def test_what_is_plain_at_the_first_decision_point_is_decided_then(self, make_touch, tmp_path):
-        for kind in ("hard", "soft"):
-            for seed in range(20):
-                save(tmp_path / f"{kind}_{seed:02d}.npz", make_touch(kind=kind, seed=seed))
-        compared = early.compare_stopping(followed(read([tmp_path])), (0.6, 1.2))["category"]
+    def test_what_is_plain_at_the_first_decision_point_is_decided_then(self, tmp_path):
+        dataset = followed(read([save_touches(tmp_path, 20)]))
+        compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
         assert compared.right.all()
         rule = next(certified for certified in compared.certified if certified.asked == 0.15)
         assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
@@ -277,22 +275,19 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, cap
     assert not (tmp_path / "out").exists()
 
 
-def test_report_pictures_tables_and_front_are_written(make_touch, tmp_path, monkeypatch):
+def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     from train.tradeoff import run as running
 
-    for kind in ("hard", "soft"):
-        for seed in range(14):
-            touch = make_touch(kind=kind, seed=seed, rate=50.0)
-            save(tmp_path / "data" / f"{kind}_{seed:02d}.npz", touch)
+    data = str(save_touches(tmp_path / "data", 14, rate=50.0))
     monkeypatch.setattr(running, "FEWEST", 28)
     monkeypatch.setattr(costs, "PARTS", (1,))
     monkeypatch.setattr(running, "WINDOWS_S", (0.4, 1.2))
     monkeypatch.setattr(costs, "WAITS_S", (0.4,))
     monkeypatch.setattr(costs, "EVERY", (4,))
-    digest = read([tmp_path / "data"]).digest
+    digest = read([data]).digest
     path = board_file(tmp_path / "board.json", digest)
     out = tmp_path / "out"
-    report = tradeoff([str(tmp_path / "data")], out, str(path), scene_path=str(SCENE))
+    report = tradeoff([data], out, str(path), scene_path=str(SCENE))
     text = report.read_text()
     assert "http" not in text
     assert "62 MB of memory, and 812 ms from starting Python" in text
