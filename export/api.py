@@ -198,13 +198,9 @@ def _name(choice: Choice, candidates: Sequence[Candidate]) -> str:
 
 def _table(fitted: Fitted, prices: Sequence[tuple[float, float]] | None) -> list[str]:
     """A row for each candidate: the nested accuracy of its own numbers, and its price."""
-    tasks = list(fitted.chosen)
     wide = max(len(candidate.name) for candidate in fitted.candidates)
-    head = f"{'features':<{wide}}  how"
-    head += "".join(f"  {task:>22}" for task in tasks)
-    if prices is not None:
-        head += "  us a decision      kB"
-    lines = [head]
+    lines = [f"{'features':<{wide}}  how" + "".join(f"  {task:>22}" for task in fitted.chosen)]
+    lines[0] += "" if prices is None else "  us a decision      kB"
     for i, candidate in enumerate(fitted.candidates):
         line = f"{candidate.name:<{wide}}  {candidate.projection}"
         own = {(grid.features, grid.projection) for grid in candidate.grids}
@@ -219,16 +215,14 @@ def _table(fitted: Fitted, prices: Sequence[tuple[float, float]] | None) -> list
 
 def warnings(fitted: Fitted) -> list[str]:
     """Sentences on data that flatter or spoil a model."""
-    dataset, lines = fitted.dataset, []
+    dataset, classifier, lines = fitted.dataset, fitted.classifier, []
     some = [path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()]
     if some:
-        share = len(some) / (len(dataset.trials) + len(dataset.untouched))
-        lines.append(
-            f"{'warning: ' if share > MISSING_SHARE else ''}without a contact above "
-            f"{dataset.layout.onset} counts, and counted as wrong: {_files(some)}"
-        )
-        if share > MISSING_SHARE:
-            lines[-1] += "; `python -m train thresholds` proposes thresholds"
+        line = f"without a contact above {dataset.layout.onset} counts, and counted as wrong: "
+        line += _files(some)
+        if len(some) / (len(dataset.trials) + len(dataset.untouched)) > MISSING_SHARE:
+            line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
+        lines.append(line)
     for what, paths in dataset.left_out.items():
         total = len({trial.path for trial in dataset.trials} | set(paths))
         lines.append(
@@ -256,34 +250,33 @@ def warnings(fitted: Fitted) -> list[str]:
             f"after its onset ({longest:.2f} s)"
         )
     for task, chosen in fitted.chosen.items():
-        classifier = fitted.classifier
-        dropped = chosen.choice.components - classifier.components_[task]
+        space, components = classifier.spaces_[task], classifier.components_[task]
+        dropped = chosen.choice.components - components
         if dropped > 0 and chosen.choice.projection == "pca":
             lines.append(
-                f"warning: {task}: the trials span {classifier.components_[task]} components, "
-                f"{dropped} fewer than asked for"
+                f"warning: {task}: the trials span {components} components, {dropped} fewer than "
+                "asked for"
             )
-        rows = classifier.rows_[classifier.spaces_[task]][:, : classifier.components_[task]]
+        rows = classifier.rows_[space][:, :components]
         equal = told_by_order(rows, classifier.labels_[task])
         if equal:
             lines.append(
                 f"warning: {task}: {equal} trials have the same coordinates as a trial of another "
                 "label; the earlier trial counts as nearer, so their order decides the label"
             )
-        projection = classifier.projections_[classifier.spaces_[task]]
+        projection = classifier.projections_[space]
         steps, place = coarseness(rows, projection.grid_.unit)
-        farthest = classifier.members_[classifier.spaces_[task]][place]
+        farthest = classifier.members_[space][place]
         if steps < FEWEST_UNITS:
             lines.append(
                 f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps "
                 f"of another one, since {dataset.trials[farthest].path} lies far outside all "
                 "others; leave it out if its recording is wrong"
             )
-        gap = projection.gap_
-        if gap < CLOSE_EIGENVALUES:
+        if projection.gap_ < CLOSE_EIGENVALUES:
             lines.append(
-                f"warning: {task}: two components explain the same variance to within {gap:.1e}; "
-                "which of them is kept is arbitrary"
+                f"warning: {task}: two components explain the same variance to within "
+                f"{projection.gap_:.1e}; which of them is kept is arbitrary"
             )
     return lines
 
@@ -343,10 +336,8 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     full = fitted.measured
     choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
     names = tuple(n for n in full.names if any(n in c.features for c in choices.values()))
-    y = {
-        task: full.labels(task)
-        for task in {*choices, *(t for c in choices.values() for t in c.targets)}
-    }
+    tasks = {*choices, *(target for c in choices.values() for target in c.targets)}
+    y = {task: full.labels(task) for task in tasks}
     part = full.of(names)
     X = part.features(fitted.window_s, fitted.samples)
     classifier = ContactClassifier(choices, names, part.widths(fitted.samples)).fit(X, y)

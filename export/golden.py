@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,20 +41,15 @@ def trials_of(dataset: DataSet, count: int) -> list[int]:
 
 def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     """A quarter second before onset to two frames past the window."""
-    t = recording.t
-    a = int(np.searchsorted(t, onset_s - 0.25))
-    b = int(np.searchsorted(t, onset_s + model.info.window_s)) + 2
-    valid = recording.valid
-    if valid is None:
-        valid = np.ones(recording.frames.shape[1:], dtype=bool)
-    if valid.ndim == 2:
-        valid = np.broadcast_to(valid, recording.frames.shape)
-    return Recording(
-        t=t[a:b],
-        frames=recording.frames[a:b],
-        joints=None if recording.joints is None else recording.joints[a:b],
-        valid=valid[a:b],
-        meta=recording.meta,
+    first, last = np.searchsorted(recording.t, (onset_s - 0.25, onset_s + model.info.window_s))
+    kept = slice(first, last + 2)
+    valid = np.array(True) if recording.valid is None else recording.valid
+    return replace(
+        recording,
+        t=recording.t[kept],
+        frames=recording.frames[kept],
+        joints=None if recording.joints is None else recording.joints[kept],
+        valid=np.broadcast_to(valid, recording.frames.shape)[kept],
     )
 
 
@@ -70,10 +66,9 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         trial = dataset.trials[i]
         part = trimmed(trial.recording, trial.onset_s, model)
         series = first_series(part, model)
-        if series is None:
-            continue
-        pieces.append(part)
-        contacts.append(series)
+        if series is not None:
+            pieces.append(part)
+            contacts.append(series)
     rng = np.random.default_rng(20120101)
     own = np.stack([info.vector(s) for _, s in contacts])
     rows = X[rng.permutation(len(X))[: VECTORS // 2]]
@@ -97,19 +92,13 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     if info.dof is not None:
         arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
     if info.decision_points_s:
-        at_decision_points = np.stack(
-            [
-                np.stack([info.vector(s, window) for _, s in contacts])
-                for window in info.decision_points_s
-            ]
-        )
+        windows = info.decision_points_s
+        early = np.array([[info.vector(s, window) for _, s in contacts] for window in windows])
         # Besides the trials, which were trained with, points between them.
-        between = 0.5 * (at_decision_points + np.roll(at_decision_points, 1, axis=1))
-        arrays["decision_point_vectors"] = np.concatenate([at_decision_points, between], axis=1)
-    bounds = {
-        key: bound
-        for key, bound in BOUNDS.items()
-        if info.has_label_distances or key != "label_distances"
-    }
+        between = 0.5 * (early + np.roll(early, 1, axis=1))
+        arrays["decision_point_vectors"] = np.concatenate([early, between], axis=1)
+    bounds = dict(BOUNDS)
+    if not info.has_label_distances:
+        del bounds["label_distances"]
     meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)

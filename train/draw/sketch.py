@@ -61,12 +61,10 @@ def draw_side(
         since, place = last
         first = first or place
         if since == 0.0:
-            label = f"contact {text}"
-            axis.plot(
-                *place[0][[0, 2]], "*", color=style, ms=13, mec="white", ls="none", label=label
-            )
+            star = {"color": style, "ms": 13, "mec": "white", "ls": "none"}
+            axis.plot(*place[0][[0, 2]], "*", **star, label=f"contact {text}")
         if drawn:
-            motion = _thing(axis, drawn, first, place[0], since, (style, hatch))
+            motion = _thing(axis, drawn, first, place[0], since, color=style, hatch=hatch)
     title = "seen from the side"
     if drawn:
         effects, mass = drawn.get("effects"), _size(drawn, "mass_kg")
@@ -119,18 +117,8 @@ def _turned(outline: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(outline @ np.array([[c, -s], [s, c]]))
 
 
-def _fill(axis: Any, outline: np.ndarray, style: tuple[str, str]) -> None:
-    color, hatch = style
-    axis.fill(*outline.T, facecolor=color, edgecolor=color, alpha=0.25, hatch=hatch)
-
-
 def _thing(
-    axis: Any,
-    drawn: dict[str, Any],
-    first: Place,
-    now: np.ndarray,
-    since: float,
-    style: tuple[str, str],
+    axis: Any, drawn: dict[str, Any], first: Place, now: np.ndarray, since: float, **style: Any
 ) -> str:
     """Draw the object where it now stands; its motion in words, for the title.
 
@@ -140,7 +128,7 @@ def _thing(
     Args:
         first: the contact at onset.
         now: (3,) position of the last contact, `since` seconds ago.
-        style: colour and hatching.
+        style: colour and hatching, by their names in matplotlib.
     """
     start = first[0][[0, 2]]
     ahead = math.copysign(1.0, first[1][0] or 1.0)
@@ -164,9 +152,8 @@ def _thing(
             # A pot that slides takes its stems along; otherwise they bend as far as pressed.
             bent = max(moved - slid - behind, 0.0) * (top - floor) / -floor
             ends = slid + behind + np.array([0.0, bent])
-            axis.plot(
-                start[0] + ahead * ends, start[1] + [floor, top], color=style[0], alpha=0.5, lw=1
-            )
+            heights, lines = start[1] + [floor, top], {"color": style["color"], "alpha": 0.5}
+            axis.plot(start[0] + ahead * ends, heights, **lines, lw=1)
         return ""
     motion = ""
     aside, foot = _size(drawn, "aside_m"), _size(drawn, "foot_m")
@@ -181,14 +168,14 @@ def _thing(
         outline[:, 0] += slid
         if "turning" in effects and aside is not None and foot is not None:
             angle = slid * aside / ((foot / 3.0) ** 2 + aside**2)
-            _from_above(axis, foot, aside, slid, angle, style)
+            _from_above(axis, foot, aside, slid, angle, **style)
             motion = f", turns by {math.degrees(angle):.0f} degrees" if slid else ""
-    _fill(axis, start + outline * [ahead, 1.0], style)
+    axis.fill(*(start + outline * [ahead, 1.0]).T, alpha=0.25, **style)
     return motion
 
 
 def _from_above(
-    side: Any, foot: float, aside: float, moved: float, angle: float, style: tuple[str, str]
+    side: Any, foot: float, aside: float, moved: float, angle: float, **style: Any
 ) -> None:
     """Draw an object from above in a corner, pushed to the right and turned about the contact."""
     if not side.child_axes:
@@ -198,5 +185,5 @@ def _from_above(
         corner.set(xticks=[], yticks=[])
     corner = side.child_axes[0]
     corners = np.array([[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]]) * foot - [0.0, aside]
-    _fill(corner, _turned(corners, angle) + np.array([moved, 0.0]), style)
-    corner.plot(moved, 0.0, "*", color=style[0])
+    corner.fill(*(_turned(corners, angle) + np.array([moved, 0.0])).T, alpha=0.25, **style)
+    corner.plot(moved, 0.0, "*", color=style["color"])

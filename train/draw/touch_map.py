@@ -71,17 +71,11 @@ def draw(
             axis.plot(line[:, across], line[:, up], label=None if i else name, **behind)
         for i, label in enumerate(sorted(set(labels))):
             those = np.array([seen == label for seen in labels])
-            axis.scatter(
-                positions[those, across],
-                positions[those, up],
-                s=90,
-                marker=MARKERS[i % len(MARKERS)],
-                color="0.6" if label == UNKNOWN else f"C{i % 10}",
-                alpha=0.35 + 0.65 * sure[those],
-                edgecolors="black",
-                linewidths=0.6,
-                label=f"{label} ({int(those.sum())})",
-            )
+            style = {"s": 90, "edgecolors": "black", "linewidths": 0.6}
+            style["color"] = "0.6" if label == UNKNOWN else f"C{i % 10}"
+            style |= {"marker": MARKERS[i % len(MARKERS)], "alpha": 0.35 + 0.65 * sure[those]}
+            text = f"{label} ({int(those.sum())})"
+            axis.scatter(*positions[those][:, [across, up]].T, **style, label=text)
         unit = "m" if contacts.head.unit == "metre" else contacts.head.unit
         axis.set(xlabel=f"{'xyz'[across]} ({unit})", ylabel=f"{'xyz'[up]} ({unit})", title=view)
         axis.set_aspect("equal", adjustable="datalim")

@@ -15,7 +15,7 @@ def sketch(effects, moved=0.1, since=0.0, **values):
     axis = Figure().add_subplot()
     drawn = {"effects": effects, "values": values}
     now = FIRST[0] + [moved, 0.0, 0.0]
-    return axis, sketches._thing(axis, drawn, FIRST, now, since, ("blue", "//"))
+    return axis, sketches._thing(axis, drawn, FIRST, now, since, color="blue", hatch="//")
 
 
 def outline(axis):
@@ -97,5 +97,5 @@ def test_the_skin_is_seen_as_thick_as_it_is_and_the_object_no_higher_than_it(for
 @pytest.mark.parametrize("effects", [5, [1, 2], ["stems"], ["turning", "sliding", "tipping"]])
 def test_a_scene_that_makes_no_sense_is_drawn_as_far_as_it_does(values, effects):
     axis, drawn = Figure().add_subplot(), {"effects": effects, "values": values, "family": 3}
-    sketches._thing(axis, drawn, FIRST, FIRST[0] + [0.1, 0.0, 0.0], 0.0, ("blue", "//"))
+    sketches._thing(axis, drawn, FIRST, FIRST[0] + [0.1, 0.0, 0.0], 0.0, color="blue", hatch="//")
     assert axis.lines
