@@ -92,7 +92,7 @@ def _left_out(
         owned = None if own is None else own[train]
         model.fit(X[train], {name: labels[train] for name, labels in y.items()}, owned)
         rows = model.neighbours(task, X[test])[1]
-        said.append(classes[vote(index[train][rows], len(classes))[0]])
+        said.append(classes[vote(index[train][rows])])
     key, c = model.spaces_[task], model.components_[task]
     p, known = model.projections_[key], model.rows_[key][:, :c]
     weights = p.weights_[:, :c]

@@ -28,7 +28,7 @@ from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of, types_of
 from train.projection import Spectrum
-from train.scaling import centred_and_scaled, widths_of
+from train.scaling import centred_and_scaled, finite, widths_of
 
 FOLDS = 10
 SEED = 2012
@@ -381,14 +381,10 @@ def evaluate(
     Raises:
         InputError: there are fewer than three folds, or X is not finite.
     """
-    X = np.ascontiguousarray(X, dtype=np.float64)
     count = int(folds.max()) + 1
     if count < 3:
         raise InputError(f"nested accuracy needs at least 3 folds, not {count}; record more")
-    if not np.isfinite(X).all():
-        raise InputError(
-            f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
-        )
+    X = finite(X)
     classes = {
         task: np.where(labels == "", -1, np.unique(labels[labels != ""]).searchsorted(labels))
         for task, labels in y.items()

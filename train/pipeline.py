@@ -12,33 +12,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
-from sklearn.base import BaseEstimator, ClassifierMixin
-from sklearn.utils.validation import check_is_fitted
 
 from edge.errors import InputError
 from edge.model.teaching import nearest_of_label
 from edge.touch.features import FEATURES
 from train.agreement import factors_of
 from train.projection import Projection
-from train.scaling import widths_of
+from train.scaling import finite, widths_of
 
 
-def vote(labels: NDArray[np.int64], classes: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Majority of the neighbours' labels; a tie goes to the nearest neighbour among the tied.
+def vote(labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) majority of the neighbours' labels (n, k), nearest first.
 
-    Args:
-        labels: (n, k) class of each neighbour, nearest first.
-        classes: how many classes there are.
-
-    Returns:
-        (n,) winners and (n, classes) shares of the votes.
+    A tie goes to the nearest neighbour among the tied.
     """
-    n, k = labels.shape
-    votes = np.zeros((n, classes))
-    np.add.at(votes, (np.arange(n)[:, None], labels), 1.0)
-    own = np.take_along_axis(votes, labels, axis=1)
-    nearest = own.argmax(axis=1)  # the first, hence the nearest, of those with most votes
-    return labels[np.arange(n), nearest], votes / k
+    votes = (labels[:, :, None] == labels[:, None]).sum(axis=2)
+    # The first, hence the nearest, of those with most votes.
+    return np.take_along_axis(labels, votes.argmax(axis=1)[:, None], axis=1)[:, 0]
 
 
 def squared_distances(X: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -46,41 +36,6 @@ def squared_distances(X: NDArray[np.float64], rows: NDArray[np.float64]) -> NDAr
     return (
         np.asarray(cdist(X, rows, "sqeuclidean")) if X.shape[1] else np.zeros((len(X), len(rows)))
     )
-
-
-class NearestNeighbours(ClassifierMixin, BaseEstimator):
-    """k nearest neighbours under the project's rules.
-
-    Euclidean distance; majority vote; a tie goes to the nearest neighbour among the tied; equal
-    distances go to the earlier training row.
-
-    Args:
-        k: neighbours that vote, at most the training rows.
-    """
-
-    def __init__(self, k: int = 1) -> None:
-        self.k = k
-
-    def fit(self, X: NDArray[np.float64], y: NDArray[np.str_]) -> NearestNeighbours:
-        """Keep the rows X (n, c) and their labels y (n,)."""
-        self.rows_ = np.asarray(X, dtype=np.float64)
-        self.classes_, self.labels_ = np.unique(np.asarray(y), return_inverse=True)
-        if not 1 <= self.k <= len(self.rows_):
-            raise InputError(f"k must be 1 to {len(self.rows_)} training trials, not {self.k}")
-        return self
-
-    def kneighbors(self, X: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Distances and rows (m, k) of the neighbours of X (m, c), nearest first."""
-        check_is_fitted(self)
-        squares = squared_distances(np.asarray(X, dtype=np.float64), self.rows_)
-        rows = np.argsort(squares, axis=1, kind="stable")[:, : self.k]
-        return np.sqrt(np.take_along_axis(squares, rows, axis=1)), rows
-
-    def predict(self, X: NDArray[np.float64]) -> NDArray[np.str_]:
-        """(m,) labels."""
-        _, rows = self.kneighbors(X)
-        winners, _ = vote(self.labels_[rows], len(self.classes_))
-        return np.asarray(self.classes_[winners])
 
 
 def label_distances(
@@ -192,11 +147,7 @@ class ContactClassifier:
             X, y: the trials; labels are empty where a trial has none.
             own: (n,) whether a trial is the owner's, see `Choice.counts`.
         """
-        X = np.asarray(X, dtype=np.float64)
-        if not np.isfinite(X).all():
-            raise InputError(
-                f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
-            )
+        X = finite(X)
         self.n_trials_, self.n_features_in_ = X.shape
         self.spaces_: dict[str, Space] = {}
         counts: dict[Space, NDArray[np.int64]] = {}
@@ -266,31 +217,30 @@ class ContactClassifier:
         """Coordinates (m, c) of vectors (m, p)."""
         return self.projections_[space].transform(X[:, self.columns_[space]])
 
-    def neighbours(
-        self, task: str, X: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Distances and training rows (m, k) for vectors (m, p), nearest first."""
-        space, c = self.spaces_[task], self.components_[task]
-        nearest = NearestNeighbours(self.choices[task].k).fit(
-            self.rows_[space][:, :c], self.classes_[task][self.labels_[task]]
-        )
-        distances, rows = nearest.kneighbors(self.project(space, X)[:, :c])
-        return distances, self.members_[space][rows]
-
     def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, members) squared distances of vectors (m, p) to the trials of the task's space."""
         space, c = self.spaces_[task], self.components_[task]
         return squared_distances(self.project(space, X)[:, :c], self.rows_[space][:, :c])
 
+    def neighbours(
+        self, task: str, X: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Distances and training rows (m, k) for vectors (m, p), nearest first."""
+        squares = self.squares(task, X)
+        near = self.nearest(task, squares)
+        distances = np.sqrt(np.take_along_axis(squares, near, axis=1))
+        return distances, self.members_[self.spaces_[task]][near]
+
+    def nearest(self, task: str, squares: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(m, k) places of the smallest squares (m, members); of equal ones the first."""
+        return np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
+
     def predict(self, X: NDArray[np.float64]) -> dict[str, NDArray[np.str_]]:
         """{task: (m,) labels} for vectors (m, p)."""
-        answers: dict[str, NDArray[np.str_]] = {}
-        for task in self.choices:
-            squares = self.squares(task, np.asarray(X, dtype=np.float64))
-            rows = np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
-            winners, _ = vote(self.labels_[task][rows], len(self.classes_[task]))
-            answers[task] = self.classes_[task][winners]
-        return answers
+        return {
+            task: self.classes_[task][vote(labels[self.nearest(task, self.squares(task, X))])]
+            for task, labels in self.labels_.items()
+        }
 
 
 def columns_of(

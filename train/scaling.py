@@ -25,6 +25,20 @@ def _exponents(X: NDArray[np.float64], axes: tuple[int, ...]) -> NDArray[np.int3
     return np.asarray(np.frexp(np.abs(X).max(axis=axes, initial=0.0))[1])
 
 
+def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
+    """X (n, p), rows in a row of memory.
+
+    Raises:
+        InputError: a feature is not finite.
+    """
+    X = np.ascontiguousarray(X, dtype=np.float64)
+    if not np.isfinite(X).all():
+        raise InputError(
+            f"the features of trial {np.argwhere(~np.isfinite(X))[0][0]} are not finite"
+        )
+    return X
+
+
 def column_means(X: NDArray[np.float64]) -> NDArray[np.float64]:
     """(p,) mean of each column of X (n, p), also where its sum would overflow."""
     powers = _exponents(X, (0,))

@@ -92,12 +92,10 @@ def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answ
 def _answers(model: ContactClassifier, x: NDArray[np.float64]) -> dict[str, tuple[Any, ...]]:
     """{task: labels, margins and nearest distances} of vectors (m, p)."""
     labels, to_labels, nearest = {}, {}, {}
-    for task, choice in model.choices.items():
+    for task, known in model.labels_.items():
         squares = model.squares(task, x)
-        rows = np.argsort(squares, axis=1, kind="stable")[:, : choice.k]
-        classes = len(model.classes_[task])
-        labels[task], _ = vote(model.labels_[task][rows], classes)
-        to_labels[task] = label_distances(squares, model.labels_[task], classes)
+        labels[task] = vote(known[model.nearest(task, squares)])
+        to_labels[task] = label_distances(squares, known, len(model.classes_[task]))
         to_labels[task] /= model.spreads_[task]
         nearest[task] = np.sqrt(squares.min(axis=1))
     for task, factors in model.products_.items():

@@ -51,7 +51,9 @@ def differences(fitted, model, queries):
     answers, wrong = model.run(queries), []
     for task in fitted.choices:
         distances, rows = fitted.neighbours(task, queries)
-        winners, shares = vote(fitted.labels_[task][rows], len(fitted.classes_[task]))
+        named = fitted.labels_[task][rows]
+        winners = vote(named)
+        shares = np.eye(len(fitted.classes_[task]))[named].mean(axis=1)
         expected = {"neighbours": rows, "label": winners, "scores": shares, "distances": distances}
         wrong += [
             f"{task}_{part}"

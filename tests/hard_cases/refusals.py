@@ -20,7 +20,7 @@ from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, taxels
 from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
-from train.crossval import leave_one_out
+from train.crossval import neighbours
 from train.importers.csv_frames import trials
 from train.pipeline import Choice, ContactClassifier
 from train.projection import Projection
@@ -101,7 +101,7 @@ ENTRIES: dict[str, Callable[[float], object]] = {
     "a training vector": lambda bad: ContactClassifier({"t": Choice("none", 2, 1)}).fit(
         spoiled(bad), {"t": labels_for(features(12))}
     ),
-    "leave-one-out": lambda bad: leave_one_out(spoiled(bad), labels_for(features(12))),
+    "leave-one-out": lambda bad: neighbours(spoiled(bad)),
     "the names of CSV frames": csv_frames,
 }
 

@@ -4,34 +4,32 @@ import numpy as np
 import pytest
 from sklearn.base import clone
 from sklearn.model_selection import cross_val_score
+from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
 from tests.hard_cases.models import features
-from train.pipeline import Choice, ContactClassifier, NearestNeighbours, vote
+from train.pipeline import Choice, ContactClassifier, vote
 from train.projection import Projection
 
 
 def test_votes_and_ties():
     labels = np.array([[2, 0, 0], [1, 0, 2], [1, 0, 0], [2, 2, 0]])
-    winners, shares = vote(labels, 3)
-    assert winners.tolist() == [0, 1, 0, 2]
-    assert shares[1].tolist() == [1 / 3, 1 / 3, 1 / 3]
-    assert vote(np.array([[2, 0]]), 3)[0].tolist() == [2]
+    assert vote(labels).tolist() == [0, 1, 0, 2]
+    assert vote(np.array([[2, 0]])).tolist() == [2]
 
 
 def test_equal_distances_go_to_the_earlier_row():
-    rows = np.array([[1.0], [-1.0], [1.0], [3.0]])
-    nearest = NearestNeighbours(3).fit(rows, np.array(["a", "b", "c", "d"]))
-    _, found = nearest.kneighbors(np.array([[0.0]]))
-    assert found.tolist() == [[0, 1, 2]]
-    assert nearest.predict(np.array([[0.0]])).tolist() == ["a"]
+    rows, y = np.array([[-1.0], [1.0], [-1.0], [3.0]]), {"t": np.array(["d", "c", "b", "a"])}
+    for k in (1, 2, 3):
+        model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(rows, y)
+        assert model.predict(np.array([[0.0]]))["t"].tolist() == ["d"]
 
 
-def test_the_estimators_work_in_a_scikit_learn_pipeline():
+def test_the_projection_works_in_a_scikit_learn_pipeline():
     X, y = features(30), np.repeat(["a", "b"], 15)
     for kind in ("pca", "lda"):
-        pipe = make_pipeline(Projection("IV", 3, kind=kind), NearestNeighbours(1))
+        pipe = make_pipeline(Projection("IV", 3, kind=kind), KNeighborsClassifier(1))
         assert (pipe.fit(X, y).predict(X) == y).all()
         assert cross_val_score(pipe, X, y, cv=5).shape == (5,)
         again = clone(pipe).fit(X, y)
@@ -44,9 +42,9 @@ def test_a_classifier_answers_every_task_by_the_rules():
     choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
     model = ContactClassifier(choices).fit(X, y)
     assert model.components_ == {"kind": 5, "object": 29}
-    distances, rows = model.neighbours("object", X)
-    assert (rows[:, 0] == np.arange(30)).all()
-    assert not distances.any()
+    squares = model.squares("object", X)
+    assert (squares.argmin(axis=1) == np.arange(30)).all()
+    assert not squares.diagonal().any()
     assert (model.predict(X)["object"] == y["object"]).all()
 
 

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from edge.touch.features import FEATURES
-from train.crossval import MAX_COMPONENTS, MAX_K, accuracies, neighbours, split_neighbours
+from train.crossval import MAX_COMPONENTS, accuracies, neighbours
 from train.evaluate import Labels, Result, SearchGrid, evaluate, fits, stratified_folds
 from train.pipeline import vote
 from train.progress import bar
@@ -77,8 +76,7 @@ def votes(
 ) -> NDArray[np.str_]:
     """(t,) labels by vote of the neighbours (t, components, k) among trials with labels y."""
     classes, labels = np.unique(y, return_inverse=True)
-    winners, _ = vote(labels[rows[:, components - 1, :k]], len(classes))
-    return np.asarray(classes[winners])
+    return np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
 
 
 def grid_search(
@@ -119,21 +117,12 @@ def transfer(
         chosen: components and k of each task, as `grid_search` chose them on X.
         changed: (n, p) the same trials, changed.
     """
-    n = len(X)
-    stacked = np.concatenate([X, changed])
-    form = "none", MAX_COMPONENTS, min(MAX_K, n - 1)
-    with threadpool_limits(1):
-        rows = np.concatenate(
-            [
-                split_neighbours(stacked, np.delete(np.arange(n), i), np.array([n + i]), *form)
-                for i in range(n)
-            ]
-        )
+    rows = neighbours(X, changed)
     results = {}
     for task, best in chosen.items():
         said = votes(rows, y[task], best.components, best.k)
         right = int((said == y[task]).sum())
-        results[task] = Result(right, n, best.components, best.k, said)
+        results[task] = Result(right, len(X), best.components, best.k, said)
     return results
 
 

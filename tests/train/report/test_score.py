@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from train.crossval import leave_one_out
+from train.crossval import accuracies, neighbours
 from train.evaluate import SearchGrid
 from train.report.score import (
     Result,
@@ -33,7 +33,7 @@ def overlapping(n=26, seed=0, spread=1.0):
 def test_the_best_cell_is_reported_with_what_it_said():
     X, y = overlapping()
     best = grid_search(X, {"t": y})["t"]
-    table = leave_one_out(X, y, features=ONE)
+    table = accuracies(neighbours(X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
     assert best.right == int((best.said == y).sum())
 
@@ -46,7 +46,7 @@ def test_a_changed_trial_is_never_recognised_by_its_own_twin():
     changed = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X + 1e-6)["t"]
     same = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X)["t"]
     assert changed.accuracy < 0.75
-    assert same.accuracy == leave_one_out(X, y["t"], features=ONE)[7, 0]
+    assert same.accuracy == accuracies(neighbours(X, features=ONE), y["t"])[7, 0]
 
 
 def test_a_change_that_moves_trials_among_others_costs():
