@@ -6,13 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten, seeded
-from tests.train.simulate.scenes import slider
-from tests.train.simulate.test_simulate_stability import (
-    SPEED,
-    judge,
-    lugre,
-    naive_push,
-)
+from tests.train.simulate.scenes import Trace, slider
+from tests.train.simulate.test_simulate_stability import SPEED, judge, lugre, naive_push
 
 
 def push_error(h: float, mu: float, steps: int = 120) -> float:
@@ -21,12 +16,9 @@ def push_error(h: float, mu: float, steps: int = 120) -> float:
     stiffness, mass = (values.ravel() for values in grid)
     rig = slider(np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, slopes=stiffness[None])
     trace = rig.run(steps)
-    return float(
-        sum(
-            bool(judge(trace.of(i), stiffness[i], mass[i], h, mu, 0.8 * mu))
-            for i in range(mass.size)
-        )
-    )
+    pushes = (Trace(*(seen[:, i : i + 1] for seen in trace)) for i in range(mass.size))
+    judged = zip(pushes, stiffness, mass, strict=True)
+    return float(sum(bool(judge(push, k, m, h, mu, 0.8 * mu)) for push, k, m in judged))
 
 
 def push_usual() -> str:
@@ -36,7 +28,7 @@ def push_usual() -> str:
         for scheme in ("explicit", "semi-implicit", "rk4")
     }
     shares = ", ".join(f"{scheme} {n}" for scheme, n in usable.items())
-    grown = lugre(0.01, explicit=True)
+    grown = lugre(0.01)
     return f"usable of 16 cases at 10 ms: {shares}; explicit LuGre grows to {grown:.0e}"
 
 

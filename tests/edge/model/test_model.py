@@ -38,10 +38,6 @@ def altered(exported, tmp_path):
     return write
 
 
-def meta_of(proto):
-    return next(p for p in proto.metadata_props if p.key == METADATA_KEY)
-
-
 def test_metadata_says_what_the_board_needs(model, forearm):
     info = model.info
     assert list(info.tasks) == ["category", "object"]
@@ -119,45 +115,25 @@ def no_metadata(proto):
     del proto.metadata_props[:]
 
 
+def edited(edit):
+    """The change of a model that edits its metadata."""
+
+    def change(proto):
+        entry = next(p for p in proto.metadata_props if p.key == METADATA_KEY)
+        metadata = json.loads(entry.value)
+        edit(metadata)
+        entry.value = json.dumps(metadata) if metadata else "{"
+
+    return change
+
+
 def meta(**changes):
-    def change(proto):
-        entry = meta_of(proto)
-        entry.value = json.dumps({**json.loads(entry.value), **changes})
-
-    return change
-
-
-def without(key):
-    def change(proto):
-        entry = meta_of(proto)
-        found = json.loads(entry.value)
-        del found[key]
-        entry.value = json.dumps(found)
-
-    return change
-
-
-def no_json(proto):
-    meta_of(proto).value = "{"
-
-
-def more_labels(proto):
-    entry = meta_of(proto)
-    found = json.loads(entry.value)
-    found["tasks"]["category"]["labels"].append("liquid")
-    entry.value = json.dumps(found)
-
-
-def another_task(proto):
-    entry = meta_of(proto)
-    found = json.loads(entry.value)
-    found["tasks"]["mobility"] = found["tasks"]["category"]
-    entry.value = json.dumps(found)
+    return edited(lambda metadata: metadata.update(changes))
 
 
 REFUSED = {
     no_metadata: "no edge-classify metadata",
-    no_json: "its metadata: not JSON",
+    edited(dict.clear): "its metadata: not JSON",
     meta(format=99): "is of format 99, but this edge-classify reads",
     meta(samples=30): "takes .*120.* features, its metadata says 90",
     meta(samples=-3): "samples must be a whole number from 2 to 10000, not -3",
@@ -169,13 +145,17 @@ REFUSED = {
     meta(tracking={"speed": 1}): "tracking.debounce is missing",
     meta(features=["noise"]): "was made for the features noise",
     meta(trials=["a"]): "names 1 of 16 trials",
-    without("window_s"): "window_s is missing; export it again",
-    more_labels: "no output category_scores of width 3",
-    another_task: "no output mobility_label",
+    edited(lambda m: m.pop("window_s")): "window_s is missing; export it again",
+    edited(
+        lambda m: m["tasks"]["category"]["labels"].append("liquid")
+    ): "no output category_scores of width 3",
+    edited(
+        lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
+    ): "no output mobility_label",
 }
 
 
-@pytest.mark.parametrize("change", REFUSED, ids=lambda c: getattr(c, "__name__", "meta"))
+@pytest.mark.parametrize("change", REFUSED, ids=REFUSED.values())
 def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
     path = altered(change)
     with pytest.raises(InputError, match=REFUSED[change]) as caught:

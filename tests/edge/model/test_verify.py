@@ -7,6 +7,7 @@ import pytest
 
 from edge.model.model import Model
 from edge.model.verify import compared, verify
+from export.arithmetic import in_float32
 
 NAN, INF = float("nan"), float("inf")
 
@@ -53,39 +54,20 @@ def test_another_shape_is_a_difference(bound):
     assert (check.seen, check.expected) == ("shape (2, 3)", "(2, 4)")
 
 
-def narrowed(data):
-    """The model as an engine runs it that computes in float32: every float64 tensor narrowed."""
-    model = onnx.load_from_string(data)
-    for tensor in model.graph.initializer:
-        if tensor.data_type == onnx.TensorProto.DOUBLE:
-            values = onnx.numpy_helper.to_array(tensor).clip(-3e38, 3e38).astype(np.float32)
-            tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
-    for value in (*model.graph.input, *model.graph.output, *model.graph.value_info):
-        if value.type.tensor_type.elem_type == onnx.TensorProto.DOUBLE:
-            value.type.tensor_type.elem_type = onnx.TensorProto.FLOAT
-    for node in model.graph.node:
-        for attribute in node.attribute:
-            if attribute.name == "to" and attribute.i == onnx.TensorProto.DOUBLE:
-                attribute.i = onnx.TensorProto.FLOAT
-    return onnxruntime.InferenceSession(model.SerializeToString())
-
-
 def test_an_engine_that_computes_in_float32_is_found_out(exported):
+    path = exported / "model.onnx"
+    narrow = in_float32(onnx.load(path)).SerializeToString()
+    single = onnxruntime.InferenceSession(narrow)
+    names = [output.name for output in single.get_outputs()]
+
     class Narrow(Model):
         """Runs the same file in float32."""
 
         def run(self, vectors, decision_point=None):
             with np.errstate(over="ignore"):
-                given = {"features": vectors.astype(np.float32)}
-            names = [output.name for output in single.get_outputs()]
-            values = single.run(names, given)
-            return {
-                name: value.astype(np.float64) if value.dtype == np.float32 else value
-                for name, value in zip(names, values, strict=True)
-            }
+                values = single.run(names, {"features": vectors.astype(np.float32)})
+            return dict(zip(names, values, strict=True))
 
-    path = exported / "model.onnx"
-    single = narrowed(path.read_bytes())
     checks = {c.name: c for c in verify(Narrow(path), exported / "golden.npz")}
     assert not checks["category_distances"].passed
     assert not checks["object_distances"].passed

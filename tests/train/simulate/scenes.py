@@ -1,6 +1,7 @@
 """Scenes of one object, and a rig for its own steps: a joint that pushes."""
 
 import math
+from collections import namedtuple
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -62,21 +63,8 @@ def run(scene, step_s=0.01, **options) -> Batch:
     return run_batch(scene, specs_of(scene, step_s), **options)
 
 
-@dataclass
-class Trace:
-    """The rig's motion and forces, (steps, n) each."""
-
-    t: np.ndarray
-    force: np.ndarray
-    q: np.ndarray
-    target: np.ndarray
-    slide: np.ndarray
-    speed: np.ndarray
-    depth: np.ndarray
-
-    def of(self, i: int):
-        """One pusher's trace."""
-        return Trace(**{name: seen[:, i : i + 1] for name, seen in vars(self).items()})
+Trace = namedtuple("Trace", "t force q target slide speed depth")
+"""The rig's motion and forces, (steps, n) each."""
 
 
 class Rig:

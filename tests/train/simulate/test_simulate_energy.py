@@ -6,7 +6,6 @@ effects are: in free motion nothing, and never less than nothing in all. Of what
 what is pushed has its speed and its lean.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -187,21 +186,6 @@ def test_a_viscous_contact_gives_back_no_more_energy_than_it_took():
         own.move_on(ALL, force[None])
         assert (own.load <= 0.0).all()
     assert (work > -1e-9).all()
-
-
-def test_a_ramp_relaxes_as_zeners_law_says_whatever_the_steps():
-    rng = np.random.default_rng(5)
-    ratio, relax_s, steepness = 1.5, 0.2, 7.0
-    own = viscous.begin(1, 1)
-    own.ratio[:], own.relax_s[:] = ratio, relax_s
-    t = 0.0
-    for h in 10.0 ** rng.uniform(-5, -1, 60):
-        t += h
-        own.set_step(ALL, np.array([h]))
-        whole = own.gain * steepness * t + own.load[0]
-        own.move_on(ALL, whole[None])
-        want = steepness * (t + ratio * relax_s * -math.expm1(-t / relax_s))
-        assert whole[0] == pytest.approx(want, rel=1e-12)
 
 
 def test_a_run_that_makes_energy_is_refused():

@@ -79,15 +79,21 @@ class TestSlope:
 
 
 class TestToppling:
-    def test_it_turns_about_its_edge_as_a_box_does(self):
+    @pytest.fixture
+    def batch(self):
+        return push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
+
+    def test_it_turns_about_its_edge_as_a_box_does_then_lies_and_stays(self, batch):
         # m (b^2 + (2 h)^2) / 3 about an edge, felt at the height h.
-        batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
         felt = 0.8 * (0.08**2 + 0.8**2) / 3.0 / 0.4**2
         assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
+        slide, lies = batch.traces["slide_m"][0], 0.5 * math.pi * 0.4
+        fallen = slide >= lies - 1e-12
+        assert fallen.any()
+        assert (slide[np.argmax(fallen) :] == lies).all()
 
-    def test_beyond_its_balance_it_falls_as_a_pendulum_does(self):
+    def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as it is.
-        batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
         own, mover = batch.trials.own["tipping"], batch.trials.own["sliding"]
         travel, lies = own.travel[0], mover.lies[0]
         slide, force = batch.traces["slide_m"][0], batch.force[0]
@@ -100,15 +106,8 @@ class TestToppling:
         scale = (mover.inertia[0] * speed**2)[free].max()
         assert np.ptp(energy[free]) < 0.03 * scale
 
-    def test_then_it_lies_and_stays(self):
-        batch = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4)
-        slide, lies = batch.traces["slide_m"][0], 0.5 * math.pi * 0.4
-        fallen = slide >= lies - 1e-12
-        assert fallen.any()
-        assert (slide[np.argmax(fallen) :] == lies).all()
-
-    def test_let_go_it_falls_back_onto_its_foot(self):
-        t = push(mass_kg=0.8, friction_static=0.9, base_m=0.08, height_m=0.4).trials
+    def test_let_go_it_falls_back_onto_its_foot(self, batch):
+        t = batch.trials
         mover = t.own["sliding"]
         mover.slide[:], mover.speed[:], t.y[:] = 1e-6, 0.0, -0.1
         tipping.drag(t, ALL)

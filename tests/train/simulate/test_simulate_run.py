@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge.errors import InputError
 from edge.recording import load
 from tests.train.simulate.scenes import make, one_object, scene
 from train.__main__ import main
@@ -144,6 +143,7 @@ class TestCommand:
             ([str(DEMO), "--out", "x", "--backend", "dask"], "needs --address"),
             ([str(DEMO), "--out", "x", "--address", "tcp://h:1"], "needs --backend dask"),
             ([str(DEMO), "--out", "x", "--trials", "0"], "trials.count must be a whole number"),
+            ([str(DEMO), "--trials", "1", "--out", f"{DEMO}/folder"], "cannot be written"),
         ],
     )
     def test_bad_usage_is_one_sentence(self, arguments, says, capsys, tmp_path, monkeypatch):
@@ -152,11 +152,6 @@ class TestCommand:
         err = capsys.readouterr().err
         assert says in err
         assert "Traceback" not in err
-
-    def test_a_folder_that_cannot_be_made(self, demo, tmp_path):
-        (tmp_path / "file").write_text("")
-        with pytest.raises(InputError, match="cannot be written"):
-            write(demo, tmp_path / "file" / "folder")
 
 
 def test_simulate_counts_touches_that_the_skin_does_not_feel(tmp_path, capsys):

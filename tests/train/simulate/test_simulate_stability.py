@@ -14,46 +14,39 @@ MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
 
 def judge(trace, stiffness, mass, h, mu_s, mu_k):
     """What must hold of any trace; returns the complaints."""
-    complaints = []
-    force = trace.force
-    if not all(np.isfinite(v).all() for v in vars(trace).values()):
+    force, moved = trace.force, np.diff(trace.slide, axis=0, prepend=0.0)
+    if not all(np.isfinite(v).all() for v in trace):
         return ["not finite"]
-    if (force < 0.0).any():
-        complaints.append("a force pulls")
-    reach = trace.target - trace.slide
-    if not (force[reach > 0.0] > 0.0).all():
-        complaints.append("no force though pressed")
-    if (force > ARM_K * np.maximum(trace.target, 0.0) * (1 + 1e-12)).any():
-        complaints.append("more force than the arm can give")
-    # In the arm's spring and the bed's the force is the same.
-    gap = np.abs(ARM_K * (trace.target - trace.q) - force)
-    if (gap > 1e-12 * ARM_K * np.abs(trace.target)).any():
-        complaints.append("arm and contact disagree")
-    moved = np.diff(trace.slide, axis=0, prepend=0.0)
     hold = mu_s * mass * GRAVITY
     stuck = np.cumsum(moved > 0.0, axis=0) == 0
-    if (trace.slide[stuck] != 0.0).any():
-        complaints.append("creeps in stick")
-    if ((force > hold * (1 + 1e-12)) & stuck).any():
-        complaints.append("sticks under more than it holds")
-    lost, scale, friction = ledger(trace, stiffness, mass, mu_k)
-    if (lost < -1e-12 * scale).any():
-        complaints.append("energy made")
-    if (friction < 0.0).any():
-        complaints.append("friction gives energy")
-    return complaints
+    # In the arm's spring and the bed's the force is the same.
+    gap = np.abs(ARM_K * (trace.target - trace.q) - force)
+    most = ARM_K * np.maximum(trace.target, 0.0)
+    lost, scale, friction = ledger(trace, 0.5 * force**2 / stiffness, mass, mu_k)
+    complaints = {
+        "a force pulls": force < 0.0,
+        "no force though pressed": force[trace.target > trace.slide] <= 0.0,
+        "more force than the arm can give": force > most * (1 + 1e-12),
+        "arm and contact disagree": gap > 1e-12 * ARM_K * np.abs(trace.target),
+        "creeps in stick": trace.slide[stuck] != 0.0,
+        "sticks under more than it holds": (force > hold * (1 + 1e-12)) & stuck,
+        "energy made": lost < -1e-12 * scale,
+        "friction gives energy": friction < 0.0,
+    }
+    return [complaint for complaint, where in complaints.items() if where.any()]
 
 
-def ledger(trace, stiffness, mass, mu_k):
+def ledger(trace, bed, mass, mu_k):
     """Energy lost in each step, all that took part in it, and what friction took of it.
 
-    The target's motion at fixed q puts energy in; after that nothing may add any.
+    The bed's energy is given, (steps, n). The target's motion at fixed q puts energy in; after that
+    nothing may add any.
     """
-    force, moved = trace.force, np.diff(trace.slide, axis=0, prepend=0.0)
-    q0, f0, v0 = (np.pad(a[:-1], ((1, 0), (0, 0))) for a in (trace.q, force, trace.speed))
-    stored0 = 0.5 * f0**2 / stiffness + 0.5 * mass * v0**2
+    moved = np.diff(trace.slide, axis=0, prepend=0.0)
+    q0, bed0, v0 = (np.pad(a[:-1], ((1, 0), (0, 0))) for a in (trace.q, bed, trace.speed))
+    stored0 = bed0 + 0.5 * mass * v0**2
     arm0 = 0.5 * ARM_K * (trace.target - q0) ** 2
-    stored1 = 0.5 * force**2 / stiffness + 0.5 * mass * trace.speed**2
+    stored1 = bed + 0.5 * mass * trace.speed**2
     arm1 = 0.5 * ARM_K * (trace.target - trace.q) ** 2
     friction = mu_k * mass * GRAVITY * moved
     lost = (stored0 + arm0) - (stored1 + arm1) - friction
@@ -67,7 +60,7 @@ class TestJudges:
         assert judge(trace, 1e3, 5.0, 0.01, MU_S, MU_K) == []
         trace.force[30:] = 0.0
         trace.q[30:] = trace.target[30:]
-        assert all(np.isfinite(v).all() for v in vars(trace).values())
+        assert all(np.isfinite(v).all() for v in trace)
         assert "no force though pressed" in judge(trace, 1e3, 5.0, 0.01, MU_S, MU_K)
 
     def test_a_bed_of_many_springs_makes_no_energy(self):
@@ -80,37 +73,18 @@ class TestJudges:
         mass = 10.0 ** rng.uniform(-3, 1, n)
         h, law = 10.0 ** rng.uniform(-3, -1, n), {"slopes": slopes, "intercepts": intercepts}
         trace = slider(h, mass, MU_S, MU_K, gaps=gaps, **law).run(100)
-
-        def stored(t):
-            inside = np.maximum(trace.depth[t] - gaps, 0.0)
-            return 0.5 * (k * inside**2).sum(axis=0) + 0.5 * mass * trace.speed[t] ** 2
-
-        for t in range(1, 100):
-            pulled = 0.5 * ARM_K * (trace.target[t] - trace.q[t - 1]) ** 2
-            left = 0.5 * ARM_K * (trace.target[t] - trace.q[t]) ** 2
-            friction = MU_K * mass * GRAVITY * (trace.slide[t] - trace.slide[t - 1])
-            lost = stored(t - 1) + pulled - stored(t) - left - friction
-            assert (lost >= -1e-9 * (pulled + stored(t))).all()
+        bed = 0.5 * (k * np.maximum(trace.depth[:, None] - gaps, 0.0) ** 2).sum(axis=1)
+        lost, scale, _ = ledger(trace, bed, mass, MU_K)
+        assert (lost >= -1e-9 * scale).all()
 
 
 class TestTraps:
-    """Each runs the naive scheme too, and shows that it breaks the bound that ours keeps."""
-
-    def test_regularised_friction_creeps_and_true_stick_does_not(self):
+    def test_what_regularised_friction_lets_creep_sticks(self):
         mass, load = 2.0, 0.5 * MU_S * 2.0 * GRAVITY
-        for slip_speed in (0.001, 0.01):
-            creep = regularised_creep(load, MU_S * mass * GRAVITY, slip_speed, 1.2)
-            assert 0.0005 < creep < 0.0125
         speed = load * (1 / ARM_K + 1e-4) / 0.3
         trace = slider(0.01, mass, MU_S, MU_K, speed=speed, travel_s=0.3).run(150)
         assert trace.force[-1, 0] == pytest.approx(load, rel=1e-9)
         assert (trace.slide == 0.0).all()
-
-    def test_explicit_lugre_blows_up(self):
-        assert lugre(0.01, explicit=True) > 1e6
-        assert lugre(0.001, explicit=True) > 1e6
-        assert lugre(0.01, explicit=False) <= 1.0 + 1e-12
-        assert lugre(0.001, explicit=False) <= 1.0 + 1e-12
 
     def test_taxel_forces_as_stiffness_times_depth_lose_digits(self):
         n, stiff = 200, 1e15
@@ -161,18 +135,12 @@ def naive_push(scheme, k, m, h=0.01, steps=120):
     return abs(SPEED * t - x) <= 3.0 * drag / k + SPEED * h and abs(v - SPEED) <= 0.5 * SPEED
 
 
-def regularised_creep(load, hold, slip_speed, seconds):
-    """How far tanh friction lets a thing creep under a load that true friction holds."""
-    speed = slip_speed * math.atanh(load / hold)
-    return speed * seconds
-
-
-def lugre(h, *, explicit, v=0.2, sigma=1e5, hold=1.0):
-    """Largest bristle force over a slide, as a part of the most that friction can give."""
+def lugre(h, v=0.2, sigma=1e5, hold=1.0):
+    """Largest bristle force over a slide by explicit steps, as a part of what friction can give."""
     z = worst = 0.0
     g = hold / sigma
     for _ in range(400):
-        z = z + h * (v - abs(v) / g * z) if explicit else (z + h * v) / (1.0 + h * abs(v) / g)
+        z = z + h * (v - abs(v) / g * z)
         worst = max(worst, abs(sigma * z) / hold)
         if worst > 1e12:
             break
