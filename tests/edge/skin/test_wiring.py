@@ -31,11 +31,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
     [
         ("rows = 4", "rows = 0", "skin: 0 x 6 taxels"),
         ("device = 1", "", "bus 0: device must be the number of a bus or its path"),
-        (
-            "device = 1",
-            "device = 1\nclock_hz = 1000000",
-            "is 1000000; a TCA9548A carries at most 400000",
-        ),
+        ("device = 1", "device = 1\nclock_hz = 1000000", "a TCA9548A carries at most 400000"),
         ('kind = "ad7147"', 'kind = "adxl"', "bus 0: kind must be one of ad7147"),
         ("mux = 0x70", "mux = 0x60", "bus 0 chip 0: mux must be 0x70 to 0x77, not 96"),
         ("mux = 0x70", "", "bus 0 chip 0: channel needs mux"),
@@ -44,11 +40,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
         ("address = 0x2D", "address = 0x5A", "bus 0 chip 1: address must be 0x2c to 0x2f, not 90"),
         ("address = 0x2D, ", "", "bus 0 chip 1: address is missing"),
         ("first = [0, 3]", "first = [0, 2]", "taxel [0, 2] belongs to bus 0 chip 0 already"),
-        (
-            "first = [0, 3]",
-            "first = [0, 4]",
-            "chip 1: first names taxel [0, 6], which lies outside",
-        ),
+        ("first = [0, 3]", "first = [0, 4]", "first names taxel [0, 6], which lies outside"),
         ("first = [0, 3]", "first = 3", "bus 0 chip 1: first must be [row, col], not 3"),
         ("block = [4, 3]", "block = [4, 2]", "names 8 taxels, but an AD7147 has 12 stages"),
         ("chips = [", "chip = [", "bus 0: chips must be a list of tables, not []"),
@@ -92,11 +84,7 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
         ("[[bus]]", "[[bus]]\ndevice = 1", "give it or serial, not both"),
         ('"block"', '"mpr121"', "kind is mpr121; a serial port carries block only"),
         ('"block"', '"microcontroller"', "(a microcontroller that serves frames), not 'micro"),
-        (
-            "chips = [",
-            "chips = [{ first = [0, 0], block = [1, 1] }, ",
-            "has 2; a serial port has one",
-        ),
+        ("= [{", "= [{ first = [0, 0], block = [1, 1] }, {", "has 2; a serial port has one"),
         ("[{ first", "[{ address = 8, first", "address has no meaning on a serial port"),
     ],
 )

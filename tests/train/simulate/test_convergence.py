@@ -9,16 +9,17 @@ from tests.train.simulate.scenes import make, movable, one_object
 from train.simulate.convergence import kinds, measure
 from train.simulate.engine import run_physics
 
-OBJECTS = (
-    ("fixed", {}, ()),
-    ("movable", {"mass_kg": 1.0, "friction_static": 0.4, "friction_kinetic": 0.35}, ()),
-    ("fixed", {"family": "foam", "modulus_pa": 12e3, "depth_m": 0.1}, ()),
+
+@pytest.mark.parametrize(
+    "thing",
+    [
+        one_object(width_m=0.05),
+        movable(1.0, 0.4, 0.35, width_m=0.05),
+        one_object(family="foam", modulus_pa=12e3, depth_m=0.1, width_m=0.05),
+    ],
 )
-
-
-@pytest.mark.parametrize(("condition", "keys", "add"), OBJECTS)
-def test_halving_the_step_halves_the_error(condition, keys, add):
-    scene = make(one_object(conditions=[condition], width_m=0.05, **keys), *add)
+def test_halving_the_step_halves_the_error(thing):
+    scene = make(thing)
     scene.trials["tolerance"] = 1e-9
     (convergence,) = measure(scene, list(kinds(scene).values()))
     assert convergence.errors[-1] < convergence.errors[0]
@@ -45,11 +46,7 @@ def test_the_step_follows_the_tolerance():
     for tolerance in (0.05, 0.004):
         scene.trials["tolerance"] = tolerance
         (convergence,) = measure(scene, list(kinds(scene).values()))
-        within = [
-            s
-            for s, e in zip(convergence.steps_s, convergence.errors, strict=False)
-            if e <= tolerance
-        ]
-        assert convergence.step_s == within[0]
+        errors = dict(zip(convergence.steps_s, convergence.errors, strict=False))
+        assert convergence.step_s == next(s for s in errors if errors[s] <= tolerance)
         chosen.append(convergence.step_s)
     assert chosen[0] > chosen[1]

@@ -19,20 +19,12 @@ from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, load
 
 ARM_K = 115.0
 RADIUS = 0.04604
-SKEW = Chain.from_dict(
-    {
-        "joint": [
-            {"name": "a", "axis": [1, 2, 3], "origin_xyz": [0.1, 0.2, 0.3]},
-            {"name": "f", "type": "fixed", "axis": [1, 0, 0], "origin_rpy": [0.3, 0.2, 1]},
-            {
-                "name": "b",
-                "axis": [0, -1, 0.5],
-                "origin_rpy": [1, 0, 0.4],
-                "translate": [0, 0, 0.2],
-            },
-        ]
-    }
-)
+SKEW_JOINTS = [
+    {"name": "a", "axis": [1, 2, 3], "origin_xyz": [0.1, 0.2, 0.3]},
+    {"name": "f", "type": "fixed", "axis": [1, 0, 0], "origin_rpy": [0.3, 0.2, 1]},
+    {"name": "b", "axis": [0, -1, 0.5], "origin_rpy": [1, 0, 0.4], "translate": [0, 0, 0.2]},
+]
+SKEW = Chain.from_dict({"joint": SKEW_JOINTS})
 
 
 class TestArm:

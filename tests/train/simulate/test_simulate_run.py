@@ -154,15 +154,30 @@ class TestCommand:
         assert "Traceback" not in err
 
 
-def test_simulate_counts_touches_that_the_skin_does_not_feel(tmp_path, capsys):
-    path = tmp_path / "deaf.toml"
+@pytest.mark.parametrize(
+    ("rest", "said"),
+    [
+        (
+            "step_s.base = 0.01\ntrials.after_s = 0.3\neffects.dead_band.counts = 65000",
+            "in 2 of them no taxel rises above skin.onset_counts (60), so no touch is felt",
+        ),
+        (
+            "labels.slides_m = 0.0\ntrials.lead_s = 0.05\ntrials.after_s = 0.15",
+            "feather-movable and its kind: no step is within trials.tolerance",
+        ),
+    ],
+)
+def test_simulate_warns_of_what_makes_trials_useless(tmp_path, capsys, rest, said):
+    path = tmp_path / "scene.toml"
     path.write_text(
-        "[trials]\ncount = 2\nafter_s = 0.3\n[step_s]\nbase = 0.01\n[effects.dead_band]\n"
-        'counts = 65000\n[[object]]\nname = "box"\nfamily = "rigid"\nconditions = ["fixed"]\n'
+        f'{rest}\ntrials.count = 1\n[[object]]\nname = "feather"\nfamily = "rigid"\n'
+        "mass_kg = 1e-4\nfriction_static = 0.5\nfriction_kinetic = 0.4\n"
+        'conditions = ["fixed", "movable"]\n'
     )
     assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().err
-    assert "in 2 of them no taxel rises above skin.onset_counts (60), so no touch is felt" in told
+    err = capsys.readouterr().err
+    assert said in err
+    assert "feather-fixed" not in err
 
 
 def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
@@ -172,16 +187,3 @@ def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
     for onset, unfelt in ((int(trial.frames.max()) - 1, 0), (int(trial.frames.max()), 1)):
         felt = replace(one, skin=replace(one.skin, onset_counts=onset))
         assert write(felt, tmp_path).unfelt == unfelt
-
-
-def test_simulate_warns_of_a_step_beyond_the_tolerance(tmp_path, capsys):
-    path = tmp_path / "light.toml"
-    path.write_text(
-        "[trials]\ncount = 1\nlead_s = 0.05\nafter_s = 0.15\n[labels]\nslides_m = 0.0\n[[object]]\n"
-        'name = "feather"\nfamily = "rigid"\nconditions = ["fixed", "movable"]\nmass_kg = 1e-4\n'
-        "friction_static = 0.5\nfriction_kinetic = 0.4\n"
-    )
-    assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().err
-    assert "feather-movable and its kind: no step is within trials.tolerance" in told
-    assert "feather-fixed" not in told

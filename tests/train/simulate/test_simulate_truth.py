@@ -73,15 +73,12 @@ class TestLabels:
         ("change", "says"),
         [
             ({"motion": {"travel_s": 0.2}}, r"as the arm's stroke ended 0\.\d\d s.*travel_s"),
-            (
-                {"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}},
-                "as the arm's stroke ended.*start_deg more",
-            ),
+            ({"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}}, "stroke ended.*start_deg"),
             ({"trials": {"count": 1, "after_s": 0.1}}, r"and the trial ended 0\.\d\d s.*after_s"),
         ],
     )
     def test_the_error_says_what_ended_a_trial_early(self, change, says):
-        with pytest.raises(InputError, match=r"the last moved \d+ mm, less than 20, " + says):
+        with pytest.raises(InputError, match=r"the last moved \d+ mm, less than 20, .*" + says):
             list(simulate(scene({**BOX, "mass_kg": 1.0}, **change)))
 
     @pytest.mark.parametrize("family", ["rigid", "foam", "bubbles"])
@@ -111,29 +108,22 @@ class TestFamilies:
             assert o.conditions == ("fixed", "movable")
 
     @pytest.mark.parametrize(
-        ("keys", "most"),
+        "keys",
         [
-            # What the skin presses down as it pushes is harder to move.
-            (
-                {"family": "foam", "friction_static": [0.3, 1.0], "skin_friction": 0.9},
-                lambda mu, value: 6.0 * (1.0 - 0.9 * mu),
-            ),
-            # A plant is no heavier than its stems can push, drawn or usual.
-            (
-                {"family": "foliage", "stem_count": [5, 30], "stem_n_m": [1.0, 50.0]},
-                lambda mu, value: min(6.0, value("stem_count") * value("stem_n_m") * 0.06),
-            ),
-            (
-                {"family": "foliage", "stem_count": 3},
-                lambda mu, value: 3 * value("stem_n_m") * 0.06,
-            ),
+            {"family": "foam", "friction_static": [0.3, 1.0], "skin_friction": 0.9},
+            {"family": "foliage", "stem_count": [5, 30], "stem_n_m": [1.0, 50.0]},
+            {"family": "foliage", "stem_count": 3},
         ],
     )
-    def test_no_object_holds_more_than_can_be_pushed(self, keys, most):
+    def test_no_object_holds_more_than_can_be_pushed(self, keys):
+        """What the skin presses down is harder to move; stems push no more than they bear."""
         for o in scene(families=[{**FAMILY, **keys, "count": 40}]).objects:
-            value = {name: number.low for name, number in o.values.items()}.get
-            mu = value("friction_static")
-            assert mu * value("mass_kg") * 9.80665 <= most(mu, value)
+            value = {name: number.low for name, number in o.values.items()}
+            mu = value["friction_static"]
+            most = 6.0 * (1.0 - value.get("skin_friction", 0.0) * mu)
+            if o.family == "foliage":
+                most = min(most, value["stem_count"] * value["stem_n_m"] * 0.06)
+            assert mu * value["mass_kg"] * 9.80665 <= most
 
     def test_a_plant_is_as_it_would_be_among_plants_of_as_many_stems(self):
         plants = [
