@@ -12,7 +12,7 @@ import argparse
 import errno
 import math
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -39,10 +39,9 @@ INTACT_FRAMES = 12
 """A sweep goes on for so many frames after the last invalid taxel."""
 CODES = (errno.EREMOTEIO, errno.EIO, errno.ETIMEDOUT, errno.EAGAIN, errno.ENODEV)
 KINDS = {
-    **{
-        errno.errorcode[code]: Fault(code=code)
-        for code in (*CODES, errno.EINVAL, errno.EBUSY, errno.EACCES)
-    },
+    errno.errorcode[code]: Fault(code=code)
+    for code in (*CODES, errno.EINVAL, errno.EBUSY, errno.EACCES)
+} | {
     "reset": Fault("reset"),
     "a frame that breaks off": Fault("break"),
     "a wrong mux channel": Fault("misroute"),
@@ -157,12 +156,22 @@ class Watched:
         return Outcome(name, met, self.wrong, self.missing, self.others, missed_ticks, back)
 
 
-def run(name, file, faults, *, touched=None, end_s=END_S, seconds=LASTS_S, overhead_s=0.0, seed=0):
+def touches(fault, bus, chip):
+    """Whether a fault may meet what is said to a chip or its mux."""
+    wanted = (fault.bus, fault.mux, fault.channel)
+    there = (bus.device, chip.mux, chip.channel)
+    return fault.address in (None, chip.address, chip.mux) and all(
+        want in (None, place) for want, place in zip(wanted, there, strict=True)
+    )
+
+
+def run(name, file, faults, *, seconds=LASTS_S, overhead_s=0.0, seed=0):
     """Play a script for some seconds."""
     watched = Watched(file, overhead_s=overhead_s, seed=seed)
-    for bus in file.buses if touched else ():
+    for bus in file.buses:
         for chip in bus.chips:
-            watched.spared.flat[list(chip.taxels)] = not touched(chip, bus.device)
+            spared = not any(touches(fault, bus, chip) for fault in faults)
+            watched.spared.flat[list(chip.taxels)] = spared
     with watched.skin as skin:
         start = skin.clock.now()
         moved = [replace(f, during=tuple(start + t for t in f.during)) for f in faults]
@@ -172,7 +181,7 @@ def run(name, file, faults, *, touched=None, end_s=END_S, seconds=LASTS_S, overh
         while schedule.wait() - start < seconds:
             watched.read()
     met = sum(bus.met for bus in watched.buses)
-    return watched.outcome(name, met, start + end_s, schedule)
+    return watched.outcome(name, met, start + max(f.during[1] for f in faults), schedule)
 
 
 def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
@@ -241,51 +250,43 @@ def models(buses):
 
 
 def scripts():
-    """Name, skin, faults and further arguments of `run`; `*` marks what no protocol can tell."""
+    """Name, skin and faults for `run`; `*` marks what no protocol can tell."""
     cody, pad = SKINS["cody"], SKINS["mpr121"]
     first = cody.buses[0].device
     lasting = {"during": (BEGIN_S, END_S)}
     chip = {"bus": first, "mux": 0x70, "channel": 1, "address": 0x2D, **lasting}
-    one_chip = {"touched": lambda chip, bus: (bus, chip.channel, chip.address) == (first, 1, 0x2D)}
-    on_first = {"touched": lambda chip, bus: bus == first}
-    yield "NACK on one chip", cody, [Fault(**chip)], one_chip
-    yield "NACK on one mux", cody, [Fault(bus=first, address=0x70, **lasting)], on_first
-    yield "NACK on all", cody, [Fault(**lasting)], {}
+    yield "NACK on one chip", cody, [Fault(**chip)]
+    yield "NACK on one mux", cody, [Fault(bus=first, address=0x70, **lasting)]
+    yield "NACK on all", cody, [Fault(**lasting)]
     for code in (errno.EIO, errno.EAGAIN, errno.ETIMEDOUT):
-        yield f"{errno.errorcode[code]} on one chip", cody, [Fault(code=code, **chip)], one_chip
+        yield f"{errno.errorcode[code]} on one chip", cody, [Fault(code=code, **chip)]
     for code in (errno.EIO, errno.ETIMEDOUT, errno.ENODEV):
-        fault = Fault(code=code, bus=first, **lasting)
-        yield f"{errno.errorcode[code]} on one bus", cody, [fault], on_first
-    yield "ENODEV on all buses", cody, [Fault(code=errno.ENODEV, **lasting)], {}
+        yield f"{errno.errorcode[code]} on one bus", cody, [Fault(code=code, bus=first, **lasting)]
+    yield "ENODEV on all buses", cody, [Fault(code=errno.ENODEV, **lasting)]
     short = {"during": (BEGIN_S, BEGIN_S + 0.011)}
-    ends = {"end_s": BEGIN_S + 0.011}
-    yield "a chip resets", cody, [Fault("reset", **{**chip, **short})], {**one_chip, **ends}
-    yield "an MPR121 resets", pad, [Fault("reset", address=0x5B, channel=1, **short)], ends
+    yield "a chip resets", cody, [Fault("reset", **{**chip, **short})]
+    yield "an MPR121 resets", pad, [Fault("reset", address=0x5B, channel=1, **short)]
     wrong = [Fault("misroute", address=0x70, rate=0.1, **lasting)]
-    yield "a wrong mux channel, 10 % of selections", cody, wrong, {}
+    yield "a wrong mux channel, 10 % of selections", cody, wrong
     blind = replace(cody, reading=replace(cody.reading, verify_mux=False))
-    yield "the same without reading back *", blind, wrong, {}
-    foreign = [Fault("foreign", rate=0.005, **lasting)]
-    yield "another program selects a mux channel", cody, foreign, {}
+    yield "the same without reading back *", blind, wrong
+    yield "another program selects a mux channel", cody, [Fault("foreign", rate=0.005, **lasting)]
     flip = [Fault("flip", rate=0.02, **lasting)]
-    yield "bit flips in 2 % of reads, AD7147 *", cody, flip, {}
-    yield "the same, MPR121 *", pad, flip, {}
-    yield "the same, block (CRC)", SKINS["block"], flip, {}
-    yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)], one_chip
+    yield "bit flips in 2 % of reads, AD7147 *", cody, flip
+    yield "the same, MPR121 *", pad, flip
+    yield "the same, block (CRC)", SKINS["block"], flip
+    yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)]
     for rate in (0.001, 0.01, 0.1):
         for name, codes in (("random errors", CODES[:4]), ("without timeouts", CODES[:2])):
             faults = [Fault(code=code, rate=rate / len(codes), **lasting) for code in codes]
-            yield f"{name}, {rate:.1%} of transactions", cody, faults, {}
+            yield f"{name}, {rate:.1%} of transactions", cody, faults
 
 
 def table(outcomes, met):
     """The outcomes as a Markdown table; `met` heads the column of that number."""
     heads = ["fault", met, "wrong values called valid", "taxels missing, worst frame"]
     heads += ["readings lost on other chips", "ticks left out", "all back after, ms"]
-    rows = [
-        [o.name, o.met, o.wrong, o.missing, o.others, o.missed_ticks, f"{1e3 * o.back_s:.0f}"]
-        for o in outcomes
-    ]
+    rows = [[*astuple(o)[:-1], f"{1e3 * o.back_s:.0f}"] for o in outcomes]
     return "\n".join(f"| {' | '.join(map(str, row))} |" for row in [heads, ["---"] * 7, *rows])
 
 
@@ -300,10 +301,7 @@ def campaign(overhead_us, every, seed):
     from train.progress import bar
 
     cost = {"overhead_s": overhead_us * 1e-6}
-    jobs = [
-        delayed(run)(name, file, faults, seed=seed, **more, **cost)
-        for name, file, faults, more in scripts()
-    ]
+    jobs = [delayed(run)(name, file, faults, seed=seed, **cost) for name, file, faults in scripts()]
     for name, file in SKINS.items():
         jobs.append(delayed(brown_out)(f"all reset, {name}", file, **cost))
         jobs.append(delayed(brown_out)(f"all reset 4 times, {name}", file, at=REPEATED, **cost))

@@ -24,7 +24,7 @@ from tests.faults import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts,
 from tests.faulty import Fault, faulty_buses, faulty_skin
 
 CODY = SKINS["cody"]
-ROWS = {name: (file, faults, more) for name, file, faults, more in scripts()}
+ROWS = {name: (file, faults) for name, file, faults in scripts()}
 UNKNOWABLE = [name for name in ROWS if name.endswith("*")]
 """The protocol has nothing that would tell these."""
 QUIET = np.zeros((16, 24), dtype=np.uint16)
@@ -32,8 +32,8 @@ QUIET = np.zeros((16, 24), dtype=np.uint16)
 
 @pytest.mark.parametrize("name", [n for n in ROWS if n not in UNKNOWABLE])
 def test_a_fault_gives_no_wrong_value_and_costs_no_other_chip(name):
-    file, faults, more = ROWS[name]
-    outcome = run(name, file, faults, seconds=1.6, **more)
+    file, faults = ROWS[name]
+    outcome = run(name, file, faults, seconds=1.6)
     assert (outcome.met > 0, outcome.wrong, outcome.others) == (True, 0, 0)
     assert outcome.back_s < BACK_S
     hangs = any(f.code == errno.ETIMEDOUT and f.kind == "error" for f in faults)
@@ -75,8 +75,8 @@ def test_a_chip_that_never_comes_back_stays_out_and_costs_nothing():
 
 def test_without_reading_back_a_wrong_channel_gives_wrong_values():
     """The campaign can see them: the 20 bits of reading back are not for nothing."""
-    file, faults, more = ROWS["the same without reading back *"]
-    assert run("", file, faults, seconds=1.2, **more).wrong > 100
+    file, faults = ROWS["the same without reading back *"]
+    assert run("", file, faults, seconds=1.2).wrong > 100
 
 
 def test_no_result_depends_on_what_power_up_leaves_undefined():

@@ -3,17 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.train.simulate.scenes import one_object, scene
 from train.simulate.readings import FULL, Readings
-from train.simulate.scene import from_dict
 
 FRAMES, ROWS, COLS = 3, 2, 4
-SCENE = from_dict(
-    {
-        "skin": {"rows": ROWS, "cols": COLS},
-        "motion": {"place_m": 0.18},
-        "object": [{"name": "box", "family": "rigid", "conditions": ["fixed"]}],
-    }
-)
+SKIN = {"rows": ROWS, "cols": COLS}
+SCENE = scene(one_object(), skin=SKIN, motion={"place_m": 0.18})
 
 
 def reading(taxels, counts, kind=np.float32) -> Readings:

@@ -8,14 +8,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from edge.touch.arm import Chain
-from tests.train.simulate.scenes import Rig, make, movable, one_object, run, slider, specs_of
+from tests.train.simulate.scenes import Rig, make, movable, one_object, run, scene, slider, specs_of
 from train.simulate import engine
 from train.simulate.arm import Kinematics
 from train.simulate.contact import GRAVITY
 from train.simulate.effects import friction, tilt
 from train.simulate.effects.inertia import FINER
 from train.simulate.plan import ALL, make_plan
-from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS, load
+from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS
 
 ARM_K = 115.0
 RADIUS = 0.04604
@@ -131,30 +131,22 @@ class TestInertia:
 
     INERTIA, STIFFNESS, DAMPING = 0.09, 12.0, 0.4
 
-    def scene(self, tmp_path, h, loss_s, after_s=0.6):
-        (tmp_path / "arm.toml").write_text(
-            '[[joint]]\nname = "a"\naxis = [0, -1, 0]\ntranslate = [0, 0, -0.4]\n'
+    def swing(self, tmp_path, h, loss_s, after_s=0.6):
+        chain = tmp_path / "arm.toml"
+        chain.write_text('[[joint]]\nname = "a"\naxis = [0, -1, 0]\ntranslate = [0, 0, -0.4]\n')
+        return scene(
+            one_object(width_m=0.01),
+            trials={"count": 1, "lead_s": 0.05, "after_s": after_s},
+            step_s={"base": h},
+            motion={"start_deg": [0.0], "rate_deg_s": [30.0]},
+            effects={"inertia": {"loss_s": loss_s}},
+            arm={
+                "chain": str(chain),
+                "stiffness_nm_rad": [self.STIFFNESS],
+                "damping_nms_rad": [self.DAMPING],
+                "inertia_kg_m2": [self.INERTIA],
+            },
         )
-        path = tmp_path / "one.toml"
-        path.write_text(
-            f"""
-            trials = {{ count = 1, lead_s = 0.05, after_s = {after_s} }}
-            step_s = {{ base = {h} }}
-            motion = {{ start_deg = [0.0], rate_deg_s = [30.0] }}
-            effects = {{ inertia = {{ loss_s = {loss_s} }} }}
-            [arm]
-            chain = "arm.toml"
-            stiffness_nm_rad = [{self.STIFFNESS}]
-            damping_nms_rad = [{self.DAMPING}]
-            inertia_kg_m2 = [{self.INERTIA}]
-            [[object]]
-            name = "post"
-            family = "rigid"
-            conditions = ["fixed"]
-            width_m = 0.01
-            """
-        )
-        return load(path)
 
     def oracle(self, batch, loss_s):
         """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never pulling."""
@@ -184,17 +176,17 @@ class TestInertia:
 
     @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
     def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
-        batches = [run(self.scene(tmp_path, h, loss_s, after_s=0.25), h) for h in (1e-4, 5e-5)]
+        batches = [run(self.swing(tmp_path, h, loss_s, after_s=0.25), h) for h in (1e-4, 5e-5)]
         want = self.oracle(batches[0], loss_s)
         errors = [np.sqrt(np.mean((b.force[0] - want) ** 2)) / want.max() for b in batches]
         assert errors[1] < 0.1
         assert errors[1] < 0.75 * errors[0]
 
     def test_a_hit_has_short_steps_of_its_own(self, tmp_path):
-        scene, h, loss_s = self.scene(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
-        plan = make_plan(scene, specs_of(scene))
+        one, h, loss_s = self.swing(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
+        plan = make_plan(one, specs_of(one))
         plans = plan, replace(plan, stages={**plan.stages, "pace": []})
-        paced, plain = (run(scene, h, plan=one) for one in plans)
+        paced, plain = (run(one, h, plan=plan) for plan in plans)
         want = self.oracle(paced, loss_s)
         hit = slice(0, int(np.argmax(want)) + 4)
         apart = [np.abs(b.force[0, hit] - want[hit]).max() / want.max() for b in (paced, plain)]
@@ -204,7 +196,7 @@ class TestInertia:
         assert (paced.force[0, hit.stop : hit.stop + 3] == 0.0).all()
 
     def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path, monkeypatch):
-        scene = self.scene(tmp_path, 0.01, loss_s=0.02)
+        one = self.swing(tmp_path, 0.01, loss_s=0.02)
         steps, start_frames = [], engine.start_frames
 
         def watched(t, starts):
@@ -213,7 +205,7 @@ class TestInertia:
             assert t.h[0] == 0.01 / steps[-1]
 
         monkeypatch.setattr(engine, "start_frames", watched)
-        hit = int(np.argmax(run(scene).force[0, 1:] > 0.0))
+        hit = int(np.argmax(run(one).force[0, 1:] > 0.0))
         assert set(steps) == {1, FINER}
         assert set(steps[: hit - 2]) == {1}
         assert set(steps[hit : hit + 3]) == {FINER}
@@ -317,8 +309,8 @@ class TestTilt:
         assert (lever[0] == 0.0).all()  # as near to it as a row is
 
     def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
-        scene = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
-        t = run(scene, 0.0025).trials
+        one = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
+        t = run(one, 0.0025).trials
         moved = (t.jacobian * (t.q - t.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()
         np.testing.assert_allclose(t.depth, t.y_frame + moved, rtol=0.0, atol=1e-13)

@@ -56,18 +56,20 @@ class TestTurning:
 
 
 class TestSlope:
-    @pytest.mark.parametrize("degrees", [-2.0, 1.0])
-    def test_uphill_takes_more_and_downhill_less(self, degrees):
+    @pytest.mark.parametrize(
+        ("degrees", "mu", "keys", "rel"),
+        [
+            (-2.0, MU, {}, 0.02),
+            (1.0, MU, {}, 0.02),
+            (1.0, 0.2, {"friction_kinetic": 0.2, "stribeck_m_s": 0.01}, 0.1),
+        ],
+    )
+    def test_uphill_takes_more_and_downhill_less(self, degrees, mu, keys, rel):
+        """Also where friction falls with speed."""
         angle = math.radians(degrees)
-        force = MASS * GRAVITY * (MU * math.cos(angle) + math.sin(angle))
-        batch = push(slope_deg=degrees)
-        assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.02)
-
-    def test_friction_that_falls_with_speed_falls_from_the_slopes(self):
-        batch = push(slope_deg=1.0, friction_kinetic=0.2, stribeck_m_s=0.01)
-        angle = math.radians(1.0)
-        force = MASS * GRAVITY * (0.2 * math.cos(angle) + math.sin(angle))
-        assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.1)
+        force = MASS * GRAVITY * (mu * math.cos(angle) + math.sin(angle))
+        batch = push(slope_deg=degrees, **keys)
+        assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=rel)
 
     def test_friction_falls_with_the_square_of_the_speed(self):
         t = push(friction_static=0.6, friction_kinetic=0.2, stribeck_m_s=0.05).trials
