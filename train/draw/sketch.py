@@ -45,8 +45,7 @@ def draw_side(
     """
     joints = recording.joints
     assert joints is not None
-    simulated = recording.meta.get("simulation")
-    drawn = simulated if isinstance(simulated, dict) else {}
+    drawn = recording.meta.get("simulation", {})
     first: Place | None = None
     motion = ""
     for text, later, style, line, hatch in MOMENTS:
@@ -67,9 +66,9 @@ def draw_side(
             motion = _thing(axis, drawn, first, place[0], since, color=style, hatch=hatch)
     title = "seen from the side"
     if drawn:
-        effects, mass = drawn.get("effects"), _size(drawn, "mass_kg")
-        title += f": {drawn.get('family', '')}" + (f", {mass:.2g} kg" if mass else "") + motion
-        title += "\n" + (", ".join(map(str, effects)) if isinstance(effects, list) else "")
+        mass = drawn["values"].get("mass_kg")
+        title += f": {drawn['family']}" + (f", {mass:.2g} kg" if mass else "") + motion
+        title += "\n" + ", ".join(drawn["effects"])
     axis.set_title(title, fontsize=9)
     axis.set(xlabel=f"x in the frame of {chain.base}, metres", ylabel="z, metres")
     axis.set_aspect("equal", adjustable="datalim")
@@ -102,15 +101,6 @@ def _last_contact(
     return None
 
 
-def _size(simulated: dict[str, Any], key: str) -> float | None:
-    """A number that the simulator drew; None where the recording has no plausible one."""
-    values = simulated.get("values")
-    size = values.get(key) if isinstance(values, dict) else None
-    if isinstance(size, bool) or not isinstance(size, int | float):
-        return None
-    return float(size) if 0 < abs(size) < 1e9 else None
-
-
 def _turned(outline: np.ndarray, angle: float) -> np.ndarray:
     """Points (n, 2) turned clockwise about the origin."""
     c, s = math.cos(angle), math.sin(angle)
@@ -130,25 +120,24 @@ def _thing(
         now: (3,) position of the last contact, `since` seconds ago.
         style: colour and hatching, by their names in matplotlib.
     """
+    effects, size = drawn["effects"], drawn["values"].get
     start = first[0][[0, 2]]
     ahead = math.copysign(1.0, first[1][0] or 1.0)
-    height = _size(drawn, "height_m") or STANDS_M
-    width = _size(drawn, "width_m") or 0.1
+    height = size("height_m") or STANDS_M
+    width = size("width_m") or 0.1
     top = max(min(0.5 * width, first[2]), LEAST_M)
     floor = -max(height, 0.5 * min(width, 0.6))
-    depth = _size(drawn, "base_m") or DEPTH_M
+    depth = size("base_m") or DEPTH_M
     z = np.linspace(floor, top, 33)
-    face = np.minimum(z * z / (2.0 * (_size(drawn, "radius_m") or math.inf)), depth / 2.0)
+    face = np.minimum(z * z / (2.0 * (size("radius_m") or math.inf)), depth / 2.0)
     outline = np.vstack([np.column_stack([face, z]), [[depth, top], [depth, floor]]])
     table = start[0] + ahead * np.array([-0.1, depth + 0.25])
     axis.plot(table, 2 * [start[1] + floor], color="sienna")
     moved = max(ahead * float(now[0] - first[0][0]), 0.0)
-    given = drawn.get("effects")
-    effects = given if isinstance(given, list) else []
     slid = moved if "sliding" in effects else 0.0
     if "stems" in effects:
-        count = int(np.clip(_size(drawn, "stem_count") or 12, 1, STEMS))
-        for behind in np.linspace(0.0, _size(drawn, "stem_spread_m") or 0.06, count):
+        count = min(int(size("stem_count") or 12), STEMS)
+        for behind in np.linspace(0.0, size("stem_spread_m") or 0.06, count):
             # A pot that slides takes its stems along; otherwise they bend as far as pressed.
             bent = max(moved - slid - behind, 0.0) * (top - floor) / -floor
             ends = slid + behind + np.array([0.0, bent])
@@ -156,8 +145,8 @@ def _thing(
             axis.plot(start[0] + ahead * ends, heights, **lines, lw=1)
         return ""
     motion = ""
-    aside, foot = _size(drawn, "aside_m"), _size(drawn, "foot_m")
-    friction = _size(drawn, "friction_static") or 0.0
+    aside, foot = size("aside_m"), size("foot_m")
+    friction = size("friction_static") or 0.0
     if slid and "tipping" in effects and friction > depth / (2.0 * height):
         fallen = since > LOST_S
         lean = 0.5 * math.pi if fallen else min(slid / height, 0.5 * math.pi)

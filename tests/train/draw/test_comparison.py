@@ -2,7 +2,6 @@
 
 import pytest
 from matplotlib import image
-from matplotlib.figure import Figure
 
 from edge import demo
 from edge.errors import InputError
@@ -14,10 +13,7 @@ from train.draw import comparison
 TOUCHES = [str(path) for path in demo.recordings()]
 
 
-def test_the_command_draws_several_with_the_decisions_of_a_model(tmp_path, monkeypatch):
-    drawn = []
-    save = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (drawn.append(f), save(f, *a, **k)))
+def test_the_command_draws_several_with_the_decisions_of_a_model(tmp_path, drawn):
     out = tmp_path / "four.png"
     assert main(["show", *TOUCHES, "--model", str(demo.MODEL), "--out", str(out)]) == 0
     assert out.read_bytes()[:4] == b"\x89PNG"

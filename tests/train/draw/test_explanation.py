@@ -1,18 +1,14 @@
 """Why a touch was decided so, as a picture: its curves over those of the nearest trials."""
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from edge.recording import save
 from train.__main__ import main
 
 
 def test_a_touch_is_drawn_over_the_trials_that_a_model_finds_nearest(
-    exported, recordings, tmp_path, make_touch, monkeypatch
+    exported, recordings, tmp_path, make_touch, drawn
 ):
-    drawn = []
-    keep = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (drawn.append(f), keep(f, *a, **k)))
     save(tmp_path / "new.npz", make_touch(kind="soft", seed=9))
     model = ["--model", str(exported / "model.onnx"), "--data", str(recordings)]
     assert main(["show", str(tmp_path / "new.npz"), *model]) == 0

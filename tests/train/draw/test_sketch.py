@@ -83,19 +83,3 @@ def test_the_skin_is_seen_as_thick_as_it_is_and_the_object_no_higher_than_it(for
     assert np.ptp(corners[:, 1]) == pytest.approx(15 * forearm.pitch[0])
     tall = outline(sketch([], width_m=1.0)[0])
     assert tall[:, 1].max() == pytest.approx(FIRST[0][2] + FIRST[2])
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"width_m": "wide", "mass_kg": "x", "radius_m": [1]},
-        [1],
-        {"width_m": -1, "height_m": 1e300, "stem_count": -3, "stem_spread_m": -1},
-        {"aside_m": 0.1, "foot_m": -2},
-    ],
-)
-@pytest.mark.parametrize("effects", [5, [1, 2], ["stems"], ["turning", "sliding", "tipping"]])
-def test_a_scene_that_makes_no_sense_is_drawn_as_far_as_it_does(values, effects):
-    axis, drawn = Figure().add_subplot(), {"effects": effects, "values": values, "family": 3}
-    sketches._thing(axis, drawn, FIRST, FIRST[0] + [0.1, 0.0, 0.0], 0.0, color="blue", hatch="//")
-    assert axis.lines

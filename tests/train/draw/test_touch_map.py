@@ -17,13 +17,8 @@ HEAD = {"event": "map", "frame": "torso_lift_link", "unit": "metre", "tasks": ["
 
 
 def touch(n, place, label, confidence=1.0):
-    known = {
-        "event": "decision",
-        "task": "category",
-        "flags": [],
-        "contact": n,
-        "onset_s": float(n),
-    }
+    known = {"event": "decision", "task": "category", "flags": []}
+    known |= {"contact": n, "onset_s": float(n)}
     return known | {"place": place, "label": label, "confidence": confidence}
 
 
@@ -31,10 +26,8 @@ def touch(n, place, label, confidence=1.0):
 def path(tmp_path):
     rng = np.random.default_rng(5)
     labels = ["rigid-fixed", "soft-movable", "soft-fixed", None]
-    touches = [
-        touch(n, rng.normal([0.4, -0.2, -0.3], 0.05).tolist(), labels[n % 4], n % 3 / 2)
-        for n in range(20)
-    ]
+    places = rng.normal([0.4, -0.2, -0.3], 0.05, (20, 3)).tolist()
+    touches = [touch(n, place, labels[n % 4], n % 3 / 2) for n, place in enumerate(places)]
     path = tmp_path / "map.jsonl"
     path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *touches]))
     return path
