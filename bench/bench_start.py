@@ -53,7 +53,7 @@ def bench_cold_start(against, tmp_path):
         return until_decided
 
     against(
-        start(b'"decision"', "-m", "edge.cli", "replay", "--model", path, recording),
+        start(b'"decision"', "-m", "edge", "replay", "--model", path, recording),
         {"scikit-learn's pipeline": start(b"'", "-c", USUAL, arrays)},
         most={"scikit-learn's pipeline": 1 / 6},
         calls=1,

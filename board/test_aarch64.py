@@ -85,7 +85,7 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
 
 
 def test_the_demo_prints_the_same_lines(run):
-    demo = ("-m", "edge.cli", "demo")
+    demo = ("-m", "edge", "demo")
     native = subprocess.run([sys.executable, *demo], capture_output=True, text=True, check=True)
     assert timeless(run(*demo)) == timeless(native.stdout)
 

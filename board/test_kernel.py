@@ -59,7 +59,7 @@ def skins(tmp_path_factory):
         text = text.replace(old, new)
     (folder / "cody.toml").write_text(text)
     touches = tmp_path_factory.mktemp("touches")
-    fake = f"edge.cli fake --skin {folder}/pad.toml --out {touches}"
+    fake = f"edge fake --skin {folder}/pad.toml --out {touches}"
     export = f"export --data {touches}/touches --out {touches} --features paper --projection pca"
     for command in (fake, f"{export} --decision-points none"):
         subprocess.run([sys.executable, "-m", *command.split()], cwd=kernel.CHECKOUT, check=True)

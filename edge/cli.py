@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 
 from edge import __version__
@@ -22,12 +23,6 @@ COMMANDS = tuple(
     "demo".split()
 )
 """Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
-FLAGS = {
-    ("--json",): "print JSON lines even to a terminal",
-    ("-v", "--verbose"): "print more messages to stderr",
-    ("-q", "--quiet"): "print only errors to stderr",
-}
-"""Options of every command, with their help."""
 UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of writing to a full disk, beyond a quota, or to a terminal that has gone."""
 
@@ -45,8 +40,10 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
     for command in add_commands(top, "edge.commands", wanted):
-        for flags, text in FLAGS.items():
-            command.add_argument(*flags, action="store_true", help=text)
+        flag = partial(command.add_argument, action="store_true")
+        flag("--json", help="print JSON lines even to a terminal")
+        flag("-v", "--verbose", help="print more messages to stderr")
+        flag("-q", "--quiet", help="print only errors to stderr")
     return top
 
 
@@ -169,6 +166,3 @@ def main(argv: Sequence[str] | None = None) -> int:
 # The interpreter's last garbage collection would visit every imported object, which doubles the
 # time that the program takes to end.
 atexit.register(gc.freeze)
-
-if __name__ == "__main__":
-    sys.exit(main())

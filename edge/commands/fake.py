@@ -13,12 +13,12 @@ import argparse
 from contextlib import ExitStack
 from pathlib import Path
 
-from edge.commands.options import within
+from edge.commands.options import add_noise, within
 from edge.commands.output import Output
 from edge.commands.source import ending_signals
 from edge.errors import InputError
 from edge.fake.clock import PacedClock
-from edge.fake.player import NOISE_COUNTS, fake_buses, playback
+from edge.fake.player import fake_buses, playback
 from edge.fake.touches import still, touches
 from edge.fake.usb_adapter import UsbAdapter, plugged
 from edge.recording import load as load_recording
@@ -45,13 +45,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="plug a USB adapter with the skin's chips into this machine (Linux, as root); they "
         "feel this recording over and over, or nothing",
     )
-    parser.add_argument(
-        "--noise",
-        type=within(float, 0.0, 1000.0),
-        default=NOISE_COUNTS,
-        metavar="COUNTS",
-        help="noise of the chips of --plug, as a standard deviation (default: %(default)g)",
-    )
+    add_noise(parser, "the chips of --plug")
     parser.add_argument(
         "--trials",
         type=within(int, 1, 1000),

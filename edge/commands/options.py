@@ -44,8 +44,6 @@ def task_label(text: str) -> tuple[str, str]:
 
 def add_skin(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
-    from edge.fake.player import NOISE_COUNTS  # a replay needs no chips
-
     parser.add_argument("--skin", metavar="skin.toml", help="the file that describes the skin")
     parser.add_argument(
         "--fake",
@@ -53,19 +51,26 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
         help="need no hardware: play this recording onto fake chips, as fast as possible; without "
         "--skin, the chips are chosen to suit the recording",
     )
-    parser.add_argument(
-        "--noise",
-        type=within(float, 0.0, 1000.0),
-        default=NOISE_COUNTS,
-        metavar="COUNTS",
-        help="noise of the fake chips of a --skin, as a standard deviation (default: %(default)g)",
-    )
+    add_noise(parser, "the fake chips of a --skin")
     parser.add_argument(
         "--real-time", action="store_true", help="play the recording at its original speed"
     )
     parser.add_argument("--loop", action="store_true", help="play the recording over and over")
     parser.add_argument(
         "--seconds", type=seconds, default=math.inf, help="stop after this time (default: never)"
+    )
+
+
+def add_noise(parser: argparse.ArgumentParser, chips: str) -> None:
+    """Add the option for the noise of these chips, which are fake."""
+    from edge.fake.player import NOISE_COUNTS  # a replay needs no chips
+
+    parser.add_argument(
+        "--noise",
+        type=within(float, 0.0, 1000.0),
+        default=NOISE_COUNTS,
+        metavar="COUNTS",
+        help=f"noise of {chips}, as a standard deviation (default: %(default)g)",
     )
 
 

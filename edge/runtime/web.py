@@ -26,11 +26,8 @@ from edge.errors import EdgeError, InputError
 from edge.files import refusing
 from edge.runtime.event_writer import parse_address
 
-FILES = {
-    "/": ("page.html", "text/html; charset=utf-8"),
-    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
-    "/page.css": ("page.css", "text/css; charset=utf-8"),
-}
+FILES = {"/": "html", "/page.js": "javascript", "/page.css": "css"}
+"""Kind of text of each file that is served."""
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
     "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
@@ -89,7 +86,8 @@ class WebServer:
         self._streams = 0
         folder = resources.files("edge") / "pages"
         self.files = {
-            path: (kind, (folder / name).read_bytes()) for path, (name, kind) in FILES.items()
+            path: (f"text/{kind}; charset=utf-8", (folder / (path[1:] or "page.html")).read_bytes())
+            for path, kind in FILES.items()
         }
         threading.Thread(target=self._http.serve_forever, args=(0.1,), daemon=True).start()
 

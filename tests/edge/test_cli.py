@@ -98,7 +98,7 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
         "COMP_TYPE": "9",
     }
     done = subprocess.run(
-        [sys.executable, "-m", "edge.cli"], cwd=ROOT, env=asked, capture_output=True, text=True
+        [sys.executable, "-m", "edge"], cwd=ROOT, env=asked, capture_output=True, text=True
     )
     assert done.stdout.split() == ["record"]
 
@@ -138,7 +138,7 @@ def test_only_the_command_that_is_asked_for_is_loaded():
 def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_path):
     """Nor does a file that is opened later take its descriptor, and get what is printed."""
     log = tmp_path / "log"
-    command = f"{sys.executable} -m edge.cli check {skinfile.shipped()} {closed}"
+    command = f"{sys.executable} -m edge check {skinfile.shipped()} {closed}"
     redirected = f"({command}) > {log}.out 2> {log}.err; echo $? > {log}.status"
     subprocess.run(["sh", "-c", redirected], cwd=ROOT, timeout=60)
     assert Path(f"{log}.status").read_text() == "0\n"

@@ -108,7 +108,7 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         for t, q in zip(trial.t.tolist()[:63], trial.joints.tolist(), strict=False)
     )
     done = subprocess.run(
-        [sys.executable, "-m", "edge.cli", "run", "--model", str(exported / "model.onnx"),
+        [sys.executable, "-m", "edge", "run", "--model", str(exported / "model.onnx"),
          "--fake", str(recordings / "hard_2.npz"), "--joints", "stdin", "--joints-shared-clock"],
         cwd=ROOT, input=sent + "nonsense\n", capture_output=True, text=True, timeout=60,
     )  # fmt: skip

@@ -155,7 +155,7 @@ def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
                 os.write(writing, b"x" * size)
     os.set_blocking(writing, True)
     process = subprocess.Popen(
-        [sys.executable, "-m", "edge.cli", "record", "--fake", str(parted),
+        [sys.executable, "-m", "edge", "record", "--fake", str(parted),
          "--loop", "--label", "object=a", "--out", str(out)],
         cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

@@ -130,14 +130,14 @@ def test_a_damaged_golden_file_is_one_sentence(verify, exported, tmp_path):
 
 def test_a_pipe_that_is_closed_is_quiet(exported, recordings):
     model = ["replay", "--model", str(exported / "model.onnx"), str(recordings)]
-    line = f"{sys.executable} -m edge.cli {' '.join(model)} | head -1"
+    line = f"{sys.executable} -m edge {' '.join(model)} | head -1"
     piped = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (piped.stdout.count("\n"), piped.stderr) == (1, "")
 
 
 def test_output_without_room_is_one_sentence(exported, recordings):
     model, touch = str(exported / "model.onnx"), str(recordings / "hard_0.npz")
-    command = [sys.executable, "-m", "edge.cli", "replay", "--model", model, touch]
+    command = [sys.executable, "-m", "edge", "replay", "--model", model, touch]
     with open("/dev/full", "w") as full:
         run = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
     assert run.returncode == 2

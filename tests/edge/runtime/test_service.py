@@ -33,7 +33,7 @@ def manager(tmp_path):
 def start(manager, tmp_path, *arguments):
     fake = ("--fake", str(TOUCH), "--loop")
     return subprocess.Popen(
-        [sys.executable, "-m", "edge.cli", "run", "--model", str(demo.MODEL), *fake, *arguments],
+        [sys.executable, "-m", "edge", "run", "--model", str(demo.MODEL), *fake, *arguments],
         cwd=ROOT,
         env={**os.environ, "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "200000"},
         stdout=subprocess.PIPE,
