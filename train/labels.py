@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import permutations
 
 from edge.errors import InputError
-from edge.model.teaching import JOINED
+from edge.model.teaching import JOINED, joined
 from edge.recording import Recording
 
 NO_CONTACT = "none"
@@ -45,19 +45,11 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     out = [dict(labels) for labels in trials]
     for triple in permutations(sorted(tasks | set(JOINED)), 3):
         whole, first, second = triple
-        known = [own for own in trials if tasks.issuperset(triple) and own.keys() >= set(triple)]
-        if triple != JOINED and not known:
-            continue
-        if any(own[whole] != f"{own[first]}-{own[second]}" for own in known):
-            continue
-        for own in out:
-            follows = {}
-            if own.get(whole, "").count("-") == 1:
-                follows = dict(zip((first, second), own[whole].split("-"), strict=True))
-            if own.keys() >= {first, second}:
-                follows[whole] = f"{own[first]}-{own[second]}"
-            own.update({t: label for t, label in follows.items() if t in tasks and t not in own})
-    return out
+        known = [own for own in trials if own.keys() >= set(triple)]
+        holds = all(own[whole] == f"{own[first]}-{own[second]}" for own in known)
+        if holds and (known or triple == JOINED):
+            out = [joined(own, triple) for own in out]
+    return [{task: label for task, label in own.items() if task in tasks} for own in out]
 
 
 def shared_tasks(trials: Sequence[Mapping[str, str]], *, partial: bool = False) -> tuple[str, ...]:

@@ -23,7 +23,6 @@ for a trained object is an error of it too.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -47,10 +46,6 @@ from train.pipeline import (
 from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
 
-FOLDS = 10
-FEWER_FOLDS = 5
-MANY_TRIALS = 400
-"""With so many trials `FEWER_FOLDS` are enough, as four fifths of the trials fit a good model."""
 FEWEST = 20
 """Trials that calibration needs."""
 PULL = 0.5
@@ -58,21 +53,6 @@ PULL = 0.5
 LEAST_SLOPE = 1e-3
 """Smallest slope a standard deviation: a larger margin never makes a label less likely."""
 NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """One task's answers to trials by models fitted without them.
-
-    Attributes:
-        right: (decision points, n) whether the named labels are right.
-        margins: (decision points, n) their margins.
-        distances: (decision points, n) to the nearest training trial.
-    """
-
-    right: NDArray[np.bool_]
-    margins: NDArray[np.float64]
-    distances: NDArray[np.float64]
 
 
 Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]]
@@ -131,6 +111,14 @@ def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[fl
     return slope, float(solution[1]) - slope * middle
 
 
+def curves(
+    margins: NDArray[np.float64], right: NDArray[np.bool_]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Slopes and intercepts of `logistic` at each decision point, from margins (points, n)."""
+    slopes, intercepts = zip(*map(logistic, margins, right), strict=True)
+    return slopes, intercepts
+
+
 def confidences(
     slopes: Sequence[float], intercepts: Sequence[float], margins: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -148,12 +136,6 @@ def unlike(novelty: Novelty, distances: NDArray[np.float64]) -> NDArray[np.bool_
     """(points, n) whether contacts are unknown, from their nearest distances (points, n)."""
     limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
     return np.asarray(distances > limits[:, None])
-
-
-def folds_of(n: int) -> NDArray[np.int64]:
-    """(n,) the calibration fold of each trial, at random; the same for the same n."""
-    stream = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0x666F6C64,)))
-    return np.asarray(stream.permutation(n) % (FOLDS if n < MANY_TRIALS else FEWER_FOLDS))
 
 
 def finest(y: Mapping[str, NDArray[np.str_]]) -> str:
@@ -175,7 +157,7 @@ class SequentialClassifier:
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
         columns_: the columns of the vectors that these take, rising.
-        held_out_: {task: HeldOut}.
+        right_: {task: (decision points, n) whether the labels named without a trial are right}.
         stopping_: {task: Stopping}.
         novelty_: Novelty.
     """
@@ -198,8 +180,8 @@ class SequentialClassifier:
         self,
         X: NDArray[np.float64],
         y: Mapping[str, NDArray[np.str_]],
-        folds: NDArray[np.int64] | None = None,
-        fold_choices: Sequence[Mapping[str, Choice]] | None = None,
+        folds: NDArray[np.int64],
+        fold_choices: Sequence[Mapping[str, Choice]],
         own: NDArray[np.bool_] | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
@@ -207,31 +189,27 @@ class SequentialClassifier:
         Args:
             X: (decision points, n, p).
             y: {task: (n,) labels}; empty where a trial has none.
-            folds: (n,) from 0, or -1 for trials that calibrate nothing; `folds_of` where None.
-            fold_choices: [fold]{task: Choice}, chosen without the fold's trials. Where None,
-                `choices` serve every fold; this is exact if they were not chosen by these trials.
+            folds: (n,) from 0, or -1 for trials that calibrate nothing.
+            fold_choices: [fold]{task: Choice}, chosen without the fold's trials.
             own: see `ContactClassifier.fit`.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
         """
-        n = X.shape[1] if folds is None else int((folds >= 0).sum())
+        n = int((folds >= 0).sum())
         if n < FEWEST:
             raise InputError(
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or export "
                 "without decision points"
             )
-        if folds is None:
-            folds = folds_of(n)
-        count = int(folds.max()) + 1
-        chosen = [self.choices] * count if fold_choices is None else fold_choices
+        count = len(fold_choices)
         kept = _taken(self.choices.values(), self.features)
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(kept, self.features, widths)
         types = types_of(kept, self.features, widths)
         self.decision_points_ = _models(X[..., self.columns_], y, self.choices, *types, own)
         self.n_features_in_ = len(self.columns_)
-        work = (delayed(self._fold)(X, y, folds == k, chosen[k], own) for k in range(count))
+        work = (delayed(self._fold)(X, y, folds == k, fold_choices[k], own) for k in range(count))
         by_fold = Parallel(n_jobs=self.jobs)(work)
         most = finest({task: y[task] for task in self.choices})
         nearest = np.empty(X.shape[:2])
@@ -242,21 +220,18 @@ class SequentialClassifier:
             others = (folds >= 0) & (folds != k) & (y[most] != "")
             limits = novelty(most, nearest[:, others])
             unknown[:, folds == k] = unlike(limits, nearest[:, folds == k])
-        self.held_out_ = {}
-        for task in self.choices:
-            named = np.empty(X.shape[:2], dtype=y[task].dtype)
-            margins, distances = np.empty(named.shape), np.empty(named.shape)
-            for k, answers_of in enumerate(by_fold):
-                left_out = folds == k
-                named[:, left_out], margins[:, left_out], distances[:, left_out] = answers_of[task]
-            self.held_out_[task] = HeldOut(named == y[task], margins, distances)
+        self.right_ = right = {task: np.zeros(X.shape[:2], dtype=bool) for task in self.choices}
+        margins = {task: np.empty(X.shape[:2]) for task in self.choices}
+        for k, answers_of in enumerate(by_fold):
+            for task, (named, sure, _) in answers_of.items():
+                right[task][:, folds == k] = named == y[task][folds == k]
+                margins[task][:, folds == k] = sure
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self.novelty_ = novelty(most, nearest[:, tested[most]])
         confidence = {
-            task: calibrated(held_out, folds, tested[task])
-            for task, held_out in self.held_out_.items()
+            task: calibrated(margins[task], right[task], folds, tested[task])
+            for task in self.choices
         }
-        right = {task: held_out.right for task, held_out in self.held_out_.items()}
         courses = self._courses(confidence, right, unknown, tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
@@ -264,10 +239,8 @@ class SequentialClassifier:
             for factor in factors:
                 rules[factor] = following(rules[factor], rules[task], courses[factor], seconds)
         self.stopping_ = {}
-        for task, held_out in self.held_out_.items():
-            tests = tested[task]
-            curves = map(logistic, held_out.margins[:, tests], held_out.right[:, tests])
-            slopes, intercepts = zip(*curves, strict=True)
+        for task, tests in tested.items():
+            slopes, intercepts = curves(margins[task][:, tests], right[task][:, tests])
             _, wrong = courses[task].under(candidates(len(seconds))[0])
             self.stopping_[task] = Stopping(
                 slopes, intercepts, tuple(rules[task]), len(wrong), int(wrong.sum()), RISK
@@ -355,13 +328,14 @@ def _models(
 
 
 def calibrated(
-    held_out: HeldOut, folds: NDArray[np.int64], tested: NDArray[np.bool_]
+    margins: NDArray[np.float64],
+    right: NDArray[np.bool_],
+    folds: NDArray[np.int64],
+    tested: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """(points, n) confidences, each fold's by a logistic regression on the other folds' tested."""
-    out = np.zeros(held_out.right.shape)
+    out = np.zeros(right.shape)
     for fold in range(int(folds.max()) + 1):
         own, others = folds == fold, tested & (folds != fold)
-        curves = map(logistic, held_out.margins[:, others], held_out.right[:, others])
-        slopes, intercepts = zip(*curves, strict=True)
-        out[:, own] = confidences(slopes, intercepts, held_out.margins[:, own])
+        out[:, own] = confidences(*curves(margins[:, others], right[:, others]), margins[:, own])
     return out

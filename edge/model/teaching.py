@@ -61,14 +61,14 @@ def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[A
     }
 
 
-def joined(labels: Mapping[str, str]) -> dict[str, str]:
-    """{task: label} of a trial, with those of `JOINED` that follow from its others."""
-    whole, *parts = JOINED
+def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str, str]:
+    """{task: label} of a trial, with those of `tasks`, like `JOINED`, that follow from others."""
+    whole, *halves = tasks
     follow: dict[str, str] = {}
     if labels.get(whole, "").count("-") == 1:
-        follow = dict(zip(parts, labels[whole].split("-"), strict=True))
-    elif labels.keys() >= set(parts):
-        follow = {whole: "-".join(labels[part] for part in parts)}
+        follow = dict(zip(halves, labels[whole].split("-"), strict=True))
+    elif labels.keys() >= set(halves):
+        follow = {whole: "-".join(labels[half] for half in halves)}
     return {**follow, **labels}
 
 

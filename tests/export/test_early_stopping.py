@@ -22,6 +22,7 @@ from export.api import save as save_model
 from export.graph import to_onnx
 from tests.conftest import PAPER, save_touches
 from train.dataset import load_trials
+from train.evaluate import stratified_folds
 from train.pipeline import Choice
 from train.stopping import SequentialClassifier
 
@@ -62,8 +63,9 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     width = early[0].info.samples * len(FEATURES)
     X, queries = rng.normal(size=(3, len(labels), width)), rng.normal(size=(9, width))
     info = replace(early[0].info, tasks={"t": Task(("common", "known", "rare"), 3, 4, "none", 0.5)})
-    sequential = SequentialClassifier({"t": Choice("none", 4, 3)}, info.decision_points_s)
-    sequential.fit(X, {"t": labels})
+    choices = {"t": Choice("none", 4, 3)}
+    sequential = SequentialClassifier(choices, info.decision_points_s)
+    sequential.fit(X, {"t": labels}, stratified_folds(labels), [choices] * 10)
     info = replace(
         info, stopping=sequential.stopping_, novelty=sequential.novelty_, rows=132, trials=()
     )
@@ -231,7 +233,8 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
     width = early[0].info.samples * len(FEATURES)
     X, more, queries = (rng.normal(size=(3, n, width)) for n in (45, 3, 9))
     choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1)}
-    sequential = SequentialClassifier(choices, early[0].info.decision_points_s).fit(X, y)
+    sequential = SequentialClassifier(choices, early[0].info.decision_points_s)
+    sequential.fit(X, y, stratified_folds(y["t"]), [choices] * 10)
     info = replace(
         early[0].info,
         tasks={

@@ -12,6 +12,7 @@ from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
 from tests.hard_cases.models import describe, features, labels_for
+from train.evaluate import stratified_folds
 from train.pipeline import Choice, ContactClassifier, vote
 from train.scaling import SCALINGS
 from train.stopping import SequentialClassifier
@@ -151,7 +152,8 @@ def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
     X = np.stack([features(40, seed) for seed in (1, 2, 3)])
     y = {"t": labels_for(X[0], 3), "u": labels_for(X[0], 2, 1)}
     choices = {"t": Choice("IV", 6, 3), "u": Choice("IV", 2, 2, "lda")}
-    model = SequentialClassifier(choices, (0.4, 0.8, 1.2)).fit(X, y)
+    model = SequentialClassifier(choices, (0.4, 0.8, 1.2))
+    model.fit(X, y, stratified_folds(y["t"]), [choices] * 10)
     data = to_onnx(model, describe(model.decision_points_[-1]))
     session = onnxruntime.InferenceSession(data)
     names = [output.name for output in session.get_outputs()]

@@ -5,12 +5,12 @@ import pytest
 
 from edge.errors import InputError
 from edge.model.stopping import NOVELTY_RATE
+from train.evaluate import stratified_folds
 from train.pipeline import Choice
 from train.stopping import (
     SequentialClassifier,
     answers,
     confidences,
-    folds_of,
     logistic,
     unlike,
 )
@@ -47,6 +47,12 @@ class TestLogistic:
 SECONDS = np.array([0.4, 0.8, 1.2])
 
 
+def calibrated(choices, X, y):
+    """A model whose settings serve every fold too."""
+    folds = stratified_folds(next(iter(y.values())))
+    return SequentialClassifier(choices, SECONDS, ("max_force",)).fit(X, y, folds, [choices] * 10)
+
+
 def touches(n, seed=0):
     """At the first decision point the labels look alike; from the second on they do not."""
     rng = np.random.default_rng(seed)
@@ -59,7 +65,7 @@ def touches(n, seed=0):
 def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     X, labels = touches(120)
     choices = {"t": Choice("none", 3, 3)}
-    model = SequentialClassifier(choices, SECONDS, ("max_force",)).fit(X, {"t": labels})
+    model = calibrated(choices, X, {"t": labels})
     rule = model.stopping_["t"].rule(0.1)
     assert rule.mean_s <= 0.83
     new, truth = touches(300, seed=1)
@@ -69,7 +75,7 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
     X, labels = touches(60)
-    folds = folds_of(60)
+    folds = stratified_folds(labels)
     # A projection of no component that tells: the fold it serves is guessed.
     worse = X.copy()
     worse[:, :, 0] = 0.0
@@ -79,16 +85,15 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
     model = SequentialClassifier(choices, SECONDS, ("max_force",)).fit(
         X, {"t": labels}, folds, [bad, *[choices] * (count - 1)]
     )
-    right = model.held_out_["t"].right[-1]
+    right = model.right_["t"][-1]
     assert right[folds != 0].all()
     assert not right[folds == 0].all()
 
 
 def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
-    model = SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS, ("max_force",))
-    model.fit(X, {"t": labels})
-    assert (model.held_out_["t"].distances > 0.0).all()
+    model = calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})
+    assert (np.array(model.novelty_.limits) > 0.0).all()
     _, _, own = answers(model.decision_points_, X)["t"]
     assert (own == 0.0).all()
 
@@ -99,10 +104,9 @@ def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothi
     X[:, ::50, 5] = 500.0 * (1 + np.arange(4))
     each = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
-    model = SequentialClassifier(choices, SECONDS, ("max_force",))
-    model.fit(X, {"kind": labels, "thing": each})
+    model = calibrated(choices, X, {"kind": labels, "thing": each})
     assert model.novelty_.task == "thing"
-    right = {task: one.right[-1] for task, one in model.held_out_.items()}
+    right = {task: own[-1] for task, own in model.right_.items()}
     assert model.stopping_["kind"].wrong == int((~right["kind"]).sum())
     far = np.arange(200) % 50 == 0
     assert model.stopping_["thing"].wrong >= int((~right["thing"] | far).sum())
@@ -110,8 +114,7 @@ def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothi
 
 def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
     X, labels = touches(60)
-    model = SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS, ("max_force",))
-    novelty = model.fit(X, {"t": labels}).novelty_
+    novelty = calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels}).novelty_
     distances = np.array([row[-2] for row in novelty.limits])[:, None] + [0.0, 1e-9]
     assert novelty.rates[-2] == NOVELTY_RATE
     assert unlike(novelty, distances).tolist() == [[False, True]] * 3
@@ -122,7 +125,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     """The folds may choose what the model does not: its own vectors are the narrower ones."""
     X, labels = touches(60)
     names = ("max_force", "contact_area")
-    folds = folds_of(60)
+    folds = stratified_folds(labels)
     count = int(folds.max()) + 1
     blind = {"t": Choice("none", 3, 3, features=names[1:])}
     seeing = {"t": Choice("none", 3, 3, features=names[:1])}
@@ -131,7 +134,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     )
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
-    assert model.held_out_["t"].right[-1].all()
+    assert model.right_["t"][-1].all()
     _, _, distances = answers(model.decision_points_, X[..., model.columns_])["t"]
     assert (distances == 0.0).all()
 
@@ -139,4 +142,4 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
 def test_too_few_trials_are_refused():
     X, labels = touches(19)
     with pytest.raises(InputError, match="calibration needs at least 20 trials, not 19"):
-        SequentialClassifier({"t": Choice("none", 3, 1)}, SECONDS).fit(X, {"t": labels})
+        calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})
