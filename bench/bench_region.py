@@ -28,7 +28,7 @@ def large():
 
 
 FRAMES = {"contact": contact(), "soft contact": large()} | {
-    name: SHAPES[name] for name in ("full", "checkerboard", "serpentine", "spiral", "empty")
+    name: SHAPES[name] for name in ("full", "checkerboard", "serpentine", "empty")
 }
 
 

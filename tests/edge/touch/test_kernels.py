@@ -9,11 +9,10 @@ from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch import kernels
 from edge.touch.features import channels_of, feature_vector, kernel_channels
-from edge.touch.frame import Frame
 from edge.touch.kernels import SAMPLES, KernelTable, convolution_of_bias, shares
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import feature
-from edge.touch.track import ContactTracker
+from tests.edge.touch.pressed import followed, pressed
 
 SKIN = SkinLayout(16, 24, threshold_counts=9)
 HEAVY = list(combinations(range(9), 3))
@@ -99,21 +98,17 @@ def test_a_convolution_takes_one_to_nine_channels_the_same_on_every_machine():
     assert (kernels._mixes(1) == 1).all()
 
 
-def touch(layout=SKIN):
+def touch():
     """A press that grows; its frames come 40 ms apart and a little late."""
-    frames = []
-    for i in range(40):
-        counts = np.zeros(layout.shape, dtype=np.uint16)
-        counts[2:5, 3:6] = 10 + 7 * i % 50
-        frames.append(Frame(5.0 + 0.04 * i + 1e-9 * (i % 3), counts))
-    return frames
+    patch = {(row, (3, 4, 5)) for row in (2, 3, 4)}
+    return [
+        pressed(SKIN, 5.0 + 0.04 * i + 1e-9 * (i % 3), dict.fromkeys(patch, 10 + 7 * i % 50))
+        for i in range(40)
+    ]
 
 
 def series_of(frames, *wanted):
-    tracker = ContactTracker(SKIN, features=wanted)
-    for frame in frames:
-        (contact,) = tracker.push(frame) or [None]
-    return contact.series()
+    return followed(SKIN, frames, features=wanted).series()
 
 
 @pytest.mark.parametrize(("name", "channels"), [("taxel_kernels", 24), ("zone_kernels", 32)])

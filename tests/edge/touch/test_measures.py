@@ -24,7 +24,7 @@ from edge.touch.measures import (
     names,
 )
 from edge.touch.region import ActiveTaxels, largest_region
-from edge.touch.track import ContactTracker
+from tests.edge.touch.pressed import followed, pressed
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
 ROUND = replace(FLAT, wraps=True)
@@ -36,25 +36,17 @@ def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[
     candidates = []
     for cut in range(turn or 1):
         moved = {(r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()}
-        force = sum(moved.values())
-        cols = sum(f * c for (_, c), f in moved.items())
-        cols_cols = sum(f * c * c for (_, c), f in moved.items())
-        candidates.append(
-            (
-                force * cols_cols - cols * cols,
-                cut,
-                [
-                    max(moved.values(), default=0),
-                    len(moved),
-                    force,
-                    sum(f * r for (r, _), f in moved.items()),
-                    cols,
-                    sum(f * r * r for (r, _), f in moved.items()),
-                    sum(f * r * c for (r, c), f in moved.items()),
-                    cols_cols,
-                ],
-            )
-        )
+
+        def total(of, moved=moved):
+            return sum(f * of(r, c) for (r, c), f in moved.items())
+
+        force, cols, cols_cols = (total(lambda _, c, n=n: c**n) for n in range(3))
+        sums = [
+            *(force, total(lambda r, _: r), cols, total(lambda r, _: r * r)),
+            *(total(lambda r, c: r * c), cols_cols),
+        ]
+        largest = max(moved.values(), default=0)
+        candidates.append((force * cols_cols - cols * cols, cut, [largest, len(moved), *sums]))
     return min(candidates)[2]
 
 
@@ -117,26 +109,25 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     squares = sum(c * c for c in range(cols))
     sums = rows * cols, rows * line, rows * line, rows * squares, line * line, rows * squares
     assert row[2:] == [65535 * v for v in sums]
-    tracker = ContactTracker(layout, features=["skin_spread_along", "skin_slant"])
-    tracker.push(frame)
-    (contact,) = tracker.push(replace(frame, t=1.0)) or [None]
-    vector = feature_vector(contact.series(), 1.0, 2, ["skin_spread_along", "skin_slant"])
+    wanted = ["skin_spread_along", "skin_slant"]
+    vector = vector_of(layout, [frame, replace(frame, t=1.0)], wanted, 2)
     assert vector[0] == pytest.approx(np.sqrt((rows**2 - 1) / 12), rel=1e-15)
     assert vector[2] == 0.0
 
 
-def series_of(layout: SkinLayout, frames: list[Frame], wanted, chain=None):
-    tracker = ContactTracker(layout, features=wanted, chain=chain)
-    contact = None
-    for frame in frames:
-        (contact,) = tracker.push(frame) or [contact]
-    return contact.series()
+def series_of(layout: SkinLayout, frames, wanted):
+    return followed(layout, frames, features=wanted).series()
+
+
+def vector_of(layout: SkinLayout, frames, wanted, samples: int):
+    """The features of the first second."""
+    return feature_vector(series_of(layout, frames, wanted), 1.0, samples, wanted)
 
 
 def value(layout: SkinLayout, counts, name: str) -> float:
     """A feature of a contact whose frames are all the same."""
     frames = [Frame(t, np.asarray(counts, dtype=np.uint16)) for t in (0.0, 0.5, 1.0)]
-    vector = feature_vector(series_of(layout, frames, [name]), 1.0, 3, [name])
+    vector = vector_of(layout, frames, [name], 3)
     assert len(set(vector)) == 1
     return vector[0]
 
@@ -194,42 +185,30 @@ def test_places_on_a_seam_are_measured_on_the_circle():
 
 
 def test_a_contact_is_followed_across_the_seam_and_does_not_jump():
-    frames = []
-    for i in range(5):
-        counts = np.zeros((5, 7), dtype=np.uint16)
-        counts[2, (5 + i) % 7] = 50
-        frames.append(Frame(i / 4, counts))
-    vector = feature_vector(
-        series_of(ROUND, frames, ["contact_around"]), 1.0, 5, ["contact_around"]
-    )
+    frames = [pressed(ROUND, i / 4, {(2, (5 + i) % 7): 50}) for i in range(5)]
+    vector = vector_of(ROUND, frames, ["contact_around"], 5)
     assert vector.tolist() == [5.0, 6.0, 7.0, 8.0, 9.0]
 
 
 def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
     """The right half is touched from the third of five frames on, and the contact ends."""
-    frames = []
-    for i, right in enumerate([0, 0, 40, 80, 0, 0, 0, 0, 0, 0]):
-        counts = np.zeros((5, 7), dtype=np.uint16)
-        counts[1, 1] = 60 if i < 4 else 0
-        counts[i % 4, 5] = right
-        frames.append(Frame(i / 4, counts))
+    right = [0, 0, 40, 80, 0, 0, 0, 0, 0, 0]
+    frames = [
+        pressed(FLAT, i / 4, {(1, 1): 60 if i < 4 else 0, (i % 4, 5): force})
+        for i, force in enumerate(right)
+    ]
     wanted = ["right_along", "right_force", "right_area"]
     vector = feature_vector(series_of(FLAT, frames, wanted), 1.25, 6, wanted).reshape(3, 6)
     assert vector[0].tolist() == [2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
     assert vector[1].tolist() == [0.0, 0.0, 0.4, 0.8, 0.0, 0.0]
     assert vector[2].tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
-    never = feature_vector(series_of(FLAT, frames[:2], wanted), 1.0, 2, ["right_along"])
-    assert never.tolist() == [0.0, 0.0]
+    assert vector_of(FLAT, frames[:2], ["right_along"], 2).tolist() == [0.0, 0.0]
 
 
 def test_a_rate_is_the_change_a_second_of_the_sampled_values():
-    frames = []
-    for i in range(11):
-        counts = np.zeros((5, 7), dtype=np.uint16)
-        counts[1, 1] = 100 + 20 * i
-        frames.append(Frame(i / 10, counts))
+    frames = [pressed(FLAT, i / 10, {(1, 1): 100 + 20 * i}) for i in range(11)]
     wanted = ["max_force", "max_force_rate", "contact_area_rate"]
-    vector = feature_vector(series_of(FLAT, frames, wanted), 1.0, 5, wanted).reshape(3, 5)
+    vector = vector_of(FLAT, frames, wanted, 5).reshape(3, 5)
     assert vector[0] == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0])
     assert vector[1] == pytest.approx([2.0] * 5)
     assert vector[2].tolist() == [0.0] * 5
@@ -237,20 +216,16 @@ def test_a_rate_is_the_change_a_second_of_the_sampled_values():
 
 def test_force_motion_follows_the_force_where_the_area_stays():
     layout = replace(FLAT, pitch_m=0.01)
-    frames = []
-    for t, forces in ((0.0, (50, 50)), (0.5, (50, 150)), (1.0, (50, 50))):
-        counts = np.zeros((5, 7), dtype=np.uint16)
-        counts[1, 1:3] = forces
-        frames.append(Frame(t, counts))
-    wanted = ["contact_motion", "force_motion"]
-    vector = feature_vector(series_of(layout, frames, wanted), 1.0, 3, wanted)
+    frames = [
+        pressed(layout, t, {(1, 1): 50, (1, 2): f}) for t, f in ((0, 50), (0.5, 150), (1, 50))
+    ]
+    vector = vector_of(layout, frames, ["contact_motion", "force_motion"], 3)
     assert vector == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0025, 0.0], abs=1e-17)
 
 
 def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
-    first, second = np.zeros((2, 5, 7), dtype=np.uint16)
-    first[1, 1], second[1, 1:3] = 50, 70
-    frames = [Frame(0.0, first), Frame(0.1, first), Frame(0.1, second)]
+    readings = (0.0, {(1, 1): 50}), (0.1, {(1, 1): 50}), (0.1, {(1, (1, 2)): 70})
+    frames = [pressed(FLAT, *reading) for reading in readings]
     wanted = [*ALL[:3], "skin_force", "force_motion"]
     series = series_of(FLAT, frames, wanted)
     assert series.integers.shape == (2, 4 + 8 * 2)
@@ -259,9 +234,7 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
 
 
 def test_zones_that_no_feature_calls_for_are_not_measured():
-    counts = np.zeros((5, 7), dtype=np.uint16)
-    counts[1, 1] = 50
-    frames = [Frame(t, counts) for t in (0.0, 0.5)]
+    frames = [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)]
     assert list(series_of(FLAT, frames, ["skin_force"]).zones) == ["skin"]
     assert series_of(FLAT, frames, ["max_force", "contact_area"]).zones == {}
 
@@ -311,9 +284,7 @@ def test_a_wrong_name_is_one_sentence(wanted, sentence):
 
 
 def test_a_feature_that_was_not_measured_is_one_sentence():
-    counts = np.zeros((5, 7), dtype=np.uint16)
-    counts[1, 1] = 50
-    series = series_of(FLAT, [Frame(t, counts) for t in (0.0, 0.5)], ["max_force"])
+    series = series_of(FLAT, [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)], ["max_force"])
     for name in ("skin_force", "force_motion", "stiffness", "taxel_force", "joint_angle"):
         with pytest.raises(InputError, match=f"{name} was not measured"):
             feature_vector(series, 1.0, 2, [name])
@@ -339,17 +310,12 @@ def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(se
     counts = rng.integers(0, 65536, shape).astype(np.uint16)
     valid = None if seed % 4 == 0 else rng.random(shape) < 0.8
     cells = Cells(layout)
-    expected = []
-    for top in range(0, rows, cells.side):
-        for left in range(0, cols, cells.side):
-            square = [
-                (r, c)
-                for r in range(top, min(top + cells.side, rows))
-                for c in range(left, min(left + cells.side, cols))
-            ]
-            if any(layout.alive[taxel] for taxel in square):
-                expected.append(
-                    sum(int(counts[taxel]) for taxel in square if valid is None or valid[taxel])
-                )
+    readable = counts.astype(int) * (1 if valid is None else valid)
+    squares = [
+        np.s_[top : top + cells.side, left : left + cells.side]
+        for top in range(0, rows, cells.side)
+        for left in range(0, cols, cells.side)
+    ]
+    expected = [int(readable[s].sum()) for s in squares if layout.alive[s].any()]
     assert cells.read(Frame(0.0, counts, valid=valid)).tolist() == expected
     assert len(expected) == cells.count

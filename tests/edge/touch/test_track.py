@@ -7,28 +7,20 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
-from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings, first_contact
+from tests.edge.touch.pressed import followed, pressed
 
 FLAT = SkinLayout(4, 6, threshold_counts=10, onset_counts=20, pitch_m=0.01)
-
-
-def frames(peaks, layout=FLAT, at=(1, 1), dt=0.01, start=0.0):
-    for i, peak in enumerate(peaks):
-        counts = np.zeros(layout.shape, dtype=np.uint16)
-        counts[at] = peak
-        yield Frame(t=start + i * dt, counts=counts)
+AT_ONCE = TrackSettings(debounce=1)
 
 
 def follow(peaks, settings=None, *, layout=FLAT, dt=0.01, start=0.0, **keywords):
     """The contacts of a stream, each as (onset_s, peaks, ended)."""
     tracker = ContactTracker(layout, settings, **keywords)
-    contacts = []
-    for frame in frames(peaks, layout, dt=dt, start=start):
-        (contact,) = tracker.push(frame) or [None]
-        if contact is not None and contact not in contacts:
-            contacts.append(contact)
+    contacts = {}
+    for i, peak in enumerate(peaks):
+        contacts |= dict.fromkeys(tracker.push(pressed(layout, start + i * dt, {(1, 1): peak})))
     return [(c.onset_s, c.series().peak.tolist(), c.ended) for c in contacts]
 
 
@@ -38,7 +30,7 @@ def test_onset_is_the_first_frame_of_the_run_that_confirmed_it():
 
 def test_one_frame_alone_begins_no_contact():
     assert follow([0, 30, 0, 30, 0]) == []
-    assert follow([0, 30, 0], TrackSettings(debounce=1)) == [(0.01, [30, 0], False)]
+    assert follow([0, 30, 0], AT_ONCE) == [(0.01, [30, 0], False)]
 
 
 def test_a_contact_begins_above_the_upper_threshold_and_lasts_to_the_lower():
@@ -75,23 +67,15 @@ def test_nothing_is_kept_beyond_the_horizon():
 
 def test_motion_counts_from_the_reading_that_counts():
     """Where the first instant was read twice, the later reading is the onset's place."""
-    tracker = ContactTracker(FLAT, TrackSettings(debounce=1))
-    for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]:
-        counts = np.zeros(FLAT.shape, dtype=np.uint16)
-        counts[1, col] = 50
-        (contact,) = tracker.push(Frame(t, counts)) or [None]
+    frames = [pressed(FLAT, t, {(1, col): 50}) for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]]
+    contact = followed(FLAT, frames, AT_ONCE)
     assert contact.series().motion == pytest.approx([0.0, 0.01], abs=1e-16)
 
 
 def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
-    tracker = ContactTracker(replace(FLAT, release_s=0.02))
-    zones = [(1, 1), (1, 2), (2, 4), None, None]
-    for i, place in enumerate(zones):
-        counts = np.zeros(FLAT.shape, dtype=np.uint16)
-        if place:
-            counts[place] = 50
-        (contact,) = tracker.push(Frame(i * 0.01, counts)) or [None]
-    series = contact.series()
+    places = [{(1, 1): 50}, {(1, 2): 50}, {(2, 4): 50}, {}, {}]
+    frames = [pressed(FLAT, i * 0.01, taxels) for i, taxels in enumerate(places)]
+    series = followed(replace(FLAT, release_s=0.02), frames).series()
     far = np.hypot(0.01, 0.03)
     assert series.motion == pytest.approx([0.0, 0.01, far, far, far], abs=1e-16)
     assert series.area.tolist() == [1, 1, 1, 0, 0]
@@ -99,26 +83,26 @@ def test_motion_on_a_flat_skin_and_its_last_value_after_the_end():
     assert series.ended
 
 
+TURN = Chain([Joint("turn", (0.0, 0.0, 1.0))])
+
+
+def turning(angles):
+    """A region that stays on the skin, while the arm turns."""
+    joints = [None if angle is None else np.array([angle]) for angle in angles]
+    return [pressed(FLAT, i * 0.01, {(0, 2): 50}, joints=q) for i, q in enumerate(joints)]
+
+
 def test_motion_in_the_world_follows_the_joints():
     """A region that stays on the skin moves in the world as its link does."""
     layout = replace(FLAT, pitch_m=0.1)
-    chain = Chain([Joint("turn", (0.0, 0.0, 1.0))])
-    tracker = ContactTracker(layout, chain=chain)
-    for i, angle in enumerate([0.0, 0.5, np.pi]):
-        counts = np.zeros(layout.shape, dtype=np.uint16)
-        counts[0, 2] = 50  # at x = 0.2 m from the axis
-        (contact,) = tracker.push(Frame(i * 0.01, counts, joints=np.array([angle]))) or [None]
+    # At x = 0.2 m from the axis.
+    contact = followed(layout, turning([0.0, 0.5, np.pi]), chain=TURN)
     expected = [0.0, 2 * 0.2 * np.sin(0.25), 0.4]
     assert contact.series().motion == pytest.approx(expected, abs=1e-15)
 
 
 def test_a_frame_without_a_pose_leaves_a_gap_in_motion_and_is_flagged():
-    chain = Chain([Joint("turn", (0.0, 0.0, 1.0))])
-    tracker = ContactTracker(FLAT, chain=chain)
-    for i, joints in enumerate([None, np.array([0.0]), None, np.array([np.pi])]):
-        counts = np.zeros(FLAT.shape, dtype=np.uint16)
-        counts[0, 2] = 50
-        (contact,) = tracker.push(Frame(i * 0.01, counts, joints=joints)) or [None]
+    contact = followed(FLAT, turning([None, 0.0, None, np.pi]), chain=TURN)
     motion = contact.series().motion
     assert np.isnan(motion).tolist() == [True, False, True, False]
     assert motion[3] == pytest.approx(0.04)
@@ -126,45 +110,38 @@ def test_a_frame_without_a_pose_leaves_a_gap_in_motion_and_is_flagged():
 
 
 def test_taxels_that_are_missing_are_flagged_unless_known_to_be_dead():
-    counts = np.zeros(FLAT.shape, dtype=np.uint16)
-    counts[1, 1] = 50
     valid = np.ones(FLAT.shape, dtype=bool)
     valid[3, 5] = False
+    frame = pressed(FLAT, 0.0, {(1, 1): 50}, valid=valid)
     for layout, missing in ((FLAT, True), (replace(FLAT, dead=(23,)), False)):
-        tracker = ContactTracker(layout, TrackSettings(debounce=1))
-        (contact,) = tracker.push(Frame(0.0, counts, valid))
+        contact = followed(layout, [frame], AT_ONCE)
         assert contact.missing_taxels is missing
 
 
 def test_a_region_has_the_mean_time_of_its_taxels():
     """A frame is a rolling shutter: its chips are read one after another."""
-    tracker = ContactTracker(FLAT, TrackSettings(debounce=1))
     times = np.zeros(FLAT.shape)
-    counts = np.zeros(FLAT.shape, dtype=np.uint16)
-    counts[1, 1:3] = 50
-    for i in range(2):
-        times[1, 1], times[1, 2] = i * 0.02 + 0.004, i * 0.02 + 0.008
-        (contact,) = tracker.push(Frame(i * 0.02, counts, times=times)) or [None]
+    times[1, (1, 2)] = 0.004, 0.008
+    frames = [pressed(FLAT, t, {(1, (1, 2)): 50}, times=t + times) for t in (0.0, 0.02)]
+    contact = followed(FLAT, frames, AT_ONCE)
     assert contact.onset_s == pytest.approx(0.006)
     assert contact.series().t == pytest.approx([0.0, 0.02])
 
 
 def test_frames_of_another_shape_and_time_that_goes_back_are_refused():
-    tracker = ContactTracker(FLAT)
     with pytest.raises(InputError, match="on a skin of"):
-        tracker.push(Frame(0.0, np.zeros((2, 2), dtype=np.uint16)))
-    tracker.push(Frame(1.0, np.zeros(FLAT.shape, dtype=np.uint16)))
+        followed(FLAT, [pressed(SkinLayout(2, 2), 0.0, {})])
     with pytest.raises(InputError, match="time goes back"):
-        tracker.push(Frame(0.5, np.zeros(FLAT.shape, dtype=np.uint16)))
+        followed(FLAT, [pressed(FLAT, t, {}) for t in (1.0, 0.5)])
 
 
 @pytest.mark.parametrize("t", [np.nan, np.inf, -np.inf])
 def test_times_that_are_not_finite_are_refused(t):
-    counts = np.full(FLAT.shape, 50, dtype=np.uint16)
     with pytest.raises(InputError, match="time of a frame is not finite"):
-        ContactTracker(FLAT).push(Frame(t, counts))
+        followed(FLAT, [pressed(FLAT, t, {})])
+    frame = pressed(FLAT, 0.0, {(1, 1): 50}, times=np.full(FLAT.shape, t))
     with pytest.raises(InputError, match="time of a taxel in contact is not finite"):
-        ContactTracker(FLAT).push(Frame(0.0, counts, times=np.full(FLAT.shape, t)))
+        followed(FLAT, [frame])
 
 
 def test_another_scale_brings_the_thresholds_along():
@@ -213,8 +190,7 @@ def test_a_recording_without_a_contact_gives_none(make_touch, forearm):
 
 def test_a_clock_too_large_for_its_steps_is_refused_and_says_so():
     """Seconds since 1970 are fine; as milliseconds or nanoseconds, steps of a frame drown."""
-    counts = np.zeros(FLAT.shape, dtype=np.uint16)
-    ContactTracker(FLAT).push(Frame(1.7e9, counts))
+    followed(FLAT, [pressed(FLAT, 1.7e9, {})])
     for t in (1.7e12, 1.7e18, -1e15):
         with pytest.raises(InputError, match="give seconds"):
-            ContactTracker(FLAT).push(Frame(t, counts))
+            followed(FLAT, [pressed(FLAT, t, {})])
