@@ -40,53 +40,34 @@ class RegionTrack:
     time, an arm that bounces off a rigid thing and comes back makes one contact.
 
     Attributes:
-        contact: the contact followed, confirmed or not; None before it and after its end.
+        contact: the contact followed, confirmed or not.
     """
 
-    def __init__(self, settings: TrackSettings, layout: SkinLayout, horizon_s: float) -> None:
-        self._settings, self._layout, self._horizon_s = settings, layout, horizon_s
-        self.contact: Contact | None = None
-        self._confirmed = False
+    def __init__(self, contact: Contact, settings: TrackSettings, horizon_s: float) -> None:
+        """Follow a contact from the frame that is pushed next."""
+        self.contact = contact
+        self._settings, self._horizon_s = settings, horizon_s
         self._run = 0
         self._touched_s = 0.0
 
-    @property
-    def region(self) -> Region | None:
-        """The region followed so far."""
-        return None if self.contact is None else self.contact.region
-
-    def awaits(self, region: Region | None) -> bool:
-        """Whether this region would begin a contact here."""
-        return self.contact is None and region is not None and region.peak > self._layout.onset
-
-    def begin(self, contact: Contact) -> None:
-        """Follow a contact from the frame that is pushed next."""
-        self.contact, self._confirmed, self._run = contact, False, 0
-
     def push(self, frame: Frame, active: ActiveTaxels, region: Region | None) -> Contact | None:
         """The contact, from the frame that confirms it on, else None; takes in a frame."""
-        contact = self.contact
-        if contact is None:
-            return None
+        contact, layout = self.contact, self.contact.layout
         age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
-        if not self._confirmed:
-            if region is None or region.peak <= self._layout.onset:
-                self.contact = None
+        if self._run < self._settings.debounce:
+            if region is None or region.peak <= layout.onset:
+                contact.ended = True
                 return None
             contact.add(frame, active, region, age_s)
             self._touched_s = age_s
             self._run += 1
-            if self._run < self._settings.debounce:
-                return None
-            self._confirmed = True
-            return contact
+            return contact if self._run == self._settings.debounce else None
         if contact.age_s < self._horizon_s:
             contact.add(frame, active, region, age_s)
         if region is not None:
             self._touched_s = age_s
-        elif released(self._touched_s, age_s, self._layout.release_s):
+        elif released(self._touched_s, age_s, layout.release_s):
             contact.ended = True
-            self.contact = None
         return contact
 
 
@@ -161,12 +142,25 @@ class ContactTracker:
         active = ActiveTaxels(
             frame.counts, self.layout.threshold_counts, valid=frame.valid, wraps=self.layout.wraps
         )
-        pairs = self._largest(active) if self._max_contacts == 1 else self._every(active)
-        for track, region in pairs:
-            if region is not None and track.awaits(region):
-                track.begin(self._contact(frame, region))
+        tracks = self._tracks
+        if self._max_contacts > 1:
+            regions = active.regions
+            shares = _shared(tracks, regions)
+        else:
+            largest = active.largest(tracks[0].contact.region if tracks else None)
+            regions = [] if largest is None else [largest]
+            shares = dict.fromkeys(range(len(tracks)), 0) if regions else {}
+        self.region = regions[0] if regions else None
+        pairs = [
+            (track, regions[shares[i]] if i in shares else None) for i, track in enumerate(tracks)
+        ]
+        for j, region in enumerate(regions):
+            begins = j not in shares.values() and region.peak > self.layout.onset
+            if begins and len(pairs) < self._max_contacts:
+                contact = self._contact(frame, region)
+                pairs.append((RegionTrack(contact, self._settings, self.horizon_s), region))
         contacts = [track.push(frame, active, region) for track, region in pairs]
-        self._tracks = [track for track, _ in pairs if track.contact is not None]
+        self._tracks = [track for track, _ in pairs if not track.contact.ended]
         return [contact for contact in contacts if contact is not None]
 
     def _check(self, frame: Frame) -> None:
@@ -185,31 +179,6 @@ class ContactTracker:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
 
-    def _largest(self, active: ActiveTaxels) -> list[tuple[RegionTrack, Region | None]]:
-        """The one track, with the largest region."""
-        (track,) = self._tracks or [self._track()]
-        self.region = active.largest(track.region)
-        return [(track, self.region)]
-
-    def _every(self, active: ActiveTaxels) -> list[tuple[RegionTrack, Region | None]]:
-        """Each track with its region, then new tracks for regions that continue no track."""
-        regions = active.regions
-        self.region = regions[0] if regions else None
-        shares = _shared(self._tracks, regions)
-        pairs = [
-            (track, regions[shares[i]] if i in shares else None)
-            for i, track in enumerate(self._tracks)
-        ]
-        for j, region in enumerate(regions):
-            if len(pairs) >= self._max_contacts:
-                break
-            if j not in shares.values() and (new := self._track()).awaits(region):
-                pairs.append((new, region))
-        return pairs
-
-    def _track(self) -> RegionTrack:
-        return RegionTrack(self._settings, self.layout, self.horizon_s)
-
     def _contact(self, frame: Frame, region: Region) -> Contact:
         on_skin = self._motion_on_skin and frame.joints is None
         chain = None if on_skin else self._chain
@@ -221,7 +190,7 @@ def _shared(tracks: list[RegionTrack], regions: list[Region]) -> dict[int, int]:
     pairs = []
     for i, track in enumerate(tracks):
         for j, region in enumerate(regions):
-            before = track.region
+            before = track.contact.region
             common = 0 if before is None else (before.bits & region.bits).bit_count()
             if common or (before is not None and before.touches(region)):
                 pairs.append((-common, i, j))
