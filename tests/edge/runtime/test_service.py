@@ -5,7 +5,6 @@ import os
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 from configparser import ConfigParser
@@ -20,14 +19,6 @@ from edge.runtime import touch_map as touchmap
 ROOT = Path(__file__).parents[3]
 UNIT = ROOT / "board" / "edge-classify.service"
 TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
-
-
-@pytest.fixture
-def manager(tmp_path):
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-        listener.bind(str(tmp_path / "notify"))
-        listener.settimeout(60.0)
-        yield listener
 
 
 def start(manager, tmp_path, *arguments):
