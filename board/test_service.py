@@ -4,7 +4,6 @@
 machine's files, with empty folders over those that the unit and its installation write to.
 """
 
-import json
 import os
 import shutil
 import subprocess
@@ -22,7 +21,9 @@ from edge.skin.calibration import save_calibration
 
 HERE = Path(__file__).resolve().parent
 SYSTEMD = Path("/lib/systemd/systemd")
-LONGEST_S = 240
+UNIT = "edge-classify.service"
+FAKE = "--fake /etc/edge-classify/touch.npz --loop --real-time"
+SHOWN = "ActiveState SubState MainPID NRestarts StatusText ExecMainStatus LimitRTTIME".split()
 
 START = """\
 set -e
@@ -36,30 +37,90 @@ mount --bind {packages} /opt/packages
 mount --bind {checkout} /opt/checkout
 install -D -m 755 {folder}/edge-classify /opt/edge-classify/bin/edge-classify
 install -D -m 644 -t /etc/edge-classify {folder}/model.onnx {folder}/skin.toml {folder}/touch.npz
-install -m 644 {here}/edge-classify.service {folder}/*.service {folder}/*.target /run/units
+install -m 644 {here}/edge-classify.service {folder}/*.target /run/units
 install -D -m 644 -t /run/units/edge-classify.service.d {here}/real-time.conf {folder}/log.conf
 export container=edge SYSTEMD_UNIT_PATH=/run/units PATH=/usr/sbin:/usr/bin:/sbin:/bin
-exec {systemd} --system --unit=probe.service --show-status=no --log-target=null
+exec {systemd} --system --unit=multi-user.target --show-status=no --log-target=null
 """
 COMMAND = """\
 #!/bin/sh
 export PYTHONPATH=/opt/checkout:/opt/packages PYTHONDONTWRITEBYTECODE=1
 exec /opt/python/bin/{python} -m edge "$@"
 """
-PROBE = """\
-[Unit]
-DefaultDependencies=no
-[Service]
-Type=oneshot
-ExecStart=/opt/python/bin/{python} {here}/service_guest.py {folder}/results.json
-"""
 LOG = "[Service]\nStandardOutput=append:/run/log\nStandardError=append:/run/log\n"
+TARGETS = "multi-user.target basic.target shutdown.target sysinit.target".split()
 TARGET = "[Unit]\nDefaultDependencies=no\n"
+
+
+class Machine:
+    """The machine of the new systemd, seen from this one."""
+
+    def __init__(self, start):
+        command = "unshare --pid --fork --mount --mount-proc --uts --kill-child bash -c".split()
+        self.process = subprocess.Popen([*command, start], stdin=subprocess.DEVNULL)
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+        (self.first,) = self.once(lambda: children.read_text().split(), len)
+        self.root = Path(f"/proc/{self.first}/root")
+        # Before that, /run and its sockets are this machine's, and so is the systemd behind them.
+        name = Path(f"/proc/{self.first}/comm")
+        assert self.once(name.read_text, "systemd\n".__eq__) == "systemd\n"
+        self.once(lambda: self.run("systemctl", "is-active", TARGETS[0]), "active\n".__eq__)
+
+    def run(self, *command):
+        """What a command prints there."""
+        inside = ["nsenter", "--target", self.first, "--pid", "--mount", "--uts", *command]
+        return subprocess.run(inside, capture_output=True, text=True, check=False).stdout
+
+    def once(self, look, wanted, seconds=60.0):
+        """What is seen once it is as wanted, or the last that is seen."""
+        ends = time.monotonic() + seconds
+        while not wanted(seen := look()) and time.monotonic() < ends:
+            assert self.process.poll() is None, "systemd did not start"
+            time.sleep(0.2)
+        return seen
+
+    def shown(self):
+        """The unit's properties."""
+        properties = (f"--property={name}" for name in SHOWN)
+        lines = self.run("systemctl", "show", UNIT, *properties).splitlines()
+        return dict(line.split("=", 1) for line in lines)
+
+    def wait_for(self, **wanted):
+        """The unit's properties once they are as wanted, or the last ones."""
+        return self.once(self.shown, lambda seen: wanted.items() <= seen.items())
+
+    def restart(self, arguments):
+        """Start the service anew with these arguments."""
+        environment = self.root / "etc" / "edge-classify" / "edge-classify.env"
+        environment.write_text(f'ARGUMENTS="{arguments}"\n')
+        self.run("systemctl", "reset-failed", UNIT)
+        self.run("systemctl", "restart", "--no-block", UNIT)
+
+
+def take_steps(machine):
+    """{step: what systemd and the kernel say of the service}."""
+    verify = f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?"
+    seen = {"verified": machine.run("bash", "-c", verify)}
+    machine.restart(FAKE)
+    seen["started"] = machine.wait_for(ActiveState="active")
+    pid = seen["started"]["MainPID"]
+    seen["status"] = (machine.root / "proc" / pid / "status").read_text()
+    seen["schedule"] = machine.run("chrt", "--pid", pid)
+    machine.run("kill", "-STOP", pid)
+    seen["hung"] = machine.wait_for(ActiveState="active", NRestarts="1")
+    machine.restart("--without-joints skin")
+    seen["missing device"] = machine.wait_for(SubState="auto-restart", ExecMainStatus="3")
+    machine.restart(f"{FAKE} --error 2")
+    machine.wait_for(ActiveState="failed")
+    time.sleep(3.0)
+    seen["mistaken"] = machine.shown()
+    seen["log"] = (machine.root / "run" / "log").read_text()
+    return seen
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """{step: what systemd and the kernel said of the service}, of `service_guest.py`."""
+    """The results of `take_steps`."""
     if not (SYSTEMD.exists() and shutil.which("unshare")):
         pytest.skip("this machine has no systemd, or no unshare")
     if os.geteuid() != 0:
@@ -79,38 +140,33 @@ def results(tmp_path_factory):
     skin = shutil.copy(skinfile.shipped("cody"), folder / "skin.toml")
     save_calibration(skin, calibrated(skinfile.load(skin)).calibration)
     (folder / "edge-classify").write_text(COMMAND.format(**names))
-    (folder / "probe.service").write_text(PROBE.format(**names))
     (folder / "log.conf").write_text(LOG)
-    for target in ("sysinit", "basic", "shutdown", "multi-user"):
-        (folder / f"{target}.target").write_text(TARGET)
-    command = "unshare --pid --fork --mount --mount-proc --uts --kill-child bash -c".split()
-    machine = subprocess.Popen([*command, START.format(**names)], stdin=subprocess.DEVNULL)
-    ends = time.monotonic() + LONGEST_S
+    for target in TARGETS:
+        (folder / target).write_text(TARGET)
+    machine = Machine(START.format(**names))
     try:
-        while not (folder / "results.json").exists():
-            assert machine.poll() is None, "systemd did not start"
-            assert time.monotonic() < ends, "the steps did not end"
-            time.sleep(0.2)
-        return json.loads((folder / "results.json").read_text())
+        return take_steps(machine)
     finally:
-        machine.kill()
-        machine.wait()
+        machine.process.kill()
+        machine.process.wait()
 
 
 def test_the_unit_is_valid(results):
-    assert results["verified"][0] == 0, results["verified"]
+    assert results["verified"].splitlines()[-1] == "0", results["verified"]
 
 
 def test_it_is_active_once_it_reads_the_skin_as_a_user_without_rights(results):
     started = results["started"]
     assert (started["ActiveState"], started["NRestarts"]) == ("active", "0"), started
     assert started["StatusText"] == "reading fake /etc/edge-classify/touch.npz"
-    assert started["uid"] >= 61184  # of the range of dynamic users
-    assert started["capabilities"] == "0000000000000000"
+    status = dict(line.split(":\t", 1) for line in results["status"].splitlines())
+    assert int(status["Uid"].split()[0]) >= 61184  # of the range of dynamic users
+    assert status["CapEff"].strip() == "0000000000000000"
 
 
 def test_the_drop_in_gives_it_a_real_time_priority_with_a_limit(results):
-    assert (results["started"]["policy"], results["started"]["priority"]) == (os.SCHED_FIFO, 10)
+    policy, priority = (line.split(": ")[1] for line in results["schedule"].splitlines())
+    assert (policy, priority) == ("SCHED_FIFO", "10")
     assert results["started"]["LimitRTTIME"] == "10000000"
 
 
