@@ -107,18 +107,19 @@ def trials(
         raise InputError(f"{path}: holds no file {', '.join(SUFFIXES)}; give a folder of trials")
     beside = labels_beside(folder / LABELS)
     skin = dict(read_json(folder / "skin.json")) if (folder / "skin.json").is_file() else {}
-    parts: list[tuple[str, dict[str, str], _Table]] = []
+    tables: list[tuple[str, dict[str, str], _Table]] = []
     for file in files:
         with parsing(str(file), "a table", "; save it as text"):
-            parts += _trials_in(_table(file), folder, options.task)
-    measured = [_measured(table, options) for _, _, table in parts]
-    for (_, _, table), (_, values, _) in zip(parts, measured, strict=True):
-        if values.shape[1] != measured[0][1].shape[1]:
-            few = f"{values.shape[1]} taxels, and {parts[0][2].path} {measured[0][1].shape[1]}"
+            tables += _trials_in(_table(file), folder, options.task)
+    parts = [(*part, *_measured(part[2], options)) for part in tables]
+    first, width = parts[0][2].path, parts[0][4].shape[1]
+    for _, _, table, _, values, _ in parts:
+        if values.shape[1] != width:
+            few = f"{values.shape[1]} taxels, and {first} {width}"
             raise InputError(f"{table.path}: has {few}; name them by --taxels")
-    starts = [np.median(values[:START], axis=0) for _, values, _ in measured]
+    starts = [np.median(values[:START], axis=0) for *_, values, _ in parts]
     rest = max(starts, key=np.nansum) if options.falls else 0.0
-    for (name, labels, table), (t, values, joints) in zip(parts, measured, strict=True):
+    for name, labels, table, t, values, joints in parts:
         shape = _shape(options.shape, table, skin, values.shape[1])
         counts = (np.clip(rest - values, 0.0, None) if options.falls else values) * options.scale
         valid = np.isfinite(counts)

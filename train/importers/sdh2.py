@@ -11,6 +11,7 @@ import bz2
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -87,36 +88,23 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
         frames.append(_unpacked(frame.findtext("frame_data") or "", cells))
     if not frames:
         raise ValueError("it has no frame")
-    counts = np.array(frames)
-    rows, cols = places[0].shape
-    side_by_side = np.zeros((len(frames), rows, 2 * cols + 1), dtype=np.uint16)
-    side_by_side[:, :, :cols] = counts[:, places[0]]
-    side_by_side[:, :, cols + 1 :] = counts[:, places[1]]
+    left, right = (np.array(frames)[:, place] for place in places)
+    side_by_side = np.concatenate([left, 0 * left[:, :, :1], right], axis=2)
     t = (np.array(stamps) - stamps[0]) / 1000.0
     if (np.diff(t) <= 0.0).any():
         raise ValueError("the times of its frames do not increase")
     layout = SkinLayout(
-        rows=rows,
-        cols=2 * cols + 1,
+        rows=alive.shape[0],
+        cols=alive.shape[1],
         wraps=False,
         pitch_m=pitch_m,
         threshold_counts=THRESHOLD_COUNTS,
         onset_counts=ONSET_COUNTS,
         dead=tuple(np.flatnonzero(~alive).tolist()),
     )
-    return Recording(
-        t=t,
-        frames=side_by_side,
-        valid=alive,
-        joints=_joints(root, t, stamps[0]),
-        meta={
-            "labels": {"object": file.parent.name},
-            "skin": layout.to_dict(),
-            "arm": None,
-            "source": f"SDH-2 grasp {file.name}",
-            "trial": file.stem,
-        },
-    )
+    meta: dict[str, Any] = {"labels": {"object": file.parent.name}, "arm": None}
+    meta |= {"skin": layout.to_dict(), "source": f"SDH-2 grasp {file.name}", "trial": file.stem}
+    return Recording(t, side_by_side, _joints(root, t, stamps[0]), alive, meta)
 
 
 def _pads(
