@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.touch.arm import Chain, Vector
 from edge.touch.frame import Frame
-from edge.touch.layout import RELEASE_S, SkinLayout
+from edge.touch.layout import SkinLayout
 from edge.touch.measures import COLS, FORCE, ROWS, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
@@ -35,18 +35,13 @@ class FeatureSeries:
         motion: (n,) distance of the centroid from its place at onset, metres; its last value
             is kept without contact; NaN where the arm's pose was not known; 0 where it was not
             asked for.
-        counts_per_newton: scale of `peak`, or None.
+        layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
-        release_s: a contact is over once it has not been felt for so long; until then it has
-            only lifted off.
         zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        turn: columns of a full turn where the skin wraps, or None.
         taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`), or None.
         kernel_cells: (n, cells) likewise, of the fewer cells that kernels take, or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or None.
-        threshold_counts: a taxel above it is active.
-        pitch: distance between rows of taxels, metres; 1 taxel where it is unknown.
     """
 
     t: NDArray[np.float64]
@@ -54,17 +49,13 @@ class FeatureSeries:
     area: NDArray[np.int64]
     sums: NDArray[np.int64]
     motion: NDArray[np.float64]
-    counts_per_newton: float | None = None
+    layout: SkinLayout
     ended: bool = False
-    release_s: float = RELEASE_S
     zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     force_motion: NDArray[np.float64] | None = None
-    turn: int | None = None
     taxels: NDArray[np.int64] | None = None
     kernel_cells: NDArray[np.int64] | None = None
     joints: NDArray[np.float64] | None = None
-    threshold_counts: int = 0
-    pitch: float = 1.0
 
     def thinned(self, every: int) -> FeatureSeries:
         """Every n-th frame, as a slower wire would deliver them."""
@@ -74,7 +65,8 @@ class FeatureSeries:
         """The frames in which the contact is felt, up to the first one at the window's end.
 
         A board decides with that frame, so later ones must not count. Frames in which the contact
-        has lifted off are left out, as it may go on. But once it has been away for `release_s`,
+        has lifted off are left out, as it may go on. But once it has been away for the skin's
+        `release_s`,
         the contact was over when it lifted off, and these frames stay.
         """
         n = min(int(self.t.searchsorted(window_s)) + 1, self.t.size)
@@ -82,7 +74,7 @@ class FeatureSeries:
         if felt.all():
             return self if n == self.t.size else self._frames(slice(n))
         last = n - 1 - int(felt[::-1].argmax())
-        if released(self.t[last], self.t[n - 1], self.release_s):
+        if released(self.t[last], self.t[n - 1], self.layout.release_s):
             felt[last + 1 :] = True
         return self._frames(np.flatnonzero(felt))
 
@@ -242,13 +234,9 @@ class Contact:
             peak=counted[:, 0],
             area=counted[:, 1],
             sums=counted[:, 2:PLAIN],
-            counts_per_newton=self.layout.counts_per_newton,
+            layout=self.layout,
             ended=self.ended,
-            release_s=self.layout.release_s,
             zones={zone: zones[:, columns] for zone, columns in self._measurer.columns.items()},
-            turn=self.layout.cols if self.layout.wraps else None,
-            threshold_counts=self.layout.threshold_counts,
-            pitch=self.layout.pitch[0],
         )
 
 

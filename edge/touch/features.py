@@ -141,10 +141,11 @@ class _Course:
         self, series: FeatureSeries, window_s: float, tables: Mapping[str, KernelTable]
     ) -> None:
         self._series, self._window_s, self._tables = series, window_s, tables
-        self._scale = series.counts_per_newton or 1.0
-        self._zones = {name: _Zone(sums, series) for name, sums in series.zones.items()}
-        self._force_floor = (series.threshold_counts + 1) / self._scale
-        self._length_floor = MOTION_FLOOR * series.pitch
+        layout = series.layout
+        self._scale = layout.counts_per_newton or 1.0
+        self._zones = {name: _Zone(sums, layout) for name, sums in series.zones.items()}
+        self._force_floor = (layout.threshold_counts + 1) / self._scale
+        self._length_floor = MOTION_FLOOR * layout.pitch[0]
 
     def block(self, group: tuple[Feature, ...], samples: int) -> NDArray[np.float64]:
         """Values of features of one kind, one after another."""
@@ -273,9 +274,9 @@ def _not_measured(feature: Feature) -> InputError:
 class _Zone:
     """The quantities of one zone, from its whole numbers (n, 8)."""
 
-    def __init__(self, sums: NDArray[np.int64], series: FeatureSeries) -> None:
-        self._sums, self._turn = sums, series.turn
-        self._scale = 1.0 if series.counts_per_newton is None else series.counts_per_newton
+    def __init__(self, sums: NDArray[np.int64], layout: SkinLayout) -> None:
+        self._sums, self._layout = sums, layout
+        self._scale = layout.counts_per_newton or 1.0
         self._force = sums[:, FORCE]
 
     def max_force(self) -> NDArray[np.float64]:
@@ -297,12 +298,10 @@ class _Zone:
 
     def around(self) -> NDArray[np.float64]:
         centroid, known = self._centroid(COLS), self._force > 0
-        if self._turn is not None:
+        if self._layout.wraps:
             # A contact that crosses the seam goes on; it does not jump to the other end.
-            cols = centroid[known] % self._turn
-            if 2.0 * np.abs(cols[1:] - cols[:-1]).max(initial=0.0) >= self._turn:
-                cols = np.unwrap(cols, period=self._turn)
-            centroid[known] = cols
+            turn = self._layout.cols
+            centroid[known] = np.unwrap(centroid[known] % turn, period=turn)
         return centroid
 
     def spread_along(self) -> NDArray[np.float64]:

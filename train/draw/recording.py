@@ -87,7 +87,7 @@ def units(layout: SkinLayout) -> dict[str, str]:
 def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
     """{feature: (n,) values} of the paper's three features in each frame."""
     return {
-        "max_force": series.peak / (series.counts_per_newton or 1.0),
+        "max_force": series.peak / (series.layout.counts_per_newton or 1.0),
         "contact_area": series.area,
         "contact_motion": series.motion,
     }

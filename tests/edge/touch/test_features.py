@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
+from edge.touch.layout import SkinLayout
 
 
 def series(t, peak, area=None, motion=None, scale=None, ended=False):
@@ -18,7 +19,7 @@ def series(t, peak, area=None, motion=None, scale=None, ended=False):
         area=np.array(area if area is not None else [1] * n, dtype=np.int64),
         sums=np.zeros((n, 2), dtype=np.int64),
         motion=np.array(motion if motion is not None else [0.0] * n),
-        counts_per_newton=scale,
+        layout=SkinLayout(1, 1, counts_per_newton=scale),
         ended=ended,
     )
 
