@@ -1,5 +1,7 @@
 """One decision from a feature vector, against the default conversion and scikit-learn."""
 
+from dataclasses import replace
+
 import numpy as np
 import onnxruntime
 import pytest
@@ -9,11 +11,9 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from edge.model.info import ModelInfo, Task
+from edge.demo import MODEL
+from edge.model.info import Task
 from edge.model.model import Model
-from edge.touch.features import FEATURES
-from edge.touch.layout import SkinLayout
-from edge.touch.track import TrackSettings
 from export import graph
 from train.pipeline import Choice, ContactClassifier
 
@@ -38,19 +38,8 @@ def features(n):
 def exported(X, y, components, path):
     fitted = ContactClassifier({"object": Choice("IV", components, K)}).fit(X, {"object": y})
     labels = tuple(map(str, fitted.classes_["object"]))
-    info = ModelInfo(
-        tasks={"object": Task(labels, K, components, "IV", 0.5)},
-        layout=SkinLayout(16, 24, True),
-        tracking=TrackSettings(),
-        window_s=1.2,
-        samples=40,
-        features=FEATURES,
-        units={},
-        motion_frame="skin",
-        chain=None,
-        rows=len(X),
-        data_digest="",
-    )
+    task = Task(labels, K, components, "IV", 0.5)
+    info = replace(Model(MODEL).info, tasks={"object": task}, rows=len(X), trials=())
     path.write_bytes(graph.to_onnx(fitted, info))
     return Model(path)
 
