@@ -167,7 +167,7 @@ def bars(
     name: str,
     title: str,
     names: Sequence[str],
-    groups: Mapping[str, Sequence[Result | None]],
+    groups: Mapping[str, Sequence[Result]],
     *,
     marks: Mapping[str, Mapping[str, float]] | None = None,
     mark: str = "paper",
@@ -179,7 +179,7 @@ def bars(
         name: of the picture's file.
         title: its caption.
         names: along the axis.
-        groups: {group: results of the names, None where there is none}.
+        groups: {group: results of the names}.
         marks: {group: {name: percent}}, drawn as diamonds.
         mark: the diamonds' name.
         reference: {text: percent} of vertical lines.
@@ -192,14 +192,10 @@ def bars(
         diamonds = mark
         for i, (stroke, (group, row)) in enumerate(zip(STROKES, groups.items(), strict=False)):
             y = np.arange(m) + (i - (g - 1) / 2) * height
-            shown = [(at, result) for at, result in zip(y, row, strict=True) if result]
-            values, arms = spread([result for _, result in shown])
-            axes.barh(
-                [at for at, _ in shown], values, height * 0.92, color=stroke[0], alpha=0.85,
-                hatch=HATCHES[i], ec="white", lw=0, label=group,
-                xerr=arms,
-                error_kw={"ecolor": "0.25", "elinewidth": 0.8},
-            )  # fmt: skip
+            values, arms = spread(row)
+            style = {"color": stroke[0], "alpha": 0.85, "hatch": HATCHES[i], "ec": "white", "lw": 0}
+            error = {"xerr": arms, "error_kw": {"ecolor": "0.25", "elinewidth": 0.8}}
+            axes.barh(y, values, height * 0.92, **style, **error, label=group)
             beside = [(p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()]
             if beside:
                 style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": diamonds}

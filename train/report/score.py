@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, accuracies, neighbours
-from train.evaluate import Labels, Result, SearchGrid, evaluate, fits, stratified_folds
+from train.evaluate import Labels, Result, SearchGrid, evaluate
 from train.pipeline import vote
-from train.progress import bar
-from train.stopping import finest
 
 
 def percent(share: float) -> float:
@@ -45,10 +43,8 @@ def nested(
     grid: SearchGrid,
     features: Sequence[str],
     *,
+    folds: NDArray[np.int64],
     widths: Sequence[int] | None = None,
-    folds: NDArray[np.int64] | None = None,
-    jobs: int = 1,
-    progress: str | None = None,
 ) -> dict[str, Result]:
     """Each task's nested accuracy over a grid; see `train.evaluate`.
 
@@ -57,26 +53,18 @@ def nested(
         y: {task: (n,) labels}.
         grid: the settings to choose from.
         features: names of the feature types in X.
+        folds: (n,) from 0.
         widths: columns of each; equal where None.
-        folds: (n,) from 0; ten that spread the labels evenly where None.
-        jobs: processes.
-        progress: heading of a progress bar, if one is wanted.
     """
-    folds = stratified_folds(y[finest(y)]) if folds is None else folds
-    total = fits(folds, nested=True)
-    with bar(total=total, desc=progress, unit=" fits", disable=progress is None) as shown:
-        table = evaluate(
-            X, y, folds, [grid], features=features, widths=widths, jobs=jobs, progress=shown.update
-        )
+    table = evaluate(X, y, folds, [grid], features=features, widths=widths)
     return {task: table.nested(task) for task in y}
 
 
-def votes(
-    rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int
-) -> NDArray[np.str_]:
-    """(t,) labels by vote of the neighbours (t, components, k) among trials with labels y."""
+def voted(rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int) -> Result:
+    """Votes of the neighbours (n, components, k) of trials with labels y (n,), among those."""
     classes, labels = np.unique(y, return_inverse=True)
-    return np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
+    said = np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
+    return Result(int((said == y).sum()), len(y), components, k, said)
 
 
 def grid_search(
@@ -94,9 +82,7 @@ def grid_search(
         table = accuracies(rows, labels)
         # Of equal accuracies the fewest components, then the smallest k.
         components, k = (int(i) + 1 for i in np.unravel_index(table.argmax(), table.shape))
-        said = votes(rows, labels, components, k)
-        right = int((said == labels).sum())
-        results[task] = Result(right, len(labels), components, k, said)
+        results[task] = voted(rows, labels, components, k)
     return results
 
 
@@ -118,12 +104,7 @@ def transfer(
         changed: (n, p) the same trials, changed.
     """
     rows = neighbours(X, changed)
-    results = {}
-    for task, best in chosen.items():
-        said = votes(rows, y[task], best.components, best.k)
-        right = int((said == y[task]).sum())
-        results[task] = Result(right, len(X), best.components, best.k, said)
-    return results
+    return {task: voted(rows, y[task], best.components, best.k) for task, best in chosen.items()}
 
 
 def majority(y: NDArray[np.str_]) -> Result:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from train.crossval import accuracies, neighbours
-from train.evaluate import SearchGrid
+from train.evaluate import SearchGrid, stratified_folds
 from train.report.score import (
     Result,
     grid_search,
@@ -61,7 +61,7 @@ def test_nested_accuracy_of_clear_classes_is_one():
     rng = np.random.default_rng(0)
     y = np.repeat(["a", "b", "c"], 20)
     X = rng.normal(size=(60, 30)) + 20.0 * (y == "a")[:, None] - 20.0 * (y == "b")[:, None]
-    result = nested(X, {"t": y}, SearchGrid("IV"), ONE)["t"]
+    result = nested(X, {"t": y}, SearchGrid("IV"), ONE, folds=stratified_folds(y))["t"]
     assert (result.right, result.total, result.components, result.k) == (60, 60, 1, 1)
 
 
