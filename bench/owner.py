@@ -73,13 +73,13 @@ def main() -> None:
             known[np.flatnonzero(known)[rng.permutation(known.sum())[count:]]] = False
             used, asked = known | ~own, own & np.isin(objects, order[len(order) // 2 :])
             labels = {task: each[used] for task, each in y.items()}
-            mixed = mix(
+            mixed, *_ = mix(
                 trials.part(used), labels, own[used], lambda *_: dict(chosen), X[used], SAMPLES,
                 LEAVE_OUT, quick=True, jobs=cpu_count(),
             )  # fmt: skip
             half = round((~own).sum() / count)
             for task in TASKS:
-                best = mixed.chosen[task].choice
+                best = mixed[task].choice
                 shares = []
                 for weights in (SIMULATED, ALONE, ONCE, (1, half), best.weights):
                     k = min(best.k, count // 2)

@@ -236,8 +236,7 @@ class Choosing:
             for by_task, choice in zip(without, chosen_without, strict=True):
                 by_task[task] = choice
             picked = [trials.choices[task].index(choice) for choice in chosen_without]
-            folds = range(int(table.folds.max()) + 1)
-            nested = [table.without(task, fold, prices, margin=margin) for fold in folds]
+            nested = table.by_fold(task, prices, margin=margin)
             accuracies = [
                 table.answered(task, nested),
                 trials.answered(task, picked),
@@ -272,12 +271,12 @@ def without_folds(
         table: the answers that choose; `trials`, or those to left-out groups.
         prices, margin: of `choose`.
     """
-    count = int(trials.folds.max()) + 1
     if table is trials:
-        places = [trials.without(task, fold, prices, margin=margin) for fold in range(count)]
+        places = trials.by_fold(task, prices, margin=margin)
     else:
         answers = table.held_out(task)
-        others = (answers[:, trials.folds != fold] for fold in range(count))
+        folds = range(int(trials.folds.max()) + 1)
+        others = (answers[:, trials.folds != fold] for fold in folds)
         places = [choose(each, prices, margin=margin) for each in others]
     return [table.choices[task][place] for place in places]
 

@@ -293,14 +293,16 @@ class AnswerTable:
         """The candidate chosen by all trials."""
         return choose(self.held_out(task), *rule, **more)
 
-    def without(self, task: str, fold: int, *rule: Any, **more: Any) -> int:
-        """The candidate chosen without the trials of a fold."""
-        return choose(self.right[task][fold][:, self.folds != fold], *rule, **more)
+    def by_fold(self, task: str, *rule: Any, **more: Any) -> list[int]:
+        """[fold] the candidate chosen without the trials of a fold."""
+        return [
+            choose(right[:, self.folds != fold], *rule, **more)
+            for fold, right in enumerate(self.right[task])
+        ]
 
     def nested(self, task: str, *rule: Any, **more: Any) -> Result:
         """The accuracy of the choice itself, with the numbers that it most often takes."""
-        folds = range(int(self.folds.max()) + 1)
-        return self.answered(task, [self.without(task, fold, *rule, **more) for fold in folds])
+        return self.answered(task, self.by_fold(task, *rule, **more))
 
     def answered(self, task: str, picked: Sequence[int]) -> Result:
         """The accuracy where the candidate `picked` for a fold answers the trials of that fold."""

@@ -209,8 +209,9 @@ def fit(
         def settings(of: DataSet, y: Labels) -> dict[str, Chosen]:
             return choosing(of, y).choose(windows[0])[0]
 
-        mixed = mix(dataset, y, own, settings, X, samples, leave_out, quick=quick, jobs=jobs)
-        chosen, folds, without, why = mixed.chosen, mixed.folds, mixed.without, mixed.notes
+        chosen, folds, without, why = mix(
+            dataset, y, own, settings, X, samples, leave_out, quick=quick, jobs=jobs
+        )
         y = {task: y[task] for task in chosen}
     notes += why
     tried = choosing(dataset, y).tried
@@ -221,10 +222,8 @@ def fit(
     X = dataset.features(window_s, samples)
     felt = np.ones(n, dtype=bool) if own is None else own
     notes += _leaks(measured.part(felt), {task: labels[felt] for task, labels in y.items()})
-    calibrating = int((folds >= 0).sum())
-    points = _decision_points(
-        dataset, choices, decision_points_s, window_s, samples, notes, calibrating
-    )
+    tested = int((folds >= 0).sum())
+    points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes, tested)
     sequential = None
     if points:
         used = [choice for by_task in (choices, *without) for choice in by_task.values()]
@@ -308,13 +307,11 @@ def _decision_points(
     window_s: float,
     samples: int,
     notes: list[str],
-    calibrating: int | None = None,
+    tested: int,
 ) -> tuple[float, ...]:
     """The decision points asked for, or the default ones where they can be calibrated."""
     if wanted is not None:
         return tuple(wanted)
-    n = len(dataset.trials)
-    tested = n if calibrating is None else calibrating
     if not FEWEST <= tested <= MOST_TRIALS:
         notes.append(
             f"no decision points before the full window: {tested} trials are not the {FEWEST} "
@@ -322,7 +319,7 @@ def _decision_points(
         )
         return ()
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    each = 0
+    n, each = len(dataset.trials), 0
     for task, choice in choices.items():
         columns = sum(widths[name] for name in choice.features)
         c = min(choice.components, len(set(dataset.labels(task).tolist())) * 2, n)

@@ -9,7 +9,7 @@ projection, in whole numbers. As a neighbour, each votes once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,23 +35,6 @@ ALONE, SIMULATED, ONCE = (0, 1), (1, 0), (1, 1)
 """Weights of the simulated trials and of the owner's."""
 
 
-@dataclass(frozen=True)
-class Mix:
-    """What the owner's trials choose.
-
-    Attributes:
-        chosen: {task: its settings, with the weights}; accuracies are those on the owner's trials.
-        folds: (n,) the fold of each of the owner's trials, -1 for simulated ones.
-        without: [fold]{task: the choice made without the fold's trials}.
-        notes: sentences that say how much the simulated trials help.
-    """
-
-    chosen: dict[str, Chosen]
-    folds: NDArray[np.int64]
-    without: list[dict[str, Choice]]
-    notes: list[str]
-
-
 def mix(
     dataset: DataSet,
     y: Labels,
@@ -63,7 +46,7 @@ def mix(
     *,
     quick: bool = False,
     jobs: int = 1,
-) -> Mix:
+) -> tuple[dict[str, Chosen], NDArray[np.int64], list[dict[str, Choice]], list[str]]:
     """Choose the weights of each task.
 
     Args:
@@ -76,6 +59,12 @@ def mix(
         leave_out: label whose groups are left out where the owner's trials have several of them.
         quick: fewer folds.
         jobs: processes.
+
+    Returns:
+        {task: its settings, with the weights}, whose accuracies are those on the owner's trials;
+        (n,) the fold of each of the owner's trials, -1 for simulated ones;
+        [fold]{task: the choice made without the fold's trials}; and sentences that say how much the
+        simulated trials help.
 
     Raises:
         InputError: the owner's trials are too few, or have no label.
@@ -137,8 +126,8 @@ def mix(
         rank = np.arange(len(table.choices[task]))
         rule = rank, (rank[:1] if labelled[task] < ENOUGH else None)
         best = table.choices[task][table.chosen(task, *rule)]
-        for fold, choice_of in enumerate(without):
-            choice_of[task] = table.choices[task][by_trial.without(task, fold, *rule)]
+        for choice_of, place in zip(without, by_trial.by_fold(task, *rule), strict=True):
+            choice_of[task] = table.choices[task][place]
         chosen[task] = replace(
             settled,
             choice=best,
@@ -146,10 +135,7 @@ def mix(
             by_trial=by_trial.nested(task, *rule),
             left_out=TRIAL if table is by_trial else leave_out,
             folds=table.folds,
-            by_fold=tuple(
-                table.choices[task][table.without(task, fold, *rule)]
-                for fold in range(int(table.folds.max()) + 1)
-            ),
+            by_fold=tuple(table.choices[task][place] for place in table.by_fold(task, *rule)),
         )
         names = {
             ONCE: "both",
@@ -166,7 +152,7 @@ def mix(
                 f"simulated trials no longer help {task}: export your own alone, which also "
                 "chooses the features by them"
             )
-    return Mix(chosen, by_trial.folds, without, notes)
+    return chosen, by_trial.folds, without, notes
 
 
 def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> SearchGrid:

@@ -268,8 +268,8 @@ class SequentialClassifier:
 
     def judged(
         self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
-    ) -> tuple[dict[str, NDArray[np.str_]], dict[str, NDArray[np.float64]], dict[str, Course]]:
-        """Labels and confidences (points, m) and course of each task, for trials that are new.
+    ) -> tuple[dict[str, NDArray[np.bool_]], dict[str, NDArray[np.float64]], dict[str, Course]]:
+        """Hits and confidences (points, m) and course of each task, for trials that are new.
 
         Args:
             X: (points, m, p).
@@ -281,11 +281,10 @@ class SequentialClassifier:
             task: confidences(self.stopping_[task].slopes, self.stopping_[task].intercepts, margins)
             for task, (_, margins, _) in answered.items()
         }
-        named = {task: labels for task, (labels, *_) in answered.items()}
-        right = {task: labels == y[task] for task, labels in named.items()}
+        right = {task: labels == y[task] for task, (labels, *_) in answered.items()}
         unknown = unlike(self.novelty_, answered[self.novelty_.task][2])
-        tested = {task: y[task] != "" for task in named}
-        return named, confidence, self._courses(confidence, right, unknown, tested)
+        tested = {task: y[task] != "" for task in right}
+        return right, confidence, self._courses(confidence, right, unknown, tested)
 
     def _courses(
         self,

@@ -98,7 +98,7 @@ def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(trials, o
     )
     choices = {"object": Choice("IV", objects - 1, 3, "lda", ("max_force",))}
     notes: list[str] = []
-    assert _decision_points(data, choices, None, 1.2, 40, notes) == pytest.approx(points)
+    assert _decision_points(data, choices, None, 1.2, 40, notes, trials) == pytest.approx(points)
     assert [note.split(" decision points")[0] for note in notes] == (
         [] if len(points) == 11 else [str(len(points) or "no")]
     )

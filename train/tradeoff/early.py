@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,18 +115,6 @@ class StoppingComparison:
         return float(np.abs(gaps).sum() / len(right))
 
 
-@dataclass(frozen=True)
-class _Fold:
-    """The answers to one fold held out, by task."""
-
-    test: NDArray[np.int64]
-    named: dict[str, NDArray[np.str_]]
-    confidence: dict[str, NDArray[np.float64]]
-    courses: dict[str, Course]
-    rules: dict[str, dict[float, StoppingRule | None]]
-    products: Mapping[str, Iterable[str]]
-
-
 def compare_stopping(
     dataset: DataSet, decision_points_s: Sequence[float], *, jobs: int = 1
 ) -> dict[str, StoppingComparison]:
@@ -137,26 +126,26 @@ def compare_stopping(
     folds = stratified_folds(y[finest(y)], FOLDS)
     tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
     cases = [(dataset, test, decision_points_s) for test in tests]
-    held_out: list[_Fold] = Workers(jobs).map("deciding early", _held_out, cases)
+    held_out = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
     comparisons, unknown = {}, np.empty(shape, dtype=bool)
-    for fold in held_out:
-        unknown[:, fold.test] = fold.courses[finest(y)].unknown
-    for task, labels in y.items():
-        named = np.empty(shape, dtype=labels.dtype)
-        confidence = np.empty(shape)
-        for fold in held_out:
-            named[:, fold.test] = fold.named[task]
-            confidence[:, fold.test] = fold.confidence[task]
-        right = named == labels
+    for test, (_, _, _, courses) in zip(tests, held_out, strict=True):
+        unknown[:, test] = courses[finest(y)].unknown
+    for task in y:
+        right, confidence = np.empty(shape, dtype=bool), np.empty(shape)
+        for test, (_, hits, sure, _) in zip(tests, held_out, strict=True):
+            right[:, test], confidence[:, test] = hits[task], sure[task]
+        rules = [(courses[task], model.stopping_[task]) for model, _, _, courses in held_out]
+        certified = [
+            _certified(
+                error, [(course, own.rule(error)) for course, own in rules], decision_points_s
+            )
+            for error in ERRORS
+        ]
         comparisons[task] = StoppingComparison(
-            tuple(decision_points_s),
-            right,
-            confidence,
-            unknown,
-            [_certified(error, task, held_out, decision_points_s) for error in ERRORS],
+            tuple(decision_points_s), right, confidence, unknown, certified
         )
-    for task, factors in held_out[0].products.items():
+    for task, factors in held_out[0][0].products_.items():
         parts = tuple(comparisons[factor] for factor in factors)
         comparisons[task] = replace(comparisons[task], factors=parts)
     return comparisons
@@ -164,7 +153,8 @@ def compare_stopping(
 
 def _held_out(
     dataset: DataSet, test: NDArray[np.int64], decision_points_s: Sequence[float]
-) -> _Fold:
+) -> tuple[Any, ...]:
+    """The model that was fitted without a fold, and what it answers to the fold (`judged`)."""
     train = some(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
     fitted = fit(train, quick=True, leave_out=TRIAL, decision_points_s=decision_points_s, jobs=1)
     model, others = fitted.sequential, some(dataset, test)
@@ -172,29 +162,21 @@ def _held_out(
     names = fitted.dataset.names
     new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])
     truth = {task: others.labels(task) for task in model.choices}
-    named, confidence, courses = model.judged(new, truth)
-    rules = {
-        task: {error: stopping.rule(error) for error in ERRORS}
-        for task, stopping in model.stopping_.items()
-    }
-    return _Fold(test, named, confidence, courses, rules, model.products_)
+    return (model, *model.judged(new, truth))
 
 
 def _certified(
     error: float,
-    task: str,
-    folds: Sequence[_Fold],
+    folds: Sequence[tuple[Course, StoppingRule | None]],
     decision_points_s: Sequence[float],
 ) -> Certified:
-    """The decisions at one asked error."""
+    """The decisions at one asked error, by the rule that each fold certified for it."""
     seconds = np.array(decision_points_s)
     waiting, _ = candidates(len(seconds))
     rows = []
-    for fold in folds:
-        rule = fold.rules[task][error]
+    for course, rule in folds:
         if rule is None:
             continue
-        course = fold.courses[task]
         (at, wrong), (_, late) = course.under(rule), course.under(waiting)
         unknown = course.unknown[at, np.arange(len(at))] & course.withheld
         rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])

@@ -207,11 +207,8 @@ class TestEarly:
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
         course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
-        folds = [
-            early._Fold(np.arange(4), {}, {}, {"t": course}, {"t": {0.1: given}}, {})
-            for given in (None, rule)
-        ]
-        decisions = early._certified(0.1, "t", folds, (0.6, 1.2))
+        folds = [(course, None), (course, rule)]
+        decisions = early._certified(0.1, folds, (0.6, 1.2))
         assert (decisions.folds, decisions.result.right, decisions.result.total) == (1, 3, 4)
         # At the full window one more is right and one names nothing.
         assert decisions.gain[0] == 0.0
