@@ -158,11 +158,9 @@ class Watched:
 
 def touches(fault, bus, chip):
     """Whether a fault may meet what is said to a chip or its mux."""
-    wanted = (fault.bus, fault.mux, fault.channel)
-    there = (bus.device, chip.mux, chip.channel)
-    return fault.address in (None, chip.address, chip.mux) and all(
-        want in (None, place) for want, place in zip(wanted, there, strict=True)
-    )
+    there = {"bus": bus.device, "mux": chip.mux, "channel": chip.channel}
+    at_it = fault.address in (None, chip.address, chip.mux)
+    return at_it and all(getattr(fault, key) in (None, there[key]) for key in there)
 
 
 def run(name, file, faults, *, seconds=LASTS_S, overhead_s=0.0, seed=0):

@@ -125,9 +125,7 @@ class FaultyBus(FakeBus):
             if (
                 (fault.at is None or number in fault.at)
                 and fault.during[0] <= t < fault.during[1]
-                and fault.address in (None, route.address)
-                and fault.mux in (None, route.mux)
-                and fault.channel in (None, route.channel)
+                and all(getattr(fault, key) in (None, at) for key, at in route._asdict().items())
                 and (fault.rate >= 1.0 or self.random.random() < fault.rate)
             ):
                 self.met += 1

@@ -25,8 +25,8 @@ def parsed(chip, bits=16):
 
 
 CHIPS = {
-    "ad7147": (AD7147, FakeAD7147, 0x2C, {}, {}),
-    "mpr121": (MPR121, FakeMPR121, 0x5A, {}, {}),
-    "block16": (Block, FakeBlock, 0x28, {"taxels": 12, "bits": 16}, {"taxels": 12, "bits": 16}),
-    "block12": (Block, FakeBlock, 0x28, {"taxels": 12, "bits": 12}, {"taxels": 12, "bits": 12}),
+    "ad7147": (AD7147, FakeAD7147, 0x2C, {}),
+    "mpr121": (MPR121, FakeMPR121, 0x5A, {}),
+    "block16": (Block, FakeBlock, 0x28, {"taxels": 12, "bits": 16}),
+    "block12": (Block, FakeBlock, 0x28, {"taxels": 12, "bits": 12}),
 }

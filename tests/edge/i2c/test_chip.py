@@ -15,8 +15,8 @@ from tests.edge.i2c.chips import CHIPS, VALUES, parsed, sense
 
 @pytest.fixture(params=CHIPS, ids=CHIPS)
 def pair(request):
-    driver, model, address, options, model_options = CHIPS[request.param]
-    bus = FakeBus(chips={address: model(sense, **model_options)})
+    driver, model, address, options = CHIPS[request.param]
+    bus = FakeBus(chips={address: model(sense, **options)})
     return bus, bus.chips[address], driver(bus, address, **options)
 
 
@@ -36,7 +36,7 @@ def test_a_chip_serves_its_values_once_it_is_set_up_also_after_a_reset(pair):
 
 def test_a_constructor_checks_that_its_chip_is_there(pair):
     bus, _, chip = pair
-    driver, _, _, options, _ = next(c for c in CHIPS.values() if c[0] is type(chip))
+    driver, _, _, options = next(c for c in CHIPS.values() if c[0] is type(chip))
     with pytest.raises(BusNack):
         driver(bus, 0x08, **options)
 
@@ -59,9 +59,8 @@ def test_a_constructor_refuses_another_chip(driver, model, options):
 
 @pytest.mark.parametrize("name", ["ad7147", "mpr121"])
 def test_every_register_that_does_not_keep_its_value_is_found_by_reading_back(name):
-    driver, model_class, address, _, _ = CHIPS[name]
-    wide = 2 if name == "ad7147" else 1
-    table = ad7147.start_rows() if name == "ad7147" else mpr121.SETTINGS
+    driver, model_class, address, _ = CHIPS[name]
+    wide, table = (2, ad7147.start_rows()) if name == "ad7147" else (1, mpr121.SETTINGS)
     for register, values in table:
         if not any(values):
             continue  # losing a zero changes nothing

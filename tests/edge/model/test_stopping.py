@@ -1,7 +1,7 @@
 """Confidence from distances, rules by their certified error, refusals, and the unknown."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -27,20 +27,10 @@ class TestMargin:
 
 
 def stopping(**changes):
-    rules = (
-        StoppingRule(0.10, 1.2, 2.0, 2),
-        StoppingRule(0.15, 0.8, 0.9, 2),
-        StoppingRule(0.25, 0.4, 0.6, 2),
-    )
-    given = {
-        "slopes": (1.0, 1.0, 2.0),
-        "intercepts": (0.0, 0.0, -1.0),
-        "rules": rules,
-        "trials": 140,
-        "wrong": 7,
-        "risk": 0.1,
-    }
-    return Stopping(**{**given, **changes})
+    ways = ((0.10, 1.2, 2.0, 2), (0.15, 0.8, 0.9, 2), (0.25, 0.4, 0.6, 2))
+    rules = tuple(StoppingRule(*way) for way in ways)
+    given = Stopping((1.0, 1.0, 2.0), (0.0, 0.0, -1.0), rules, trials=140, wrong=7, risk=0.1)
+    return replace(given, **changes)
 
 
 def test_the_fastest_rule_that_is_certified_is_taken():

@@ -36,13 +36,10 @@ def test_an_mpr121_that_says_nothing_works():
     """Its values fall with a touch, and a touch takes some tens of its 10 bits."""
     file = mpr121()
     assert file.chips[0].sign == -1
-    assert (file.layout.threshold_counts, file.layout.onset) == (8, 16)
     shipped = skinfile.load(skinfile.shipped("mpr121"))
     assert file.signal == shipped.signal
-    assert (file.layout.threshold_counts, file.layout.onset) == (
-        shipped.layout.threshold_counts,
-        shipped.layout.onset,
-    )
+    layouts = (file.layout, shipped.layout)
+    assert {(layout.threshold_counts, layout.onset) for layout in layouts} == {(8, 16)}
 
 
 def test_what_the_file_says_counts():

@@ -11,22 +11,9 @@ from tests.train.simulate.scenes import run
 from train.simulate import convergence
 from train.simulate.run import simulate, write
 
-BOX = {
-    "name": "box",
-    "family": "rigid",
-    "conditions": ["movable"],
-    "mass_kg": [0.5, 6.0],
-    "friction_static": 0.6,
-    "friction_kinetic": 0.5,
-    "width_m": 0.05,
-}
-FAMILY = {
-    **BOX,
-    "name": "crate",
-    "count": 6,
-    "conditions": ["fixed", "movable"],
-    "friction_static": [0.3, 0.6],
-}
+BOX = {**scenes.movable([0.5, 6.0], 0.6, 0.5, width_m=0.05)[0], "name": "box"}
+CRATES = {"name": "crate", "count": 6, "conditions": ["fixed", "movable"]}
+FAMILY = {**BOX, **CRATES, "friction_static": [0.3, 0.6]}
 del FAMILY["friction_kinetic"]
 
 
