@@ -149,10 +149,9 @@ class Watched:
             self.back_at = self.skin.clock.now()
         return frame
 
-    def outcome(self, name, met, end, schedule=None):
+    def outcome(self, name, met, end, missed_ticks=0):
         """The outcome of faults that ended at a time."""
         back = math.nan if self.back_at == math.inf else max(0.0, self.back_at - end)
-        missed_ticks = 0 if schedule is None else schedule.missed_ticks
         return Outcome(name, met, self.wrong, self.missing, self.others, missed_ticks, back)
 
 
@@ -179,7 +178,9 @@ def run(name, file, faults, *, seconds=LASTS_S, overhead_s=0.0, seed=0):
         while schedule.wait() - start < seconds:
             watched.read()
     met = sum(bus.met for bus in watched.buses)
-    return watched.outcome(name, met, start + max(f.during[1] for f in faults), schedule)
+    return watched.outcome(
+        name, met, start + max(f.during[1] for f in faults), schedule.missed_ticks
+    )
 
 
 def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
@@ -236,7 +237,7 @@ def brown_out(name, file, *, at=(3,), overhead_s=0.0):
                     chip.reset()
             watched.read()
             schedule.wait()
-    return watched.outcome(name, len(at), end, schedule)
+    return watched.outcome(name, len(at), end, schedule.missed_ticks)
 
 
 def models(buses):

@@ -5,11 +5,12 @@ import errno
 import pytest
 
 from edge.i2c.bus import BusError, BusGone, BusRefused, fetch, read, send, write
+from edge.i2c.chip import FakeChip
 from edge.i2c.tca9548a import FakeTCA9548A
 from tests.faulty import Fault, FaultyBus
 
 
-class Echo:
+class Echo(FakeChip):
     """Serves what was written to it."""
 
     def __init__(self, first=0):
@@ -20,9 +21,6 @@ class Echo:
 
     def read(self, n, t):
         return self.kept[:n].ljust(n, b"\0")
-
-    def stop(self):
-        pass
 
     def reset(self):
         self.kept = bytes(64)

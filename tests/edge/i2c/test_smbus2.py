@@ -24,10 +24,10 @@ def library(tmp_path_factory):
     return shim.build(tmp_path_factory.mktemp("shim"))
 
 
-def python(library, code, *arguments, **environment):
+def python(library, code, **environment):
     """Run code in a Python of its own, over the shim; returns the finished process."""
     return subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code), *arguments],
+        [sys.executable, "-c", textwrap.dedent(code)],
         env=shim.environment(library, **environment),
         capture_output=True,
         text=True,

@@ -58,13 +58,9 @@ def a_tensor_in_an_attribute():
 
 def a_sparse_constant():
     proto = model([add()])
-    proto.graph.sparse_initializer.append(
-        helper.make_sparse_tensor(
-            numpy_helper.from_array(np.ones(1), "w"),
-            numpy_helper.from_array(np.zeros(1, dtype=np.int64)),
-            [1 << 40],
-        )
-    )
+    values, place = numpy_helper.from_array(np.ones(1), "w"), np.zeros(1, dtype=np.int64)
+    sparse = helper.make_sparse_tensor(values, numpy_helper.from_array(place), [1 << 40])
+    proto.graph.sparse_initializer.append(sparse)
     return proto
 
 

@@ -27,20 +27,12 @@ PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 
 def on_buses(n, *, kind=ad7147.KIND, verify=False, recheck=100_000):
     """The 32 chips of Cody's skin shared out over n buses."""
-    base = kind.addresses[0]
-    channels = [CODY.chips[4 * i : 4 * i + 4] for i in range(8)]
-    share = [channels[i::n] for i in range(n)]
-    buses = tuple(
-        BusSpec(
-            f"bus {b}",
-            tuple(
-                replace(chip, kind=kind, channel=c, address=base + a)
-                for c, chips in enumerate(part)
-                for a, chip in enumerate(chips)
-            ),
-        )
-        for b, part in enumerate(share)
-    )
+    shares = [[] for _ in range(n)]
+    for i, chip in enumerate(CODY.chips):
+        channel, a = divmod(i, 4)
+        place = {"channel": channel // n, "address": kind.addresses[0] + a}
+        shares[channel % n].append(replace(chip, kind=kind, **place))
+    buses = tuple(BusSpec(f"bus {b}", tuple(chips)) for b, chips in enumerate(shares))
     reading = Reading(verify_mux=verify, recheck_frames=recheck)
     return replace(CODY, buses=buses, reading=reading)
 

@@ -191,13 +191,13 @@ def test_a_viscous_contact_gives_back_no_more_energy_than_it_took():
 def test_a_run_that_makes_energy_is_refused():
     one = make(one_object(), lead_s=0.1)
     batch = run(one)
-    joints = batch.joints.copy()
-    engine.check_energy(batch.trials, joints, batch.t)
-    joints[1, 100:, 0] -= 1.0
-    with pytest.raises(EdgeError, match=r"trial 1 of thing-fixed makes energy: at 1 s"):
-        engine.check_energy(batch.trials, joints, batch.t)
+    engine.check_energy(batch.trials, batch.joints, batch.t)
     # Nor can it shake: its damping takes more than is put in.
-    joints = batch.joints.copy()
-    joints[1, 100::2, 0] += 0.02
-    with pytest.raises(EdgeError, match=r"trial 1 of thing-fixed makes energy"):
-        engine.check_energy(batch.trials, joints, batch.t)
+    for frames, turned, when in (
+        (slice(100, None), -1.0, ": at 1 s"),
+        (slice(100, None, 2), 0.02, ""),
+    ):
+        joints = batch.joints.copy()
+        joints[1, frames, 0] += turned
+        with pytest.raises(EdgeError, match=f"trial 1 of thing-fixed makes energy{when}"):
+            engine.check_energy(batch.trials, joints, batch.t)
