@@ -191,9 +191,8 @@ def _shared(tracks: list[RegionTrack], regions: list[Region]) -> dict[int, int]:
     for i, track in enumerate(tracks):
         for j, region in enumerate(regions):
             before = track.contact.region
-            common = 0 if before is None else (before.bits & region.bits).bit_count()
-            if common or (before is not None and before.touches(region)):
-                pairs.append((-common, i, j))
+            if before is not None and before.touches(region):
+                pairs.append((-(before.bits & region.bits).bit_count(), i, j))
     shares: dict[int, int] = {}
     for _, i, j in sorted(pairs):
         if i not in shares and j not in shares.values():

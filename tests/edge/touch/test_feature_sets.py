@@ -63,11 +63,6 @@ def test_sets_and_features_expand_to_features_in_their_order_each_once():
         "contact_motion",
         "skin_force",
     )
-    assert expand(["posture", "joints"]) == (
-        "joint_angle@10",
-        "joint_change@10",
-        "joint_change_rate@10",
-    )
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
