@@ -86,10 +86,18 @@ def _draw(recordings: Sequence[tuple[str, Recording]], out: Path, model: Model |
     ):
         image = _skin(axes[0, column], recording, onset, horizon, strongest)
         decided = None if model is None else _decided(name, recording, model)
-        for row, (feature, unit) in enumerate(units(recording.layout).items(), start=1):
-            _curve(axes[row, column], recording, series, feature, horizon, decided)
+        end = horizon if decided is None else decided.window_s
+        for axis, (feature, unit) in zip(
+            axes[1:, column], units(recording.layout).items(), strict=True
+        ):
+            axis.plot(series.t, curves(series)[feature], color="C0", linewidth=2.2)
+            axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
+            if decided is not None:
+                axis.axvline(end, color="C1", linewidth=1.8)
+            axis.set_xlim(0.0, 1.15 * horizon)
+            axis.grid(alpha=0.25)
             if column == 0:
-                axes[row, 0].set_ylabel(f"{TITLES[feature]} ({UNITS.get(unit, unit)})")
+                axis.set_ylabel(f"{TITLES[feature]} ({UNITS.get(unit, unit)})")
         axes[3, column].set_xlabel("seconds from onset")
         if decided is not None:
             share = f"{decided.confidence:.0%} after {decided.window_s:g} s"
@@ -154,20 +162,3 @@ def _skin(axis: Any, recording: Recording, onset: float, horizon: float, stronge
     axis.set_title("\n".join(filter(None, (kind, thing))) or "touch", fontsize=14, weight="bold")
     axis.set_xlabel(f"column, at {recording.t[k] - onset:.2f} s")
     return image
-
-
-def _curve(
-    axis: Any,
-    recording: Recording,
-    series: FeatureSeries,
-    feature: str,
-    horizon: float,
-    decided: Decided | None,
-) -> None:
-    axis.plot(series.t, curves(series)[feature], color="C0", linewidth=2.2)
-    end = horizon if decided is None else decided.window_s
-    axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
-    if decided is not None:
-        axis.axvline(end, color="C1", linewidth=1.8)
-    axis.set_xlim(0.0, 1.15 * horizon)
-    axis.grid(alpha=0.25)

@@ -18,9 +18,7 @@ def test_a_touch_is_drawn_over_the_trials_that_a_model_finds_nearest(
     assert category.get_suptitle() == "category: soft-fixed"
     assert thing.get_suptitle().startswith("object: soft ")
     texts = [text.get_text() for text in category.legends[0].get_texts()]
-    assert texts[0] == "this touch"
-    assert texts[1].startswith("soft_")
-    assert texts[-1].startswith("hard_")
+    assert [text[:5] for text in (*texts[:2], texts[-1])] == ["this ", "soft_", "hard_"]
     force, *_, pulls = category.axes
     touch, *nearest = force.lines
     assert len(nearest) == len(texts) - 1
