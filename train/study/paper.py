@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import rankdata, spearmanr
 
-from train.evaluate import Result
+from edge.statistics import wilson
 from train.report.figures import STROKES, legend, picture
 from train.report.section import Figure, Numbers, Row, Section, Table, counted
 
@@ -60,12 +60,6 @@ class Entry:
         return self.setting == form[self.table]
 
 
-def _interval(share: float, trials: int) -> tuple[float, float]:
-    """95 % binomial interval of a share in percent, of so many trials."""
-    low, high = Result(round(share * trials / 100.0), trials).interval
-    return 100.0 * low, 100.0 * high
-
-
 def entries() -> list[Entry]:
     """All 46 numbers."""
     with open(PAPER, encoding="utf-8", newline="") as file:
@@ -92,8 +86,10 @@ def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
         ours: percent.
         tested: number of trials behind ours.
     """
-    low_p, high_p = _interval(paper, TRIALS)
-    low_o, high_o = _interval(ours, tested)
+    (low_p, high_p), (low_o, high_o) = (
+        100.0 * np.array(wilson(round(share * trials / 100.0), trials))
+        for share, trials in ((paper, TRIALS), (ours, tested))
+    )
     gap = ours - paper
     below = float(np.hypot(ours - low_o, high_p - paper))
     above = float(np.hypot(high_o - ours, paper - low_p))
