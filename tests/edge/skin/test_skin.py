@@ -39,13 +39,8 @@ def on_buses(n, *, kind=ad7147.KIND, verify=False, recheck=100_000):
 
 @pytest.mark.parametrize(
     ("kind", "buses", "hz"),
-    [
-        (ad7147.KIND, 1, 48.1),
-        (ad7147.KIND, 2, 96.2),
-        (ad7147.KIND, 3, 128.2),
-        (mpr121.KIND, 1, 49.8),
-        (mpr121.KIND, 4, 199.2),
-    ],
+    [(ad7147.KIND, n, hz) for n, hz in ((1, 48.1), (2, 96.2), (3, 128.2))]
+    + [(mpr121.KIND, n, hz) for n, hz in ((1, 49.8), (4, 199.2))],
 )
 def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
     """From the bytes of the data sheets: 8320 bits for 32 AD7147, 8032 for 32 MPR121."""

@@ -193,11 +193,8 @@ def test_a_run_that_makes_energy_is_refused():
     batch = run(one)
     engine.check_energy(batch.trials, batch.joints, batch.t)
     # Nor can it shake: its damping takes more than is put in.
-    for frames, turned, when in (
-        (slice(100, None), -1.0, ": at 1 s"),
-        (slice(100, None, 2), 0.02, ""),
-    ):
+    for every, turned, when in ((1, -1.0, ": at 1 s"), (2, 0.02, "")):
         joints = batch.joints.copy()
-        joints[1, frames, 0] += turned
+        joints[1, 100::every, 0] += turned
         with pytest.raises(EdgeError, match=f"trial 1 of thing-fixed makes energy{when}"):
             engine.check_energy(batch.trials, joints, batch.t)
