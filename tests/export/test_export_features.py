@@ -11,14 +11,7 @@ from edge.model.model import Model
 from export.__main__ import main
 from train.dataset import load_trials
 
-SIX = [
-    "skin_force",
-    "right_length",
-    "left_width",
-    "skin_slant",
-    "skin_area",
-    "contact_area_rate@10",
-]
+SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate@10".split()
 
 
 @pytest.fixture(scope="module")

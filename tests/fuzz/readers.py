@@ -19,10 +19,15 @@ from mcap.writer import CompressionType
 
 from edge.cli import main as edge_main
 from edge.errors import InputError
+from edge.model.explanation import Space
+from edge.model.model import Model
+from edge.runtime.touch_map import TouchMap
+from edge.touch.arm import Chain
 from tests.fuzz import mutate
 from tests.train.importers.test_importers import dsa
 from tests.train.importers.test_log_importers import FRAMES, STORES, array, write_bag, write_mcap
 from train.__main__ import main as train_main
+from train.simulate.scene import load as load_scene
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "edge" / "demo"
@@ -84,11 +89,6 @@ def check_printable(text: str) -> None:
         raise Wrong(f"prints text that cannot be encoded: {error}") from None
 
 
-def edge(*words: object) -> None:
-    """`edge-classify ...`."""
-    command(edge_main, *words)
-
-
 def importing(kind: str, *more: str) -> Callable[[Path], None]:
     """`python -m train import KIND`."""
 
@@ -103,11 +103,6 @@ def importing(kind: str, *more: str) -> Callable[[Path], None]:
 def files(*patterns: str) -> Callable[[], list[bytes]]:
     """The files of the checkout that match."""
     return lambda: [p.read_bytes() for pattern in patterns for p in sorted(ROOT.glob(pattern))]
-
-
-def text(*documents: Any) -> Callable[[], list[bytes]]:
-    """JSON documents, a line each, in one file."""
-    return lambda: ["".join(json.dumps(document) + "\n" for document in documents).encode()]
 
 
 def recordings() -> list[bytes]:
@@ -126,9 +121,6 @@ def recordings() -> list[bytes]:
 
 def read_model(path: Path) -> None:
     """Load a model and ask it once."""
-    from edge.model.explanation import Space
-    from edge.model.model import Model
-
     model = Model(path)
     for task, decision in model.decide(np.ones(model.info.width)).items():
         if not np.isfinite(decision.confidence):
@@ -146,8 +138,6 @@ def skins() -> list[bytes]:
 
 def read_chain(path: Path) -> None:
     """Load an arm and compute a pose."""
-    from edge.touch.arm import Chain
-
     urdf = path.suffix == ".urdf"
     chain = Chain.from_urdf(path, "base", "tip") if urdf else Chain.from_toml(path)
     if not np.isfinite(chain.pose(np.full(chain.dof, 0.5))).all():
@@ -166,25 +156,7 @@ TOUCH = {
     **{"event": "decision", "task": "object", "contact": 1, "onset_s": 1.5, "label": "cup"},
     **{"place": [0.1, 0.2, 0.3], "confidence": 0.5, "flags": ["tie"]},
 }
-
-
-def read_map(path: Path) -> None:
-    """Load a map of touches."""
-    from edge.runtime.touch_map import TouchMap
-
-    list(TouchMap(path))
-
-
-def read_scene(path: Path) -> None:
-    """Load a scene."""
-    from train.simulate.scene import load
-
-    load(path)
-
-
-def beside_a_scene(path: Path) -> None:
-    """The scene that another one builds on."""
-    shutil.copy(ROOT / "train" / "scenes" / "cody18.toml", path.parent)
+MAP = "".join(json.dumps(line) + "\n" for line in (HEAD, TOUCH, TOUCH, HEAD, TOUCH))
 
 
 def grasps() -> list[bytes]:
@@ -251,17 +223,18 @@ TABLES = [
 
 READERS = (
     Reader("recording", ".npz", recordings, mutate.of_npz,
-           lambda path: edge("replay", "--summary", "--model", MODEL, path)),
+           lambda path: command(edge_main, "replay", "--summary", "--model", MODEL, path)),
     Reader("model", ".onnx", files("tests/golden/model.onnx", "edge/demo/model.onnx"),
            mutate.of_onnx, read_model),
     Reader("golden", ".npz", files("tests/golden/demo.npz"), mutate.of_npz,
-           lambda path: edge("verify", "--model", MODEL, "--golden", path)),
-    Reader("skin", ".toml", skins, mutate.of_text, lambda path: edge("check", path)),
+           lambda path: command(edge_main, "verify", "--model", MODEL, "--golden", path)),
+    Reader("skin", ".toml", skins, mutate.of_text, lambda path: command(edge_main, "check", path)),
     Reader("arm", ".toml", files("edge/arms/cody.toml"), mutate.of_text, read_chain),
     Reader("urdf", ".urdf", lambda: [URDF], mutate.of_text, read_chain),
-    Reader("map", ".jsonl", text(HEAD, TOUCH, TOUCH, HEAD, TOUCH), mutate.of_text, read_map),
-    Reader("scene", ".toml", files("train/scenes/*.toml"), mutate.of_text, read_scene,
-           beside_a_scene),
+    Reader("map", ".jsonl", lambda: [MAP.encode()], mutate.of_text,
+           lambda path: list(TouchMap(path))),
+    Reader("scene", ".toml", files("train/scenes/*.toml"), mutate.of_text, load_scene,
+           lambda path: shutil.copy(ROOT / "train" / "scenes" / "cody18.toml", path.parent)),
     Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),

@@ -103,13 +103,10 @@ class Case:
         """Group and name, for people."""
         return f"{self.group}: {self.name}"
 
+    # Decompositions of this size only lose by a second thread, most of all beside others.
+    @threadpool_limits.wrap(limits=1)
     def worst(self) -> Worst:
         """The largest error at the hazard and in the search around it."""
-        # Decompositions of this size only lose by a second thread, most of all beside others.
-        with threadpool_limits(1):
-            return self._worst()
-
-    def _worst(self) -> Worst:
         seen: list[tuple[float, Mapping[str, Any]]] = [
             (float(self.error(**at)), dict(at)) for at in self.hazard
         ]
@@ -134,11 +131,12 @@ class Case:
         error, at = max(seen, key=lambda pair: pair[0])
         return Worst(error, at, len(seen))
 
+    @threadpool_limits.wrap(limits=1)
     def theirs(self) -> str:
         """The answer of the usual tools, in words; "" without one."""
         if self.usual is None:
             return ""
         # It warns of some hazards; what counts is what it then answers.
-        with threadpool_limits(1), warnings.catch_warnings(), np.errstate(all="ignore"):
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             return self.usual()

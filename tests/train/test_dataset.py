@@ -90,7 +90,7 @@ def test_where_most_lack_joint_angles_motion_is_on_the_skin(make_touch, tmp_path
 
 
 def test_a_label_that_a_few_lack_stays_a_task_without_them(folder, make_touch):
-    save(folder / "odd.npz", labelled(make_touch(), category="rigid-fixed", mood="bad"))
+    save(folder / "odd.npz", make_touch(labels={"category": "rigid-fixed", "mood": "bad"}))
     data = load_trials([folder])
     assert data.tasks == ("category", "object")
     assert [path.name for path in data.left_out["a label for object"]] == ["odd.npz"]
@@ -140,10 +140,6 @@ def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, mak
         load_trials([tmp_path])
 
 
-def labelled(recording, **labels):
-    return replace(recording, meta={**recording.meta, "labels": labels})
-
-
 def skinned(recording, **skin):
     return replace(recording, meta={**recording.meta, "skin": {**recording.meta["skin"], **skin}})
 
@@ -179,8 +175,10 @@ def test_recordings_that_do_not_belong_together_are_refused(change, word, folder
 
 def test_recordings_without_labels_are_refused(make_touch, tmp_path):
     for i in range(3):
-        save(tmp_path / f"{i}.npz", labelled(make_touch(seed=i), **({"mood": "bad"} if i else {})))
-        save(tmp_path / f"bare{i}.npz", labelled(make_touch(seed=i)))
+        for name, labels in ((i, {"mood": "bad"} if i else {}), (f"bare{i}", {})):
+            touch = make_touch(seed=i)
+            touch.meta["labels"] = labels
+            save(tmp_path / f"{name}.npz", touch)
     with pytest.raises(InputError, match="share no label"):
         load_trials([tmp_path])
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from edge.recording import load
+from tests.train.importers.test_log_importers import write_frames
 from train.__main__ import main
 from train.commands.import_ import zeroed
 
@@ -20,18 +21,11 @@ def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch)
     assert back.frames.dtype == np.uint16
 
 
-def csv_frames(folder, trials):
-    """The trials as folders of CSV files that are named by their times."""
-    for i, trial in enumerate(trials):
-        (folder / f"trial{i}").mkdir(parents=True)
-        for t, frame in zip(trial.t, trial.frames, strict=True):
-            np.savetxt(folder / f"trial{i}" / f"{t:.3f}.csv", frame, fmt="%d", delimiter=",")
-
-
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
     noise = np.random.default_rng(0).integers(0, 41, (60, 16, 24)).astype(np.uint16)
     touches = [make_touch(seed=seed, seconds=0.4, arm=False) for seed in range(2)]
-    csv_frames(tmp_path / "csv", [replace(t, frames=np.maximum(t.frames, noise)) for t in touches])
+    for i, one in enumerate(touches):
+        write_frames(tmp_path / "csv" / f"trial{i}", one.t, np.maximum(one.frames, noise))
     given = ["import", "csv_frames", str(tmp_path / "csv"), "--out"]
     assert main([*given, str(tmp_path / "out")]) == 0
     assert "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have a" in (

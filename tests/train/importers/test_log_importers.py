@@ -236,20 +236,24 @@ def test_an_mcap_file_of_ros_or_json_messages(tmp_path, cdr):
     assert differences(imported(tmp_path, "mcap", path)) == []
 
 
-def write_csv(folder, *, names=None):
+def write_frames(folder, times, frames, names="{1:.3f}"):
+    """A trial: CSV files that are named by their times, or by their numbers."""
+    folder.mkdir(parents=True)
+    for i, (t, frame) in enumerate(zip(times, frames, strict=True)):
+        np.savetxt(folder / f"{names.format(i, t)}.csv", frame, fmt="%d", delimiter=",")
+
+
+def write_csv(folder, **options):
     for trial in ("one", "two"):
-        (folder / trial).mkdir(parents=True)
-        for i, (t, frame) in enumerate(zip(T, FRAMES, strict=True)):
-            name = f"{t:.3f}" if names is None else names.format(i)
-            np.savetxt(folder / trial / f"{name}.csv", frame, fmt="%d", delimiter=",")
+        write_frames(folder / trial, T, FRAMES, **options)
     (folder / "labels.csv").write_text("trial,object,mobility\none,cup,fixed\ntwo,can,\n")
     return folder
 
 
-@pytest.mark.parametrize("names", [None, "frame-{:04}"])
-def test_a_folder_of_csv_frames(tmp_path, names):
-    folder = write_csv(tmp_path / "csv", names=names)
-    skin = {"threshold_counts": 50} | ({} if names is None else {"rate_hz": 100})
+@pytest.mark.parametrize("options", [{}, {"names": "frame-{0:04}"}])
+def test_a_folder_of_csv_frames(tmp_path, options):
+    folder = write_csv(tmp_path / "csv", **options)
+    skin = {"threshold_counts": 50} | ({"rate_hz": 100} if options else {})
     (folder / "skin.json").write_text(json.dumps(skin))
     assert main(["import", "csv_frames", str(folder), "--out", str(tmp_path / "out")]) == 0
     one, two = (load(tmp_path / "out" / f"{trial}.npz") for trial in ("one", "two"))
