@@ -2,20 +2,23 @@
 
 The active taxels of a frame are the bits of one Python integer, so neighbours are shifts, sets are
 ands and ors, and areas are population counts. A row takes cols + 1 bits: its last bit is always
-clear and keeps a shift from running into the next row. Every result is an integer and
+clear and keeps a shift or a carry from running into the next row. Every result is an integer and
 the same on every machine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
+
+PLAIN_STEPS = 6
+"""Steps of one taxel that a flood takes before it goes on by runs of taxels."""
 
 
 class Grid:
@@ -26,8 +29,23 @@ class Grid:
 
     def __init__(self, rows: int, cols: int, wraps: bool) -> None:
         self.rows, self.cols, self.wraps = rows, cols, wraps
-        self.stride = cols + 1
-        self._first = sum(1 << (row * self.stride) for row in range(rows))
+        self.stride = stride = cols + 1
+        first = sum(1 << (row * stride) for row in range(rows))
+        self._columns = [first << col for col in range(cols)]
+        line = (1 << cols) - 1
+        self._row_planes = [
+            sum(line << (row * stride) for row in range(rows) if row >> plane & 1)
+            for plane in range((rows - 1).bit_length())
+        ]
+        self._col_planes = [
+            sum(self._columns[col] for col in range(cols) if col >> plane & 1)
+            for plane in range((cols - 1).bit_length())
+        ]
+        half = cols // 2
+        self._outside_half = [
+            sum(self._columns) ^ sum(self._columns[start : start + half])
+            for start in (half // 2, 0, cols - half)
+        ]
 
     def pack(self, active: NDArray[np.bool_]) -> int:
         """The set of a bool array (rows, stride) whose last column is False."""
@@ -40,21 +58,67 @@ class Grid:
         flat = np.unpackbits(packed, count=size, bitorder="little").view(np.bool_)
         return flat.reshape(self.rows, self.stride)[:, : self.cols]
 
+    def bit(self, index: int) -> int:
+        """The taxel of a flat index (row * cols + col)."""
+        return 1 << (index // self.cols * self.stride + index % self.cols)
+
+    def index(self, bits: int) -> int:
+        """Lowest flat index (row * cols + col) of a set."""
+        row, col = divmod((bits & -bits).bit_length() - 1, self.stride)
+        return row * self.cols + col
+
     def neighbours(self, bits: int) -> int:
         """The taxels next to one of `bits`; bits outside the grid may be set too."""
         beside = bits << 1 | bits >> 1 | bits << self.stride | bits >> self.stride
-        if not self.wraps:
-            return beside
-        across = self.cols - 1
-        return beside | (bits & self._first) << across | bits >> across & self._first
+        first, last = bits & self._columns[0], bits & self._columns[-1]
+        if self.wraps and (first or last):
+            return beside | first << self.cols - 1 | last >> self.cols - 1
+        return beside
 
     def flood(self, seed: int, within: int) -> int:
         """All taxels of `within` that are connected to `seed`."""
-        region, grown = 0, seed
-        while grown != region:
+        region = seed
+        for _ in range(PLAIN_STEPS):
+            grown = (region | self.neighbours(region)) & within
+            if grown == region:
+                return region
             region = grown
+        # A large or winding region: each round now fills runs of taxels in the four directions
+        # (to higher columns by the carry of an addition), and a step of one taxel crosses the
+        # seam.
+        left = _doublings(within, 1, self.cols, down=False)
+        down = _doublings(within, self.stride, self.rows, down=True)
+        up = _doublings(within, self.stride, self.rows, down=False)
+        while True:
+            grown = region | within & ~(within + region)
+            for shift, free in left:
+                grown |= grown >> shift & free
+            for shift, free in down:
+                grown |= grown << shift & free
+            for shift, free in up:
+                grown |= grown >> shift & free
             grown |= self.neighbours(grown) & within
-        return region
+            if grown == region:
+                return region
+            region = grown
+
+    def row_sum(self, bits: int) -> int:
+        """Sum of the rows of all taxels of `bits`."""
+        return _sum_of_planes(self._row_planes, bits)
+
+    def col_sum(self, bits: int) -> int:
+        """Sum of the columns of all taxels of `bits`; 0 <= sum < cols * area.
+
+        Where the skin wraps, columns are counted from `best_cut` of the taxels. A set that spans
+        less than half a turn has the mean of its unrolled columns, wherever the seam lies.
+        """
+        total = _sum_of_planes(self._col_planes, bits)
+        if not self.wraps or not all(bits & outside for outside in self._outside_half):
+            return total
+        areas = [(bits & column).bit_count() for column in self._columns]
+        area = sum(areas)
+        total += self.cols * sum(areas[: best_cut(areas)])
+        return total - self.cols * area if total >= self.cols * area else total
 
 
 def best_cut(weights: Sequence[int]) -> int:
@@ -80,6 +144,28 @@ def best_cut(weights: Sequence[int]) -> int:
     return best
 
 
+def _sum_of_planes(planes: Sequence[int], bits: int) -> int:
+    """Sum of a coordinate over `bits`, whose plane n holds the taxels with bit n of it set."""
+    return sum((bits & plane).bit_count() << n for n, plane in enumerate(planes))
+
+
+def _doublings(within: int, step: int, count: int, *, down: bool) -> list[tuple[int, int]]:
+    """Shifts of 1, 2, 4, ... steps, each with the taxels that it may fill (Kogge and Stone)."""
+    rounds: list[tuple[int, int]] = []
+    shift, free = step, within
+    while shift < step * count and free:
+        rounds.append((shift, free))
+        free &= free << shift if down else free >> shift
+        shift *= 2
+    return rounds
+
+
+@lru_cache(maxsize=16)
+def grid(rows: int, cols: int, wraps: bool) -> Grid:
+    """The grid of a shape; its masks are constants, so each is made once."""
+    return Grid(rows, cols, wraps)
+
+
 class Region:
     """Connected active taxels.
 
@@ -97,18 +183,8 @@ class Region:
 
     @cached_property
     def sums(self) -> tuple[int, int]:
-        """(sum of rows, sum of columns) over the taxels: `area` times the centroid.
-
-        Where the skin wraps, columns are counted from `best_cut` of the taxels, and the sum is
-        below cols * area. A region that spans less than half a turn has the mean of its unrolled
-        columns, wherever the seam lies.
-        """
-        rows, areas = self.mask.sum(axis=1), self.mask.sum(axis=0)
-        cols = int(areas @ np.arange(len(areas)))
-        if self._grid.wraps:
-            cols += len(areas) * int(areas[: best_cut(areas.tolist())].sum())
-            cols %= len(areas) * self.area
-        return int(rows @ np.arange(len(rows))), cols
+        """(sum of rows, sum of columns) over the taxels: `area` times the centroid."""
+        return self._grid.row_sum(self.bits), self._grid.col_sum(self.bits)
 
     @property
     def centroid(self) -> tuple[float, float]:
@@ -124,8 +200,7 @@ class Region:
     @property
     def index(self) -> int:
         """Lowest flat index (row * cols + col) of its taxels."""
-        row, col = divmod((self.bits & -self.bits).bit_length() - 1, self._grid.stride)
-        return row * self._grid.cols + col
+        return self._grid.index(self.bits)
 
     def touches(self, other: Region) -> bool:
         """Whether a taxel of this region is next to, or the same as, one of the other's."""
@@ -166,7 +241,7 @@ class ActiveTaxels:
             raise InputError(f"valid must be bool {counts.shape}, not {valid.dtype} {valid.shape}")
         rows, cols = counts.shape
         self.counts = counts
-        self._grid = Grid(rows, cols, wraps)
+        self._grid = grid(rows, cols, wraps)
         padded = np.zeros((rows, self._grid.stride), dtype=np.bool_)
         self.mask = padded[:, :cols]
         try:
@@ -180,24 +255,47 @@ class ActiveTaxels:
         self.bits = self._grid.pack(padded)
 
     @cached_property
+    def _lone(self) -> int:
+        """The active taxels without an active neighbour."""
+        return self.bits & ~self._grid.neighbours(self.bits)
+
+    @cached_property
+    def _connected(self) -> list[int]:
+        """The bits of each region of several taxels."""
+        components, rest = [], self.bits ^ self._lone
+        while rest:
+            components.append(self._grid.flood(rest & -rest, rest))
+            rest ^= components[-1]
+        return components
+
+    @cached_property
     def regions(self) -> list[Region]:
         """All regions, as `find_regions` returns them."""
-        regions, rest = [], self.bits
-        while rest:
-            bits = self._grid.flood(rest & -rest, rest)
-            regions.append(
-                Region(self._grid, bits, int(self.counts[self._grid.unpack(bits)].max()))
-            )
-            rest ^= bits
+        alone = map(self._grid.bit, np.flatnonzero(self._grid.unpack(self._lone)).tolist())
+        regions = map(self._region, [*self._connected, *alone])
         return sorted(regions, key=lambda region: (-region.area, -region.peak, region.index))
 
     def largest(self, previous: Region | None = None) -> Region | None:
         """The largest region, as `largest_region` returns it."""
+        if not self.bits:
+            return None
+        # The region with the frame's peak is nearly always larger than all others together.
+        index = int(self.counts.argmax())
+        bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
+        if 2 * bits.bit_count() > self.bits.bit_count():
+            return Region(self._grid, bits, int(self.counts.item(index)))
         before = 0 if previous is None else previous.bits
-        # The regions are in the order of the remaining rules.
-        return min(
-            self.regions, key=lambda r: (-r.area, -(r.bits & before).bit_count()), default=None
-        )
+        if not self._connected:
+            # A flickering skin may have nothing but lone taxels, a hundred and more of them.
+            lone = np.flatnonzero(self._grid.unpack(self._lone & before or self._lone))
+            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
+            return Region(self._grid, self._grid.bit(index), int(self.counts.item(index)))
+        area = max(map(int.bit_count, self._connected))
+        tied = [self._region(c) for c in self._connected if c.bit_count() == area]
+        return min(tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index))
+
+    def _region(self, bits: int) -> Region:
+        return Region(self._grid, bits, int(self.counts[self._grid.unpack(bits)].max()))
 
 
 def find_regions(
