@@ -29,11 +29,6 @@ from tests.hard_cases import golden as hard_golden  # noqa: E402
 TABLE = aarch64.FOLDER / "instructions.csv"
 EMULATED = ("touch", "model", "skin", "test_classifier.py", "test_recording.py")
 """Tests of edge/ that compute; commands, drivers and fakes are the same Python everywhere."""
-NOT_EMULATED = (
-    "tests/edge/test_recording.py::test_any_metadata_is_read_or_refused_with_a_sentence",
-    "tests/edge/skin/test_loop.py::test_a_long_run_neither_grows_nor_drifts",
-)
-"""Tests among them that take minutes under emulation."""
 
 
 @pytest.fixture(scope="session")
@@ -101,7 +96,6 @@ def test_the_tests_of_the_edge_pass(run, exported):
     printed = run(
         *("-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", "-p", "emulated"),
         *("-c", CHECKOUT / "pyproject.toml", "--rootdir", CHECKOUT, "-o", "pythonpath="),
-        *(f"--deselect={path}" for path in NOT_EMULATED),
         *("--durations=10", *(CHECKOUT / "tests" / "edge" / name for name in EMULATED)),
         EDGE_CLASSIFY_EXPORTED=str(exported),
         PYTHONPATH=f"{HERE}:{CHECKOUT}",  # comes after the wheel
