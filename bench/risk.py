@@ -20,8 +20,8 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,10 @@ from scipy.stats import binom
 
 from edge.cli import dispatch
 from edge.touch.feature_sets import expand
+from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import candidates
 from train.dataset import DataSet, load_trials
-from train.fitting import Fitted, fit
-from train.pipeline import columns_of
+from train.fitting import fit
 from train.progress import bar
 from train.rules import RISK
 from train.simulate import scene as scenes
@@ -53,8 +53,36 @@ SEEDS, COUNT = 5, 20
 """Batches, each of a seed of its own; trials of each object and condition in a batch."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class DrawnSet(DataSet):
+    """A data set of trials drawn from a pool, whose vectors are measured once for all sets.
+
+    Attributes:
+        rows: (n,) of its trials in the pool.
+        pool: (windows, trials, p) vectors of the pool's trials at each of `POINTS_S`.
+        columns: {feature: its columns in the vectors}.
+    """
+
+    rows: NDArray[np.int64]
+    pool: NDArray[np.float64]
+    columns: Mapping[str, NDArray[np.int64]]
+
+    def vectors(
+        self, windows_s: Sequence[float], rows: NDArray[np.int64], names: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """(windows, m, features * samples) vectors of some rows of the pool."""
+        columns = np.concatenate([self.columns[name] for name in names])
+        return np.stack([self.pool[POINTS_S.index(w)][rows[:, None], columns] for w in windows_s])
+
+    def features(
+        self, window_s: float = WINDOW_S, samples: int = SAMPLES, names: Sequence[str] | None = None
+    ) -> NDArray[np.float64]:
+        """(n, features * samples) vectors at one of `POINTS_S`."""
+        return self.vectors([window_s], self.rows, self.names if names is None else names)[0]
+
+
 def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
-    """A batch's trials without their frames, and their vectors (decision points, n, p)."""
+    """A batch's trials without their frames, and their vectors (windows, n, p)."""
     names = [name for each in candidates({}, joints=True, quick=True) for name in each.sets]
     with tempfile.TemporaryDirectory() as folder:
         write(replace(scenes.load(SCENE, count=COUNT), seed=seed), folder)
@@ -69,15 +97,13 @@ def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
 
 
 def realised(
-    drawn: DataSet, X: NDArray[np.float64], rows: NDArray[np.int64], labels: NDArray[np.str_]
+    drawn: DrawnSet, labels: NDArray[np.str_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What a data set promises, and what becomes of it.
+    """The promises of a data set, and the outcomes on the trials that were not drawn.
 
     Args:
         drawn: the data set.
-        X: (decision points, n, p) vectors of all trials.
-        rows: (m,) trials that were not drawn.
-        labels: (tasks, m) their labels.
+        labels: (tasks, trials) of the pool.
 
     Returns:
         (tasks, 1 + errors, 4) certified error, share wrong, promised and realised mean seconds; NaN
@@ -85,11 +111,8 @@ def realised(
         (tasks, names, 5) window, accuracy shown, its interval and the realised accuracy of each
         named point of the front.
     """
-    y = dict(zip(drawn.tasks, labels, strict=True))
-
-    def vectors(fitted: Fitted) -> NDArray[np.float64]:
-        return X[:, rows[:, None], columns_of(fitted.dataset.names, drawn.names, drawn.widths())]
-
+    others = np.setdiff1d(np.arange(labels.shape[1]), drawn.rows)
+    y = dict(zip(drawn.tasks, labels[:, others], strict=True))
     made = {
         window: fit(drawn, window_s=window, decision_points_s=(), quick=True, jobs=1)
         for window in POINTS_S[:-1]
@@ -99,7 +122,7 @@ def realised(
     assert model is not None
     seconds = np.array(POINTS_S)
     outcomes = np.full((len(y), 1 + len(ERRORS), 4), np.nan)
-    _, _, courses = model.judged(vectors(fitted), y)
+    _, _, courses = model.judged(drawn.vectors(POINTS_S, others, fitted.dataset.names), y)
     for task, out in zip(y, outcomes, strict=True):
         stopping = model.stopping_[task]
         for place, error in zip(out, (stopping.smallest_error, *ERRORS), strict=True):
@@ -108,8 +131,9 @@ def realised(
                 at, wrong = courses[task].under(rule)
                 place[:] = error, wrong.mean(), rule.mean_s, seconds[at].mean()
     right: dict[float, dict[str, float]] = {}
-    for i, (window, other) in enumerate(sorted(made.items())):
-        answered = answers([other.classifier], vectors(other)[i : i + 1])
+    for window, other in made.items():
+        vectors = drawn.vectors([window], others, other.dataset.names)
+        answered = answers([other.classifier], vectors)
         right[window] = {task: float((answered[task][0][0] == y[task]).mean()) for task in y}
     points = {window: made[window].chosen for window in POINTS_S}
     shown = np.empty((len(y), len(NAMES), 5))
@@ -132,22 +156,29 @@ def run(arguments: argparse.Namespace) -> int:
     seeds = np.random.SeedSequence(arguments.seed).generate_state(SEEDS).tolist()
     batches = work((delayed(simulated)(seed) for seed in seeds), SEEDS, "batches of trials")
     trials = np.array([trial for dataset, _ in batches for trial in dataset.trials], dtype=object)
-    X, pool, sets = np.concatenate([x for _, x in batches], axis=1), batches[0][0], arguments.sets
-    y = np.array([[trial.labels[task] for trial in trials] for task in pool.tasks])
+    X, first, sets = np.concatenate([x for _, x in batches], axis=1), batches[0][0], arguments.sets
+    y = np.array([[trial.labels[task] for trial in trials] for task in first.tasks])
     rng = np.random.default_rng(arguments.seed)
     n = len(trials)
+    ends = np.cumsum(first.widths())
+    columns = dict(zip(first.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
 
-    def judged(drawn: NDArray[np.int64]) -> Any:
-        left = np.setdiff1d(np.arange(n), drawn)
-        return delayed(realised)(replace(pool, trials=tuple(trials[drawn])), X, left, y[:, left])
+    def judged(rows: NDArray[np.int64]) -> Any:
+        own = {**vars(first), "trials": tuple(trials[rows])}
+        return delayed(realised)(DrawnSet(**own, rows=rows, pool=X, columns=columns), y)
 
     draws = (np.sort(rng.permutation(n)[: arguments.trials]) for _ in range(sets))
     outcomes, shown = map(np.array, zip(*work(map(judged, draws), sets, "data sets"), strict=True))
-    failed = 0
+    return int(report(first.tasks, outcomes, shown) > 0)
+
+
+def report(tasks: Sequence[str], outcomes: NDArray[np.float64], shown: NDArray[np.float64]) -> int:
+    """Print what `realised` gave for each data set; how many promises are broken too often."""
+    sets, failed = len(outcomes), 0
     print("| task | asked | certified | of all sets, above | wrong | promised | realised | late |")
     print("|---|---|---|---|---|---|---|---|")
     names = ("the smallest", *(f"{error:g}" for error in ERRORS))
-    for task, of_task in zip(pool.tasks, outcomes.swapaxes(0, 1), strict=True):
+    for task, of_task in zip(tasks, outcomes.swapaxes(0, 1), strict=True):
         for asked, rows in zip(names, of_task.swapaxes(0, 1), strict=True):
             able = rows[~np.isnan(rows[:, 1])]
             above = int((able[:, 1] > able[:, 0]).sum())
@@ -161,14 +192,14 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"| {task} | {asked} | {certified} | {means} | {late} |")
     print("\n| task | front | window, s | shown | realised | below the interval | above |")
     print("|---|---|---|---|---|---|---|")
-    for task, of_task in zip(pool.tasks, shown.swapaxes(0, 1), strict=True):
+    for task, of_task in zip(tasks, shown.swapaxes(0, 1), strict=True):
         for name, rows in zip(NAMES, of_task.swapaxes(0, 1), strict=True):
             window, accuracy, _, _, realised_accuracy = rows.mean(axis=0)
             below, above = (rows[:, 4] < rows[:, 2]).sum(), (rows[:, 4] > rows[:, 3]).sum()
             failed += below + above > binom.ppf(0.99, sets, OUTSIDE)
             shares = f"{accuracy:.1%} | {realised_accuracy:.1%} | {below} | {above}"
             print(f"| {task} | {name} | {window:.2f} | {shares} |")
-    return int(failed > 0)
+    return failed
 
 
 def main(argv: Sequence[str] | None = None) -> int:

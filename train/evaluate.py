@@ -230,12 +230,13 @@ def _answers(
                     spectrum, new = Spectrum(known), (part[test] - mean) * gain
                     first = (np.cumsum(counts) - counts)[counts > 0]
                 pca = grid.projection == "pca"
-                shared = _neighbours(spectrum, new, None, grid, first) if pca else None
+                near = None
                 for task in tasks:
-                    labels, near = classes[task], shared
-                    if near is None:
-                        targets = np.stack([classes[t][rows] for t in grid.targets or (task,)])
-                        near = _neighbours(spectrum, new, targets, grid, first)
+                    labels = classes[task]
+                    if near is None or not (pca or grid.targets):
+                        targets = [classes[t][rows] for t in grid.targets or (task,)]
+                        separated = None if pca else np.stack(targets)
+                        near = _neighbours(spectrum, new, separated, grid, first)
                     right = votes_right(near, labels[members], labels[test])
                     places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
                     # One row for each candidate: for each projection, each k.
