@@ -194,7 +194,7 @@ def bags() -> list[bytes]:
 FRAME_FILES = [
     b"one/a.csv\n1,2,3\n4,5,6\n",
     b"labels.csv\ntrial,object\none,cup\n",
-    b'skin.json\n{"rate_hz": 100, "threshold_counts": 50, "wraps": false}',
+    b'skin.json\n{"threshold_counts": 50, "wraps": false}',
 ]
 """Files of a folder of CSV recordings: the first line is the name."""
 
@@ -212,7 +212,7 @@ def read_frames(path: Path) -> None:
     for data in (*FRAME_FILES, b"one/b.csv\n1,2,3\n4,5,6\n", path.read_bytes()):
         name, contents = data.split(b"\n", 1)
         (folder / name.decode("ascii")).write_bytes(contents)
-    importing("csv_frames")(folder)
+    importing("csv", "--frames", "--rate", "100")(folder)
 
 
 TABLES = [

@@ -20,8 +20,8 @@ from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, taxels
 from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
+from train.__main__ import parser
 from train.crossval import neighbours
-from train.importers.csv_frames import trials
 from train.pipeline import Choice, ContactClassifier
 from train.projection import Projection
 
@@ -80,7 +80,9 @@ def csv_frames(bad: float) -> None:
         trial.mkdir()
         for name in ("0.0", f"{bad}"):
             (trial / f"{name}.csv").write_text("1,2\n3,4\n")
-        list(trials(Path(folder)))
+        words = ["import", "csv", folder, "--frames", "--out", folder]
+        options = parser().parse_args(words)
+        list(options.importer.trials(Path(folder), None, options))
 
 
 ENTRIES: dict[str, Callable[[float], object]] = {

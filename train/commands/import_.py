@@ -54,19 +54,26 @@ def run(arguments: argparse.Namespace) -> int:
     importer = arguments.importer
     own = (arguments,) if hasattr(importer, "add_options") else ()
     trials = importer.trials(arguments.file, arm, *own)
-    count, without_threshold = 0, []
+    without_threshold: list[tuple[Path, Recording]] = []
+    paths: set[Path] = set()
     for name, recording in bar(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
             raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
         path = arguments.out / f"{name}.npz"
+        if not name or path.parent != arguments.out:
+            raise InputError(
+                f"{arguments.file}: the trial {name!r} needs a name that a file can have"
+            )
+        if path in paths:
+            raise InputError(f"{arguments.file}: two trials are named {name}; rename one of them")
+        paths.add(path)
         recording = zeroed(recording) if arguments.zero else recording
         if "threshold_counts" in recording.meta["skin"]:
             save(path, recording)
         else:
             without_threshold.append((path, recording))
-        count += 1
     report = set_thresholds(without_threshold) if without_threshold else ""
-    print(f"recordings written to {arguments.out}: {count}")
+    print(f"recordings written to {arguments.out}: {len(paths)}")
     if report:
         print(report)
     return 0

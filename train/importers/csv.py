@@ -6,6 +6,7 @@ name without the number at the end; `labels.csv`, with the column `trial` and on
 replaces it. A single file with a column `trial` holds all trials. It has such rows, or the columns
 `taxel` and `value` with a row for each value; its columns of text are labels. COLS are names or
 numbers from 1, such as `1-9,force`. `skin.json` in the folder is the `skin` of the recordings.
+With `--frames`, a folder holds a folder for each trial, with a file for each frame: a line a row.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import argparse
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,16 +26,18 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 
 from edge.commands.options import within
-from edge.config import read_json, shown
+from edge.config import ConfigTable, read_json, shown
 from edge.errors import InputError
 from edge.files import parsing, read_bytes
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers.csv_frames import FASTEST_HZ, labels_beside
 
 LABELS = "labels.csv"
 SUFFIXES = (".csv", ".tsv", ".txt", ".npy", ".mat")
+EMPTY = "holds no values; leave it out or save it again"
 LARGEST_BYTES, LARGEST = 1 << 28, 1e100
+FASTEST_HZ = 1e6
+"""A higher frame rate must be a mistake."""
 TIMES = ("t", "time", "time_s", "timestamp", "seconds")
 """Names of a column of times."""
 START = 3
@@ -46,6 +49,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     rate, scale = within(float, 1e-3, FASTEST_HZ), within(float, 1e-12, 1e12)
     for name, form, text in (
         ("--rate", {"type": rate, "metavar": "HZ"}, "frames a second, if no column is the time"),
+        ("--frames", {"action": "store_true"}, "a folder is a trial, and a file in it a frame, "
+         "named by its time in seconds, or by its number if --rate is given"),
         ("--time", {"metavar": "COL"}, f"the time in seconds (default: {', '.join(TIMES)})"),
         ("--taxels", {"metavar": "COLS"}, "the taxels (default: all other columns)"),
         ("--joints", {"metavar": "COLS"}, "joint angles in radians"),
@@ -71,20 +76,26 @@ class _Table:
     def columns(self, wanted: str) -> list[int]:
         """The places of a list of names and numbers; `q` also stands for q.1, q.2, ..."""
         places: list[int] = []
-        for part in wanted.split(","):
-            named = [i for i, name in enumerate(self.names) if name.split(".")[0] == part]
-            if not named and (ends := re.fullmatch(r"(\d+)(?:-(\d+))?", part)):
+        for term in wanted.split(","):
+            named = [i for i, name in enumerate(self.names) if name.split(".")[0] == term]
+            if not named and (ends := re.fullmatch(r"(\d+)(?:-(\d+))?", term)):
                 named = list(range(len(self.names)))[int(ends[1]) - 1 : int(ends[2] or ends[1])]
             if not named:
-                raise InputError(f"{self.path}: has no column {part}; it has {shown(self.names)}")
+                raise InputError(f"{self.path}: has no column {term}; it has {shown(self.names)}")
             places += named
         return places
 
     def numbers(self, places: list[int]) -> NDArray[np.float64]:
         """(n, places) values; NaN in place of those that are beyond measure."""
-        with parsing(str(self.path), "a table of numbers"):
-            values = self.values[:, places].astype(np.float64)
-            return np.where(np.abs(values) < LARGEST, values, np.nan)
+        texts = self.values[:, places]
+        try:
+            values = texts.astype(np.float64)
+        except ValueError:
+            cells = zip(np.tile(places, len(texts)).tolist(), texts.ravel().tolist(), strict=True)
+            place, text = next(cell for cell in cells if not _is_number(cell[1]))
+            problem = f"{shown(text)} in column {self.names[place]} is no number"
+            raise InputError(f"{self.path}: {problem}") from None
+        return np.where(np.abs(values) < LARGEST, values, np.nan)
 
     def time(self, named: str | None = None) -> list[int]:
         """The column of times, or none."""
@@ -101,26 +112,24 @@ def trials(
         InputError: a file cannot be read, a column is missing, or values are no counts.
     """
     folder = path if path.is_dir() else path.parent
-    files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES)
-    files = [p for p in files if p.name != LABELS] if path.is_dir() else [path]
-    if not files:
-        raise InputError(f"{path}: holds no file {', '.join(SUFFIXES)}; give a folder of trials")
-    beside = labels_beside(folder / LABELS)
-    skin = dict(read_json(folder / "skin.json")) if (folder / "skin.json").is_file() else {}
-    tables: list[tuple[str, dict[str, str], _Table]] = []
-    for file in files:
-        with parsing(str(file), "a table", "; save it as text"):
-            tables += _trials_in(_table(file), folder, options.task)
-    parts = [(*part, *_measured(part[2], options)) for part in tables]
-    first, width = parts[0][2].path, parts[0][4].shape[1]
-    for _, _, table, _, values, _ in parts:
+    read = _framed if options.frames else _tables
+    named = list(read(path, folder, options))
+    if not named:
+        kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
+        raise InputError(f"{path}: holds no {kind}; give a folder of trials")
+    beside = _labels(folder / LABELS, [name for name, _, _ in named])
+    file = folder / "skin.json"
+    skin = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
+    measured = [_measured(table, options) for _, _, table in named]
+    first, width = named[0][2].path, measured[0][1].shape[1]
+    for (_, _, table), (_, values, _) in zip(named, measured, strict=True):
         if values.shape[1] != width:
             few = f"{values.shape[1]} taxels, and {first} {width}"
             raise InputError(f"{table.path}: has {few}; name them by --taxels")
-    starts = [np.median(values[:START], axis=0) for *_, values, _ in parts]
+    starts = [np.median(values[:START], axis=0) for _, values, _ in measured]
     rest = max(starts, key=np.nansum) if options.falls else 0.0
-    for name, labels, table, t, values, joints in parts:
-        shape = _shape(options.shape, table, skin, values.shape[1])
+    for (name, labels, table), (t, values, joints) in zip(named, measured, strict=True):
+        shape = _shape(options.shape, table, skin, width)
         counts = (np.clip(rest - values, 0.0, None) if options.falls else values) * options.scale
         valid = np.isfinite(counts)
         counts[~valid] = 0.0
@@ -131,36 +140,133 @@ def trials(
                 "from 0 to 65535); see --falls, --scale and --taxels"
             )
         meta: dict[str, Any] = {"labels": {**labels, **beside.get(name, {})}, "source": path.name}
-        meta |= {"skin": {**skin, "rows": shape[0], "cols": shape[1]}, "trial": name}
+        meta |= {"skin": {**skin.raw, "rows": shape[0], "cols": shape[1]}, "trial": name}
         if joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
         seen = None if valid.all() else valid.reshape(-1, *shape)
         yield name, Recording(t - t[0], frames.reshape(-1, *shape), joints, seen, meta)
 
 
+Named = Iterator[tuple[str, dict[str, str], _Table]]
+"""The name, labels and values of each trial."""
+
+
+def _tables(path: Path, folder: Path, options: argparse.Namespace) -> Named:
+    """The trials of the file, or of the files in the folder."""
+    for file in _files(folder.rglob("*")) if path.is_dir() else [path]:
+        table = _table(file)
+        if "trial" in table.names:
+            yield from _trials_in(table)
+        else:
+            yield *_called(file.relative_to(folder).with_suffix(""), options.task), table
+
+
+def _framed(path: Path, folder: Path, options: argparse.Namespace) -> Named:
+    """The trials of a folder that has a folder for each, with a file for each frame."""
+    for inside in sorted(place for place in path.rglob("*") if place.is_dir()):
+        if files := _files(inside.glob("*")):
+            table = _stacked(inside, files, timed=options.rate is None)
+            yield *_called(inside.relative_to(folder), options.task), table
+
+
+def _files(paths: Iterable[Path]) -> list[Path]:
+    """The tables among paths, in the order of their names."""
+    return sorted(p for p in paths if p.suffix.lower() in SUFFIXES and p.name != LABELS)
+
+
+def _called(place: Path, task: str) -> tuple[str, dict[str, str]]:
+    """The name and label of the trial at a place in the folder."""
+    own = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
+    return "_".join(place.parts), {task: place.parent.name or own}
+
+
+def _labels(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
+    """{trial: its labels} of a labels.csv; empty without one."""
+    if not path.is_file():
+        return {}
+    with parsing(str(path), "a table of labels"):
+        head, *rows = _rows(path, read_bytes(path))
+    if "trial" not in head or not any(row[head.index("trial")] in trials for row in rows):
+        raise InputError(f"{path}: needs a column trial with names such as {shown(trials)}")
+    return {
+        row[head.index("trial")]: {
+            task: label for task, label in zip(head, row, strict=True) if task != "trial" and label
+        }
+        for row in rows
+    }
+
+
 def _table(path: Path) -> _Table:
     """The table in a file."""
-    data, suffix = read_bytes(path, LARGEST_BYTES), path.suffix.lower()
-    if suffix in (".npy", ".mat"):
-        file = io.BytesIO(data)
-        stored = {"": np.load(file)} if suffix == ".npy" else loadmat(file)
-        arrays = {k: v for k, v in stored.items() if k[:1] != "_" and v.dtype.kind in "iuf"}
-        n, shape = len(max(arrays.values(), key=np.size)), ()
-        names: list[str] = []
-        blocks: list[NDArray[Any]] = []
-        for key, array in arrays.items():
-            shape = array.shape[1:] if array.ndim == 3 else shape
-            if array.size % n == 0:
-                blocks.append(array.reshape(n, -1))
-                wide = range(1, blocks[-1].shape[1] + 1)
-                names += [f"{key}.{i}".strip(".") for i in wide] if len(wide) > 1 else [key]
-        return _Table(path, names, np.hstack(blocks), shape)
-    lines = [line for line in data.decode("utf-8-sig").splitlines() if line.strip()]
-    marks = [mark for mark in "\t;," if mark in lines[0]]
-    rows = list(csv.reader(lines, delimiter=marks[0])) if marks else [x.split() for x in lines]
+    with parsing(str(path), "a table", "; save it as text"):
+        data = read_bytes(path, LARGEST_BYTES)
+        if path.suffix.lower() in (".npy", ".mat"):
+            return _of_arrays(path, data)
+        rows = _rows(path, data)
     if all(map(_is_number, rows[0])):
         return _Table(path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows))
+    if len(rows) == 1:
+        raise InputError(f"{path}: {EMPTY}")
     return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:]))
+
+
+def _rows(path: Path, data: bytes) -> list[list[str]]:
+    """The cells of a text, row by row; tabs, semicolons, commas or blanks are between them."""
+    lines = [line for line in data.decode("utf-8-sig").splitlines() if line.strip()]
+    marks = [mark for mark in "\t;," if mark in lines[0]] if lines else []
+    rows = list(csv.reader(lines, delimiter=marks[0])) if marks else [x.split() for x in lines]
+    if not rows:
+        raise InputError(f"{path}: {EMPTY}")
+    width = len(rows[0])
+    for number, row in enumerate(rows, 1):
+        if len(row) != width:
+            values = f"{len(row)} value{'s' * (len(row) != 1)}"
+            raise InputError(f"{path}: row {number} has {values}, and the first row {width}")
+    return rows
+
+
+def _of_arrays(path: Path, data: bytes) -> _Table:
+    """The table of the arrays in an .npy or .mat file, a row for each entry of their first axis."""
+    file = io.BytesIO(data)
+    stored = {"": np.load(file)} if path.suffix.lower() == ".npy" else loadmat(file)
+    arrays = {
+        key: np.atleast_1d(array)
+        for key, array in stored.items()
+        if isinstance(array, np.ndarray) and array.dtype.kind in "iuf" and array.size
+    }
+    if not arrays:
+        raise InputError(f"{path}: {EMPTY}")
+    n, shape = len(max(arrays.values(), key=np.size)), ()
+    names: list[str] = []
+    blocks: list[NDArray[Any]] = []
+    for key, array in arrays.items():
+        shape = array.shape[1:] if array.ndim == 3 else shape
+        if array.size % n == 0:
+            blocks.append(array.reshape(n, -1))
+            wide = range(1, blocks[-1].shape[1] + 1)
+            names += [f"{key}.{i}".strip(".") for i in wide] if len(wide) > 1 else [key]
+    return _Table(path, names, np.hstack(blocks), shape)
+
+
+def _stacked(folder: Path, files: list[Path], *, timed: bool) -> _Table:
+    """The frames of a trial, a row for each; `timed` if their files are named by their times."""
+    tables = [_table(file) for file in files]
+    frames = [table.numbers(list(range(len(table.names)))) for table in tables]
+    shape = frames[0].shape
+    for file, frame in zip(files, frames, strict=True):
+        if frame.shape != shape:
+            sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
+            raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
+    values = np.array(frames).reshape(len(files), -1)
+    names = [str(i + 1) for i in range(values.shape[1])]
+    if not timed:
+        return _Table(folder, names, values, shape)
+    with parsing(str(folder), "a folder of files that are named by their times", "; give --rate"):
+        t = np.array([float(file.stem) for file in files])
+        if not np.isfinite(t).all():
+            raise ValueError("a time is not finite")
+    order = np.argsort(t, kind="stable")
+    return _Table(folder, ["t", *names], np.column_stack([t, values])[order], shape)
 
 
 def _is_number(text: str) -> bool:
@@ -170,24 +276,17 @@ def _is_number(text: str) -> bool:
     return False
 
 
-def _trials_in(
-    table: _Table, folder: Path, task: str
-) -> Iterator[tuple[str, dict[str, str], _Table]]:
-    """Name, labels and rows of each trial in a table."""
+def _trials_in(table: _Table) -> Named:
+    """The trials of a long table."""
     names, values = table.names, table.values
-    if "trial" not in names:
-        inside = table.path.relative_to(folder).with_suffix("")
-        own = re.sub(r"[\s_.-]*\d+$", "", inside.name) or inside.name
-        yield "_".join(inside.parts), {task: inside.parent.name or own}, table
-        return
     trial = values[:, names.index("trial")]
     texts = [i for i, name in enumerate(names) if not _is_number(values[0, i]) and name != "trial"]
     kept = [i for i, name in enumerate(names) if name != "trial" and i not in texts]
     for each in dict.fromkeys(trial.tolist()):
         rows = values[trial == each]
-        part = _Table(table.path, [names[i] for i in kept], rows[:, kept])
+        own = _Table(table.path, [names[i] for i in kept], rows[:, kept])
         labels = {names[i]: str(rows[0, i]) for i in texts}
-        yield each, labels, _pivoted(part) if "taxel" in names else part
+        yield each, labels, _pivoted(own) if "taxel" in names else own
 
 
 def _pivoted(table: _Table) -> _Table:
@@ -218,12 +317,14 @@ def _measured(
     return t, values, joints if angles else None
 
 
-def _shape(given: str | None, table: _Table, skin: dict[str, Any], taxels: int) -> tuple[int, ...]:
+def _shape(given: str | None, table: _Table, skin: ConfigTable, taxels: int) -> tuple[int, ...]:
     """Rows and columns of the skin."""
-    shape = table.shape or (skin.get("rows", 1), skin.get("cols", taxels))
+    shape = table.shape or (skin.whole("rows", 1), skin.whole("cols", taxels))
     if given is not None:
-        with parsing(f"--shape {given}", "ROWSxCOLS, such as 16x24"):
-            shape = tuple(map(int, given.split("x", 1)))
+        sizes = re.fullmatch(r"(\d+)x(\d+)", given)
+        if sizes is None:
+            raise InputError(f"--shape must be ROWSxCOLS, such as 16x24, not {given}")
+        shape = int(sizes[1]), int(sizes[2])
     if len(shape) != 2 or shape[0] * shape[1] != taxels:
         size = " x ".join(map(str, shape))
         raise InputError(f"{table.path}: {taxels} columns are not {size} taxels; give --shape")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from edge.recording import load
-from tests.train.importers.test_log_importers import write_frames
+from tests.train.importers.test_csv import write_frames
 from train.__main__ import main
 from train.commands.import_ import zeroed
 
@@ -26,7 +26,7 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     touches = [make_touch(seed=seed, seconds=0.4, arm=False) for seed in range(2)]
     for i, one in enumerate(touches):
         write_frames(tmp_path / "csv" / f"trial{i}", one.t, np.maximum(one.frames, noise))
-    given = ["import", "csv_frames", str(tmp_path / "csv"), "--out"]
+    given = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*given, str(tmp_path / "out")]) == 0
     assert "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have a" in (
         capsys.readouterr().out

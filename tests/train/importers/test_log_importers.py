@@ -236,42 +236,6 @@ def test_an_mcap_file_of_ros_or_json_messages(tmp_path, cdr):
     assert differences(imported(tmp_path, "mcap", path)) == []
 
 
-def write_frames(folder, times, frames, names="{1:.3f}"):
-    """A trial: CSV files that are named by their times, or by their numbers."""
-    folder.mkdir(parents=True)
-    for i, (t, frame) in enumerate(zip(times, frames, strict=True)):
-        np.savetxt(folder / f"{names.format(i, t)}.csv", frame, fmt="%d", delimiter=",")
-
-
-def write_csv(folder, **options):
-    for trial in ("one", "two"):
-        write_frames(folder / trial, T, FRAMES, **options)
-    (folder / "labels.csv").write_text("trial,object,mobility\none,cup,fixed\ntwo,can,\n")
-    return folder
-
-
-@pytest.mark.parametrize("options", [{}, {"names": "frame-{0:04}"}])
-def test_a_folder_of_csv_frames(tmp_path, options):
-    folder = write_csv(tmp_path / "csv", **options)
-    skin = {"threshold_counts": 50} | ({"rate_hz": 100} if options else {})
-    (folder / "skin.json").write_text(json.dumps(skin))
-    assert main(["import", "csv_frames", str(folder), "--out", str(tmp_path / "out")]) == 0
-    one, two = (load(tmp_path / "out" / f"{trial}.npz") for trial in ("one", "two"))
-    assert differences(one, joints=False) == []
-    assert one.labels == {"object": "cup", "mobility": "fixed"}
-    assert two.labels == {"object": "can"}
-    assert one.layout.threshold_counts == 50
-
-
-def csv_with(frame="1,2\n", **options):
-    def make(tmp_path):
-        folder = write_csv(tmp_path / "csv", **options)
-        (folder / "one" / "100.050.csv").write_text(frame)
-        return "csv_frames", folder
-
-    return make
-
-
 def cut_mcap(tmp_path):
     path = write_mcap(tmp_path / "grasp.mcap", cdr=False)
     path.write_bytes(path.read_bytes()[:400])
@@ -292,10 +256,6 @@ def not_a_bag(tmp_path):
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (csv_with(names="frame-{}"), "not a folder of files that are named by their times: "),
-        (csv_with("1,2\n3,x\n"), "not a frame of counts: could not convert string 'x'"),
-        (csv_with("1,2\n3,0.5\n"), "counts are whole numbers from 0 to 65535"),
-        (csv_with("1,2\n3,4\n"), "is (2, 2) taxels"),
         (cut_mcap, "not a complete MCAP file"),
         (empty_bag, "holds no frames"),
         (lambda folder: ("rosbag", folder / "no"), "no: no such file or folder"),
