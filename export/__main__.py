@@ -16,11 +16,12 @@ from edge.model.model import Model
 from edge.touch import measures
 from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
-from export.api import measure, report, save
+from export.api import measure, save
 from train.choose import LEAVE_OUT, TRIAL
 from train.dataset import read
 from train.fitting import MOST_TRIALS, fit
 from train.projection import KINDS
+from train.report.summary import summary
 from train.scaling import SCALINGS
 from train.stopping import FEWEST
 from train.tradeoff import front as fronts
@@ -133,10 +134,10 @@ def run(arguments: argparse.Namespace) -> int:
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name)
     prices = measure(fitted)
-    print(report(fitted, prices), file=sys.stderr)
+    print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     if arguments.report:
-        from export.report import write  # loads matplotlib
+        from train.report.model import write  # loads matplotlib
 
         print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0

@@ -31,7 +31,7 @@ from edge.recording import load_arrays
 ROUNDS, CALLS = 7, 200
 
 
-def _single(tensor: onnx.TensorProto) -> None:
+def _round_to_float32(tensor: onnx.TensorProto) -> None:
     """Turn a tensor of float64 into one of float32; a limit beyond its range becomes infinite."""
     if tensor.data_type == TensorProto.DOUBLE:
         with np.errstate(over="ignore"):
@@ -45,7 +45,7 @@ def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
     copy.CopyFrom(model)
     graph = copy.graph
     for tensor in graph.initializer:
-        _single(tensor)
+        _round_to_float32(tensor)
     for value in (*graph.input, *graph.output, *graph.value_info):
         if value.type.tensor_type.elem_type == TensorProto.DOUBLE:
             value.type.tensor_type.elem_type = TensorProto.FLOAT
@@ -56,7 +56,7 @@ def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
             if node.op_type == "Cast" and attribute.i == TensorProto.DOUBLE:
                 attribute.i = TensorProto.FLOAT
             elif attribute.HasField("t"):
-                _single(attribute.t)
+                _round_to_float32(attribute.t)
         if node.op_type == "Cast" and node.input[0] in stored:
             # Matrices are stored in float32 already; nothing is left to convert.
             plain[node.output[0]] = node.input[0]
@@ -119,22 +119,23 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
         )
     vectors = vectors[np.isfinite(vectors).all(axis=1)]
     shipped = onnx.load(model)
-    single = in_float32(shipped)
+    in_single = in_float32(shipped)
     with tempfile.TemporaryDirectory() as folder:
         formats = {
             "whole numbers in float64 (as shipped)": (shipped, np.float64),
-            "float32": (single, np.float32),
-            "int8 matrices": (in_int8(single, Path(folder)), np.float32),
+            "float32": (in_single, np.float32),
+            "int8 matrices": (in_int8(in_single, Path(folder)), np.float32),
         }
-    found = [answers(graph, vectors.astype(dtype), tasks) for graph, dtype in formats.values()]
+    results = [answers(graph, vectors.astype(dtype), tasks) for graph, dtype in formats.values()]
+    shipped_labels, _ = results[0]
     return [
         {
             "format": name,
             "decision us": round(microseconds, 1),
             "size kB": round(graph.ByteSize() / 1e3, 1),
-            "other labels %": round(100 * float((labels != found[0][0]).mean()), 2),
+            "other labels %": round(100 * float((labels != shipped_labels).mean()), 2),
         }
-        for (name, (graph, _)), (labels, microseconds) in zip(formats.items(), found, strict=True)
+        for (name, (graph, _)), (labels, microseconds) in zip(formats.items(), results, strict=True)
     ]
 
 

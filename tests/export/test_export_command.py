@@ -10,13 +10,13 @@ from export.__main__ import main
 from tests.conftest import PAPER
 
 
-def test_the_report_says_what_was_chosen_among_and_what_was_chosen(recordings, tmp_path, capsys):
+def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     command = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1", "--quick"]
     assert main(command) == 0
     out = capsys.readouterr()
     lines = out.err.splitlines()
     rows = [line for line in lines if line.startswith(("paper ", "contact joints ", "moments "))]
-    assert [row[:22].split() for row in rows] == [
+    assert [row[:21].split() for row in rows] == [
         ["paper", "pca"],
         ["contact", "joints", "lda"],
         ["moments", "joints", "lda"],

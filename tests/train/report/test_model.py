@@ -9,8 +9,8 @@ import export
 import train
 from edge.model.model import Model
 from edge.recording import load, save
-from export import report
 from export.api import measure
+from train.report import model as report
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,11 @@
-"""The report of an export: what the model gets wrong, by which features, and what would help."""
+"""The report of a fitted model: what it confuses, by which features, and what would help."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from sklearn.metrics import classification_report
 
 from edge.model.explanation import Explanation, Near, Space, explain
 from edge.model.model import Model
-from export.api import names, warnings
 from train.choose import TRIAL
 from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
@@ -25,10 +25,11 @@ from train.report import page
 from train.report.figures import confusion, lines, picture
 from train.report.score import interval, percent
 from train.report.section import Figure, Row, Section, Table, counted
+from train.report.summary import Prices, candidates, names, warnings
 from train.report.work import Workers
 
-PARTS = 4
-"""The learning curve is fitted to so many parts of the trials, one after another."""
+QUARTERS = 4
+"""The learning curve's fits take this many parts of the trials, one after another."""
 EXPLAINED = 60
 """Trials over which the features' pulls are averaged."""
 UNFELT = "(no contact)"
@@ -41,8 +42,8 @@ class Answers:
     Attributes:
         classes: its labels, sorted.
         truth: (n,) labels; empty where a trial has none, or was never left out.
-        said: (parts, n) answers of fits to a part of the other trials, the last to all.
-        explained: {trial: why the last answered so}, of those told wrong and some others.
+        said: (quarters, n) answers of fits to a part of the other trials, the last to all.
+        explained: {trial: why the last fit answered so}, of the wrong answers and some others.
     """
 
     classes: list[str]
@@ -52,63 +53,66 @@ class Answers:
 
     @property
     def wrong(self) -> list[int]:
-        """The trials that are told wrong."""
+        """The trials with a wrong answer."""
         return [int(i) for i in np.flatnonzero(self.said[-1] != self.truth)]
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What the sections tell of: a fit, its answers {task: Answers}, its file, and its prices.
-
-    The prices are those of `export.api.measure`.
-    """
+    """The subject of the sections: a fit, its answers {task: Answers}, its file, and its prices."""
 
     fitted: Fitted
     answers: dict[str, Answers]
     model: Model
-    prices: Sequence[tuple[float, float]]
+    prices: Prices
 
 
 def _left_out(
     X: NDArray[np.float64],
     y: Labels,
-    task: str,
-    choice: Choice,
     features: Sequence[str],
     widths: Sequence[int],
-    test: NDArray[np.int64],
     own: NDArray[np.bool_] | None,
+    task: str,
+    choice: Choice,
+    test: NDArray[np.int64],
 ) -> tuple[list[NDArray[np.str_]], dict[int, Explanation]]:
-    """[part] (test,) answers, and explanations of the wrong ones and of some others."""
+    """[quarter] (test,) answers, and explanations of the wrong ones and of some others."""
     classes, index = np.unique(y[task], return_inverse=True)
     counting = choice.counts(y[task], own) > 0
     counting[test] = False
     others = np.flatnonzero(counting)
-    part_of, said = stratified_folds(y[task][others], PARTS), []
-    for part in range(PARTS):
-        train = others[part_of <= part]
-        fewer = replace(choice, k=min(choice.k, len(train)))
-        model = ContactClassifier({task: fewer}, features, widths)
-        owned = None if own is None else own[train]
-        model.fit(X[train], {name: labels[train] for name, labels in y.items()}, owned)
+    quarter_of, said = stratified_folds(y[task][others], QUARTERS), []
+    for quarter in range(QUARTERS):
+        train = others[quarter_of <= quarter]
+        model = ContactClassifier(
+            {task: replace(choice, k=min(choice.k, len(train)))}, features, widths
+        ).fit(
+            X[train],
+            {name: labels[train] for name, labels in y.items()},
+            None if own is None else own[train],
+        )
         rows = model.neighbours(task, X[test])[1]
         said.append(classes[vote(index[train][rows])])
     key, c = model.spaces_[task], model.components_[task]
-    p, known = model.projections_[key], model.rows_[key][:, :c]
-    weights = p.weights_[:, :c]
-    space = Space(model.columns_[key], p.mean_, p.gain_, weights, known, index[train])
+    p = model.projections_[key]
+    space = Space(
+        model.columns_[key], p.mean_, p.gain_, p.weights_[:, :c], model.rows_[key][:, :c],
+        index[train],
+    )  # fmt: skip
 
     def renumbered(near: Near) -> Near:
         return near._replace(row=int(train[near.row]))
 
     explained = {}
-    for trial, near, answer in zip(test.tolist(), rows.tolist(), said[-1], strict=True):
+    for trial, voters, answer in zip(test.tolist(), rows.tolist(), said[-1], strict=True):
         if answer != y[task][trial] or trial % max(len(X) // EXPLAINED, 1) == 0:
             label, truth = int(np.searchsorted(classes, answer)), int(index[trial])
-            why = explain(space, X[trial], near, label, features, widths, truth)
-            voters, rival = tuple(map(renumbered, why.voters)), why.rival
-            rival = None if rival is None else renumbered(rival)
-            explained[trial] = why._replace(voters=voters, rival=rival)
+            why = explain(space, X[trial], voters, label, features, widths, truth)
+            explained[trial] = why._replace(
+                voters=tuple(map(renumbered, why.voters)),
+                rival=None if why.rival is None else renumbered(why.rival),
+            )
     return said, explained
 
 
@@ -116,39 +120,35 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     """{task: the answers that its nested accuracy counts}."""
     choices = [choice for chosen in fitted.chosen.values() for choice in chosen.by_fold]
     dataset = fitted.measured.of([name for choice in choices for name in choice.features])
-    X = dataset.features(fitted.window_s, fitted.samples)
-    form = dataset.names, dataset.widths(fitted.samples)
     tasks = {*fitted.chosen, *(target for choice in choices for target in choice.targets)}
     y = {task: dataset.labels(task) for task in tasks}
-    tested = {t: (chosen.folds >= 0) & (y[t] != "") for t, chosen in fitted.chosen.items()}
-    folds = {t: np.where(tested[t], chosen.folds, -1) for t, chosen in fitted.chosen.items()}
-    cases = [
-        (X, y, task, choice, *form, np.flatnonzero(folds[task] == fold), dataset.own)
-        for task, chosen in fitted.chosen.items()
-        for fold, choice in enumerate(chosen.by_fold)
-        if (folds[task] == fold).any()
-    ]
-    answers = {}
-    for task in fitted.chosen:
-        truth = np.where(tested[task], y[task], "")
-        answers[task] = Answers(np.unique(y[task]).tolist(), truth, np.tile(truth, (PARTS, 1)), {})
-    results = Workers(jobs, progress=False).map("report", _left_out, cases)
-    for (_, _, task, *_, test, _), (said, explained) in zip(cases, results, strict=True):
+    answers, cases = {}, []
+    for task, chosen in fitted.chosen.items():
+        tested = (chosen.folds >= 0) & (y[task] != "")
+        truth = np.where(tested, y[task], "")
+        said = np.tile(truth, (QUARTERS, 1))
+        answers[task] = Answers(np.unique(y[task]).tolist(), truth, said, {})
+        for fold, choice in enumerate(chosen.by_fold):
+            test = np.flatnonzero(tested & (chosen.folds == fold))
+            if test.size:
+                cases.append((task, choice, test))
+    X, widths = dataset.features(fitted.window_s, fitted.samples), dataset.widths(fitted.samples)
+    left_out = partial(_left_out, X, y, dataset.names, widths, dataset.own)
+    results = Workers(jobs, progress=False).map("report", left_out, cases)
+    for (task, _, test), (said, explained) in zip(cases, results, strict=True):
         answers[task].said[:, test] = said
         answers[task].explained.update(explained)
     return answers
 
 
-def write(
-    out: Path, fitted: Fitted, model: Model, prices: Sequence[tuple[float, float]], jobs: int = 1
-) -> Path:
+def write(out: Path, fitted: Fitted, model: Model, prices: Prices, jobs: int = 1) -> Path:
     """Write report.html with its CSV and PNG files into a folder; the page's path.
 
     Args:
         out: the folder.
         fitted: the result of `train.fit`.
         model: the file that was made of it.
-        prices: of the candidates, by `export.api.measure`.
+        prices: of the candidates.
         jobs: processes.
     """
     exported = Exported(fitted, answers_of(fitted, jobs), model, prices)
@@ -166,28 +166,32 @@ def _accuracy(exported: Exported, task: str) -> Section:
     """A task's confusions, and the recall of its classes."""
     answer, chosen = exported.answers[task], exported.fitted.chosen[task]
     untouched = exported.fitted.dataset.untouched_labels(task)
-    unfelt = [label if label == NO_CONTACT else UNFELT for label in untouched]
     tested = answer.truth != ""
     truth = np.array([*answer.truth[tested], *untouched], dtype=str)
+    unfelt = [label if label == NO_CONTACT else UNFELT for label in untouched]
     said = np.array([*answer.said[-1][tested], *unfelt], dtype=str)
-    whose = "alone" if chosen.left_out == TRIAL else f"with its entire {chosen.left_out}"
-    missed = f", {counted(len(untouched), 'recording')} without a contact among them"
+    group = "alone" if chosen.left_out == TRIAL else f"with its entire {chosen.left_out}"
+    without = f", {counted(len(untouched), 'recording')} without a contact among them"
     text = (
         f"{100 * chosen.accuracy.accuracy:.1f} % (95 % interval {interval(chosen.accuracy)}) of "
-        f"{counted(len(truth), 'trial')} are told right by a model that was chosen and fitted "
-        f"without them{missed if untouched else ''}. Each was left out {whose}."
+        f"{counted(len(truth), 'trial')} are classified correctly by a model that was chosen and "
+        f"fitted without them{without if untouched else ''}. Each was left out {group}."
     )
     scores: Any = classification_report(truth, said, output_dict=True, zero_division=0.0)
     rows: list[Row] = []
     for label in sorted(set(truth)):
         own = truth == label
         hits = Result(int((said[own] == label).sum()), int(own.sum()))
-        shares = {
-            f"{name} %": percent(scores[label][key])
-            for name, key in (("precision", "precision"), ("F1", "f1-score"))
-        }
-        recall = {"recall %": percent(hits.accuracy), "95 % interval": interval(hits)}
-        rows.append({task: label, **recall, **shares, "trials": hits.total})
+        rows.append(
+            {
+                task: label,
+                "recall %": percent(hits.accuracy),
+                "95 % interval": interval(hits),
+                "precision %": percent(scores[label]["precision"]),
+                "F1 %": percent(scores[label]["f1-score"]),
+                "trials": hits.total,
+            }
+        )
     return Section(
         f"How often it is right: {task}",
         [text],
@@ -202,7 +206,7 @@ def _file(task: str) -> str:
 
 
 def _wrong(exported: Exported) -> Section:
-    """The trials told wrong, and a picture of one."""
+    """The wrong answers, and a picture of the first."""
     figures: list[Figure] = []
     fitted, rows = exported.fitted, []
     trials = names(fitted.measured)[1]
@@ -224,17 +228,17 @@ def _wrong(exported: Exported) -> Section:
         if answer.wrong and not figures:
             figures.append(_picture(fitted, trials, task, answer))
     text = [
-        "Each of these trials was told wrong by a model that had not seen it. The last column "
-        "names the feature that tells most between the wrong answer and the nearest trial of the "
-        "right label. A wrong label or a touch that failed often stands out here. One is "
-        "drawn; `edge-classify explain` and `python -m train show` say the same of any recording."
+        "Each of these trials was classified wrongly by a model that had not seen it. The last "
+        "column names the feature that pulls most towards the wrong answer, away from the nearest "
+        "trial of the right label. A wrong label or a touch that failed often stands out here. One "
+        "is drawn; `edge-classify explain` and `python -m train show` explain any recording so."
     ]
-    tables = [Table("wrong", "Trials told wrong", rows)]
-    return Section("Trials told wrong", text if rows else ["None."], tables, figures)
+    table = Table("wrong", "Wrong answers", rows)
+    return Section("Wrong answers", text if rows else ["None."], [table], figures)
 
 
 def _picture(fitted: Fitted, trials: Sequence[str], task: str, answer: Answers) -> Figure:
-    """The first trial told wrong, over the trials that told it."""
+    """The first wrong answer: the touch over the trials that voted for it."""
     trial, measured = answer.wrong[0], fitted.measured
     why, said = answer.explained[trial], str(answer.said[-1][trial])
     near = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
@@ -265,8 +269,8 @@ def _features(exported: Exported) -> Section:
         rows.append({**row, "unit": "" if unit == "1" else unit, "values": widths[name]})
     text = [
         "A feature's pull is by how much it brings a touch nearer to the nearest trial of its "
-        "answer than to the nearest trial of another label. The table shows the features' parts "
-        f"of all pulls, as a mean over left-out trials: about {EXPLAINED}, and those told wrong."
+        "answer than to the nearest trial of another label. The table shows each feature's share "
+        f"of all pulls, as a mean over about {EXPLAINED} left-out trials and the wrong answers."
     ]
     table = Table("features", "Features of the model", rows, narrow=3)
     return Section("Features", text, [table])
@@ -275,16 +279,17 @@ def _features(exported: Exported) -> Section:
 def _learning(exported: Exported) -> Section:
     n = len(exported.fitted.dataset.trials)
     folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
-    sizes = [round(n * (1.0 - 1.0 / folds) * part / PARTS) for part in range(1, PARTS + 1)]
+    largest = n * (1.0 - 1.0 / folds)
+    sizes = [round(largest * quarter / QUARTERS) for quarter in range(1, QUARTERS + 1)]
     results = {}
     for task, answer in exported.answers.items():
         hits = (answer.said == answer.truth)[:, answer.truth != ""]
-        results[task] = [Result(int(part.sum()), part.size) for part in hits]
+        results[task] = [Result(int(quarter.sum()), quarter.size) for quarter in hits]
     rows: list[Row] = [
         {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}
         for i, size in enumerate(sizes)
     ]
-    half = PARTS // 2 - 1
+    half = QUARTERS // 2 - 1
     text = [
         f"{task}: twice the trials, {sizes[-1]} in place of {sizes[half]}, brought "
         f"{100 * (row[-1].accuracy - row[half].accuracy):+.1f} points."
@@ -304,24 +309,14 @@ def _learning(exported: Exported) -> Section:
 
 
 def _sizes(exported: Exported) -> Section:
-    rows: list[Row] = []
-    chosen = exported.fitted.chosen
-    for i, candidate in enumerate(exported.fitted.candidates):
-        own = {(grid.features, grid.projection) for grid in candidate.grids}
-        row: Row = {"features": candidate.name, "how": candidate.projection}
-        for task, settings in chosen.items():
-            star = "*" * ((settings.choice.features, settings.choice.projection) in own)
-            row[f"{task} %"] = f"{100 * settings.candidates[i].accuracy:.1f}{star}"
-        us, kilobytes = exported.prices[i]
-        rows.append({**row, "us a decision": round(us, 1), "kB": round(kilobytes, 1)})
     size = Path(exported.model.path).stat().st_size / 1024
     text = [
-        f"The model file has {size:.0f} kB. The times are those of features and decision together "
-        "on this machine; `edge-classify bench` measures a board's. * marks what was chosen for "
-        "the task: the smallest within one standard error of the best."
+        f"The model file has {size:.0f} kB. The accuracies are nested, with 95 % intervals. The "
+        "times are those of features and decision together on this machine; `edge-classify bench` "
+        "measures a board's. * marks the choice for a task: the smallest within one standard error "
+        "of the best."
     ]
-    table = Table("candidates", "Candidates", rows, ("us a decision",), narrow=3)
-    return Section("Sizes and times", text, [table])
+    return Section("Sizes and times", text, [candidates(exported.fitted, exported.prices)])
 
 
 SECTIONS: tuple[Callable[[Exported], Section], ...] = (_wrong, _features, _learning, _sizes)

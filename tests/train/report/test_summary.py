@@ -1,0 +1,113 @@
+"""The sentences that go with a model."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import train
+from edge.recording import load, save
+from train.pipeline import ContactClassifier
+from train.report.summary import (
+    LEAK,
+    coarseness,
+    posture_accuracy,
+    summary,
+    tied_across_labels,
+    warnings,
+)
+
+
+@pytest.fixture(scope="module")
+def fitted(recordings):
+    return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
+
+
+def test_a_row_a_candidate_says_what_it_gives_and_costs(fitted):
+    lines = summary(fitted, [(162.04, 31.46)] * len(fitted.candidates)).splitlines()
+    assert lines[0].split() == ["features", "how", *fitted.chosen, "us", "a", "decision", "kB"]
+    assert lines[1].startswith("paper     pca  ")
+    assert lines[1].split()[-2:] == ["162.0", "31.5"]
+    assert len(lines[0]) == len(lines[1])
+    assert lines[1].count("*") == len(fitted.chosen)
+    assert lines[2:4] == ["* chosen for the task", ""]
+
+
+def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
+    save(tmp_path / "still.npz", make_touch(seconds=0.0))
+    save(tmp_path / "odd.npz", make_touch(labels={"category": "soft-fixed"}))
+    paths = [str(recordings), str(tmp_path)]
+    fitted = train.fit(paths, features=["paper"], projection="pca", window_s=9.0, jobs=1)
+    text = "\n".join(warnings(fitted))
+    assert "warning: without a contact above 150 counts, and counted as wrong: " in text
+    assert "python -m train thresholds" in text
+    assert "recordings are left out for lack of a label for object: " in text
+    assert "the window of 9 s is longer than any recording goes on after its onset" in text
+
+
+def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings, tmp_path):
+    """The arm stood elsewhere for each object: its angles tell all without a touch."""
+    objects = sorted({load(path).labels["object"] for path in recordings.glob("*.npz")})
+    for path in recordings.glob("*.npz"):
+        recording = load(path)
+        place = np.full_like(recording.joints, 0.3 * objects.index(recording.labels["object"]))
+        save(tmp_path / path.name, replace(recording, joints=place))
+    fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
+    assert posture_accuracy(fitted.dataset, "object") == 1.0
+    (said,) = [line for line in warnings(fitted) if line.startswith("warning: object")]
+    assert "at onset alone give 100.0% of the labels" in said
+
+
+def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
+    """Every recording begins in a pose that one of another object has too, and no other."""
+    for i, path in enumerate(sorted(recordings.glob("*.npz"))):
+        recording = load(path)
+        save(tmp_path / path.name, replace(recording, joints=0.0 * recording.joints + i % 8))
+    fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
+    assert posture_accuracy(fitted.dataset, "object") == 0.0 < LEAK
+    assert not any("warning: object: the joint angles" in line for line in warnings(fitted))
+
+
+def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
+    """One touch stored under three names, twice with its own label and once with another."""
+    shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
+    touch = load(recordings / "soft_7.npz")
+    save(tmp_path / "again.npz", touch)
+    other = {**touch.labels, "object": "another"}
+    save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
+    fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
+    said = [line for line in warnings(fitted) if "have the same coordinates" in line]
+    assert [line.split(" have")[0] for line in said] == ["warning: object: 3 trials"]
+
+
+def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings):
+    """A skin that was stored with a scale of its own: one trial of newtons a million times too
+    many leaves a few steps for all others."""
+    fixed = {"features": ["paper"], "projection": "pca", "scaling": "none", "jobs": 1, "k": 1}
+    fitted = train.fit(str(recordings), components=5, **fixed)
+    assert not any("steps" in line for line in warnings(fitted))
+    outlier = fitted.X.copy()
+    outlier[7] *= 3e6
+    classifier = ContactClassifier(fitted.classifier.choices, fitted.dataset.names)
+    classifier.fit(outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen})
+    said = [line for line in warnings(replace(fitted, classifier=classifier)) if "steps" in line]
+    assert len(said) == len(fitted.chosen)
+    assert f"since {fitted.dataset.trials[7].path} lies far outside all others" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "steps", "farthest"),
+    [
+        ([[0.0], [0.0], [3.0], [10.0]], 3.0, 3),  # equal rows are skipped: 3, 3, 3, 7
+        ([[2.0], [2.0]], np.inf, 0),
+        ([[0.0, 0.0], [6.0, 8.0]], 10.0, 1),
+    ],
+)
+def test_coarseness_is_the_median_gap_of_neighbours_in_units(rows, steps, farthest):
+    assert coarseness(0.5 * np.array(rows), 0.5) == (steps, farthest)
+
+
+def test_rows_that_are_equal_but_for_rounding_are_not_equal():
+    rows = np.array([[0.0], [1.0], [0.0], [1.0 + 1e-15], [2.0], [2.0]])
+    assert tied_across_labels(rows, np.array([0, 1, 1, 0, 1, 1])) == 2

@@ -1,0 +1,225 @@
+"""A fit in words, for a person at a terminal: the candidates, the choices, and warnings."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+
+from edge.touch import measures
+from train.choose import TRIAL, Chosen
+from train.dataset import DataSet
+from train.evaluate import Result
+from train.fitting import Fitted
+from train.labels import NO_CONTACT
+from train.pipeline import Choice, squared_distances
+from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
+from train.report.score import interval
+from train.report.section import Row, Table, counted
+
+MISSING_SHARE = 0.02
+"""Recordings without a contact above which the thresholds deserve a warning."""
+LEAK = 0.5
+"""Share of labels known before the touch, above which a model recognises the place, not the
+object."""
+NAMED = 3
+"""Files that a sentence names; the rest are counted."""
+Prices = Sequence[tuple[float, float]]
+"""For each candidate: microseconds of a decision on this machine, and kilobytes."""
+
+
+def summary(fitted: Fitted, prices: Prices) -> str:
+    """The candidates, the choice of each task, notes and warnings, in lines."""
+    table = candidates(fitted, prices)
+    cells = [[str(cell) for cell in row] for row in (table.columns, *table.cells)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = [
+        "  ".join(f"{row[i]:{'<' if i < 2 else '>'}{width}}" for i, width in enumerate(widths))
+        for row in cells
+    ]
+    lines += ["* chosen for the task", ""]
+    for task, chosen in fitted.chosen.items():
+        lines += [f"{task}: {_accuracy(chosen)}", f"  {_described(chosen.choice, fitted)}"]
+    units: dict[str, list[str]] = {}
+    for name, unit in fitted.dataset.units.items():
+        units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(name)
+    lines += ["", *(f"{unit}: {', '.join(features)}" for unit, features in units.items())]
+    if any(measures.feature(name).moves for name in fitted.dataset.names):
+        frame = "along the skin" if fitted.dataset.chain is None else "in the world"
+        lines.append(f"contact motion is measured {frame}")
+    return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
+
+
+def candidates(fitted: Fitted, prices: Prices) -> Table:
+    """A row for each candidate: the nested accuracy of its own settings, and its price."""
+    rows: list[Row] = []
+    for i, candidate in enumerate(fitted.candidates):
+        own = {(grid.features, grid.projection) for grid in candidate.grids}
+        row: Row = {"features": candidate.name, "how": candidate.projection}
+        for task, chosen in fitted.chosen.items():
+            star = "*" if (chosen.choice.features, chosen.choice.projection) in own else " "
+            row[task] = _percent(chosen.candidates[i]) + star
+        us, kilobytes = prices[i]
+        rows.append({**row, "us a decision": round(us, 1), "kB": round(kilobytes, 1)})
+    return Table("candidates", "Candidates", rows, ("us a decision",), narrow=3)
+
+
+def _accuracy(chosen: Chosen) -> str:
+    """The accuracy of a task in words."""
+    numbers = f"{_percent(chosen.accuracy)} of {chosen.accuracy.total} trials, nested"
+    if chosen.left_out == TRIAL:
+        return f"{numbers}, with the trial left out"
+    return (
+        f"{numbers}, with every trial of its {chosen.left_out} left out; "
+        f"{chosen.by_trial.accuracy:.1%} with the trial alone left out"
+    )
+
+
+def _percent(result: Result) -> str:
+    return f"{result.accuracy:.1%} ({interval(result)})"
+
+
+def _described(choice: Choice, fitted: Fitted) -> str:
+    combinations = {grid.features: c.name for c in fitted.candidates[::-1] for grid in c.grids}
+    name = combinations.get(choice.features, " ".join(choice.features))
+    how = f"{choice.projection} of {name}, scaling {choice.scaling}"
+    if choice.projection == "lda":
+        how += f", shrinkage {choice.shrinkage:g}"
+        if choice.targets:
+            how += f", with the discriminants of {', '.join(choice.targets)} side by side"
+    return f"{how}, {counted(choice.components, 'component')}, k = {choice.k}"
+
+
+def warnings(fitted: Fitted) -> list[str]:
+    """Sentences on data that flatter or spoil a model."""
+    dataset, lines = fitted.dataset, []
+    untouched = [path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()]
+    if untouched:
+        line = f"without a contact above {dataset.layout.onset} counts, and counted as wrong: "
+        line += _files(untouched)
+        if len(untouched) / (len(dataset.trials) + len(dataset.untouched)) > MISSING_SHARE:
+            line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
+        lines.append(line)
+    for lacking, paths in dataset.left_out.items():
+        total = len({trial.path for trial in dataset.trials} | set(paths))
+        lines.append(
+            f"warning: {len(paths)} of {total} recordings are left out for lack of {lacking}: "
+            f"{_files(paths)}"
+        )
+    if dataset.unused:
+        lines.append(
+            "warning: only the first of several contacts is used of "
+            f"{_files(dataset.unused)}; `python -m train split` makes a recording of each"
+        )
+    longest = max(float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials)
+    if fitted.window_s > longest + 1e-9:
+        lines.append(
+            f"warning: the window of {fitted.window_s:g} s is longer than any recording goes on "
+            f"after its onset ({longest:.2f} s)"
+        )
+    return [*lines, *(line for task in fitted.chosen for line in _task_warnings(fitted, task))]
+
+
+def _task_warnings(fitted: Fitted, task: str) -> list[str]:
+    """The sentences that concern a single task."""
+    dataset, classifier, choice = fitted.dataset, fitted.classifier, fitted.chosen[task].choice
+    space, components, lines = classifier.spaces_[task], classifier.components_[task], []
+    if any(measures.feature(name).quantity == "joint_angle" for name in choice.features):
+        share = posture_accuracy(dataset, task)
+        lines.append(
+            f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
+            f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may recognise "
+            "places rather than objects; --features without posture measures touch alone"
+        )
+    if choice.components > components and choice.projection == "pca":
+        lines.append(
+            f"warning: {task}: the trials span {components} components, "
+            f"{choice.components - components} fewer than asked for"
+        )
+    rows = classifier.rows_[space][:, :components]
+    equal = tied_across_labels(rows, classifier.labels_[task])
+    if equal:
+        lines.append(
+            f"warning: {task}: {equal} trials have the same coordinates as a trial of another "
+            "label; the earlier trial counts as nearer, so their order decides the label"
+        )
+    projection = classifier.projections_[space]
+    steps, place = coarseness(rows, projection.grid_.unit)
+    if steps < FEWEST_UNITS:
+        farthest = dataset.trials[classifier.members_[space][place]].path
+        lines.append(
+            f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps "
+            f"of another one, since {farthest} lies far outside all others; leave it out if its "
+            "recording is wrong"
+        )
+    if projection.gap_ < CLOSE_EIGENVALUES:
+        lines.append(
+            f"warning: {task}: two components explain the same variance to within "
+            f"{projection.gap_:.1e}; which of them is kept is arbitrary"
+        )
+    return lines
+
+
+def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
+    """How many rows (n, c) equal a row of another label (n,)."""
+    _, group = np.unique(rows, axis=0, return_inverse=True)
+    labels_of = np.zeros((len(rows), int(labels.max()) + 1), dtype=bool)
+    labels_of[group.ravel(), labels] = True
+    return int((labels_of.sum(axis=1) > 1)[group.ravel()].sum())
+
+
+def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
+    """How coarse a model's grid is for its trials, by at most a thousand of them.
+
+    Args:
+        rows: (n, c) projected trials.
+        unit: of their coordinates.
+
+    Returns:
+        The median distance, in units, from a trial to the nearest one that differs from it;
+        infinite where all are equal. And the number of the trial that lies farthest out.
+    """
+    squares = squared_distances(rows[:: -(-len(rows) // 1000)], rows)
+    squares[squares == 0.0] = np.inf
+    nearest = float(np.sqrt(np.median(squares.min(axis=1)))) if rows.size else np.inf
+    return nearest / unit, int(squared_distances(rows, np.zeros_like(rows[:1])).argmax())
+
+
+def posture_accuracy(dataset: DataSet, task: str) -> float:
+    """Leave-one-out accuracy of a task by the joint angles at onset alone, with one neighbour."""
+    at_onset = []
+    for trial in dataset.trials:
+        joints = trial.series.joints
+        assert joints is not None
+        known = joints[np.isfinite(joints).all(axis=1)]
+        at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
+    labels = dataset.labels(task)
+    angles, labels = np.array(at_onset)[labels != ""], labels[labels != ""]
+    squares = cdist(angles, angles, "sqeuclidean")
+    np.fill_diagonal(squares, np.inf)
+    return float((labels[squares.argmin(axis=1)] == labels).mean())
+
+
+def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
+    """The name of the folder of all recordings, and each trial's path in it without suffix.
+
+    Trials of one recording are numbered from 1.
+    """
+    folder = Path(os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials]))
+    paths = [t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials]
+    counts, seen = Counter(paths), Counter[Path]()
+    trials = []
+    for path in paths:
+        seen[path] += 1
+        trials.append(path.as_posix() + (f" {seen[path]}" if counts[path] > 1 else ""))
+    return folder.name, tuple(trials)
+
+
+def _files(paths: Sequence[Path]) -> str:
+    rest = len(paths) - NAMED
+    return ", ".join(map(str, paths[:NAMED])) + (f" and {rest} more" if rest > 0 else "")
