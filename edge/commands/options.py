@@ -108,8 +108,8 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
         metavar="HOST:PORT",
         nargs="?",
         const="127.0.0.1:8000",
-        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; another "
-        f"machine needs the link that is printed, with its token{web}",
+        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; open the "
+        f"link that is printed, with its token{web}",
     )
 
 

@@ -1,6 +1,6 @@
 "use strict";
 
-// The page of one skin. Pictures come as server-sent events; actions go back as small JSON objects.
+// The page of one skin. It asks for pictures, and sends actions, as small JSON objects.
 // Text is only ever set as text, so that no label can become a part of the page.
 
 const $ = (id) => document.getElementById(id);
@@ -261,9 +261,15 @@ $("record").onclick = async () => {
 };
 addEventListener("resize", () => latest && draw(latest));
 
-const pictures = new EventSource("pictures" + query);
-pictures.onmessage = (event) => draw(JSON.parse(event.data));
-pictures.onerror = () => {
-  $("state").className = "lost";
-  $("state").textContent = "The program does not answer; trying again.";
-};
+async function watch() {
+  const answer = await fetch("picture" + query).catch(() => null);
+  if (answer && answer.status === 200) draw(await answer.json());
+  else if (!answer || !answer.ok) {
+    $("state").className = "lost";
+    $("state").textContent = answer && answer.status === 401
+      ? "The program has started anew; open the link that it has printed."
+      : "The program does not answer; trying again.";
+  }
+  setTimeout(watch, answer && answer.ok ? 100 : 1000);
+}
+watch();
