@@ -263,7 +263,8 @@ addEventListener("resize", () => latest && draw(latest));
 
 async function watch() {
   const answer = await fetch("picture" + query).catch(() => null);
-  if (answer && answer.status === 200) draw(await answer.json());
+  const picture = answer && answer.status === 200 ? await answer.json().catch(() => null) : null;
+  if (picture) draw(picture);
   else if (!answer || !answer.ok) {
     $("state").className = "lost";
     $("state").textContent = answer && answer.status === 401

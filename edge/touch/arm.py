@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,7 +43,8 @@ class _Link(NamedTuple):
     """A moving joint as plain numbers: its axis, and the fixed step before it."""
 
     slides: bool
-    direction: Vector
+    axis: Vector
+    """A direction, of length 1."""
     step: tuple[float, ...]
     """(12,) the first three rows of the fixed step's transform."""
 
@@ -65,26 +66,20 @@ class Chain:
         """
         self.joints = tuple(joints)
         self.base, self.tip = base, tip
-        self._moving: list[Joint] = []
+        self._moving = [joint for joint in self.joints if joint.kind != "fixed"]
         self._links: list[_Link] = []
-        # A moving joint's step at angle q is S0 + f S1 + g S2. For a rotation f = sin q and
-        # g = 1 - cos q (Rodrigues). For a sliding joint f = q and g = 0.
-        steps: list[tuple[NDArray[np.float64], ...]] = []
         fixed = np.eye(4)
         for joint in self.joints:
             _check_joint(joint)
             fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
             if joint.kind != "fixed":
-                self._moving.append(joint)
+                length = math.hypot(*joint.axis)
+                x, y, z = (component / length for component in joint.axis)
                 slides = joint.kind == "prismatic"
-                self._links.append(_Link(slides, _direction(joint), _rows(fixed)))
-                steps.append((fixed, *(fixed @ generator for generator in _generators(joint))))
+                self._links.append(_Link(slides, (x, y, z), _rows(fixed)))
                 fixed = np.eye(4)
             fixed = fixed @ _transform(joint.translate, ZERO)
-        self._steps = np.array(steps).reshape(-1, 3, 4, 4)
-        self._after = fixed
         self._tip = _rows(fixed)
-        self._slides = np.array([link.slides for link in self._links], dtype=bool)
 
     @property
     def dof(self) -> int:
@@ -129,22 +124,17 @@ class Chain:
         if not np.isfinite(angles).all():
             bad = np.argwhere(~np.isfinite(angles))[0][-1]
             raise InputError(f"the angle of joint {self.names[bad]} is not finite")
-        half = np.sin(0.5 * angles)
-        f = np.where(self._slides, angles, np.sin(angles))
-        g = np.where(self._slides, 0.0, 2.0 * half * half)
-        still, first, second = self._steps[:, 0], self._steps[:, 1], self._steps[:, 2]
-        steps = still + f[..., None, None] * first + g[..., None, None] * second
-        pose = self._after
-        for i in range(self.dof - 1, -1, -1):
-            pose = steps[..., i, :, :] @ pose
-        if self.dof == 0:
-            pose = np.broadcast_to(pose, (*angles.shape[:-1], 4, 4))
+        pose = np.zeros((*angles.shape[:-1], 4, 4))
+        pose[..., 3, 3] = 1.0
+        of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
+        for row, coordinates in enumerate(self._carried(of_each_joint, np.eye(4), np.sin)):
+            pose[..., row, :] = coordinates
         return pose
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
         """A point of the tip in the base's frame: `pose(q)` times the point, as plain floats.
 
-        Moving one point joint by joint is much faster than computing the pose, and as accurate.
+        It is much faster than computing the pose.
 
         Args:
             q: (dof,) as for `pose`.
@@ -156,19 +146,28 @@ class Chain:
         angles = np.asarray(q).tolist()
         if len(angles) != self.dof or not math.isfinite(sum(map(abs, angles))):
             self.pose(q)  # raises
-        x, y, z = _moved(self._tip, *position)
+        x, y, z = self._carried(angles, (*position, 1.0), math.sin)
+        return x, y, z
+
+    def _carried(self, angles: Any, position: Any, sin: Callable[[Any], Any]) -> tuple[Any, ...]:
+        """(x, y, z) in the base's frame of homogeneous coordinates (4,) in the tip's frame.
+
+        Angles and coordinates are numbers, or arrays of equal shape.
+        """
+        x, y, z, w = position
+        x, y, z = _moved(self._tip, x, y, z, w)
         for angle, link in zip(reversed(angles), reversed(self._links), strict=True):
-            kx, ky, kz = link.direction
+            kx, ky, kz = link.axis
             if link.slides:
-                x, y, z = x + angle * kx, y + angle * ky, z + angle * kz
+                x, y, z = x + angle * kx * w, y + angle * ky * w, z + angle * kz * w
             else:
-                half = math.sin(0.5 * angle)
-                f, g = math.sin(angle), 2.0 * half * half
+                half = sin(0.5 * angle)
+                f, g = sin(angle), 2.0 * half * half
                 ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
-                x += f * ax + g * (ky * az - kz * ay)
-                y += f * ay + g * (kz * ax - kx * az)
-                z += f * az + g * (kx * ay - ky * ax)
-            x, y, z = _moved(link.step, x, y, z)
+                x = x + (f * ax + g * (ky * az - kz * ay))
+                y = y + (f * ay + g * (kz * ax - kx * az))
+                z = z + (f * az + g * (kx * ay - ky * ax))
+            x, y, z = _moved(link.step, x, y, z, w)
         return x, y, z
 
     def to_dict(self) -> dict[str, Any]:
@@ -283,28 +282,14 @@ def _rows(step: NDArray[np.float64]) -> tuple[float, ...]:
     return tuple(step[:3].ravel().tolist())
 
 
-def _moved(step: tuple[float, ...], x: float, y: float, z: float) -> Vector:
-    """A point after a fixed step."""
+def _moved(step: tuple[float, ...], x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any]:
+    """Homogeneous coordinates after a fixed step."""
     a, b, c, tx, d, e, f, ty, g, h, i, tz = step
-    return a * x + b * y + c * z + tx, d * x + e * y + f * z + ty, g * x + h * y + i * z + tz
-
-
-def _direction(joint: Joint) -> Vector:
-    """The joint's axis at length 1."""
-    x, y, z = joint.axis
-    length = math.hypot(x, y, z)
-    return x / length, y / length, z / length
-
-
-def _generators(joint: Joint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """K and K^2 of a rotation about the joint's axis; if it slides, its direction and zero."""
-    x, y, z = _direction(joint)
-    first = np.zeros((4, 4))
-    if joint.kind == "prismatic":
-        first[:3, 3] = x, y, z
-        return first, np.zeros((4, 4))
-    first[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-    return first, first @ first
+    return (
+        a * x + b * y + c * z + tx * w,
+        d * x + e * y + f * z + ty * w,
+        g * x + h * y + i * z + tz * w,
+    )
 
 
 def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
