@@ -27,11 +27,12 @@ from edge import demo
 from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.runtime.event_writer import Lines
-from edge.runtime.touch_map import TouchMap, map_writer
+from edge.runtime.touch_map import map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.touch.track import MAX_CONTACTS
 from tests.faulty import Fault, faulty_skin
+from train.touch_map import TouchMap
 
 GROWTH_KB = 2048
 """Allowed after the first tenth: pages that the allocator keeps, no more with more hours."""

@@ -3,18 +3,15 @@
 A run begins with a line such as `{"event": "map", "frame": "torso", "unit": "metre", "tasks": []}`,
 where `frame` is the arm's base, or `skin`. The decisions that have a place follow, as the events of
 `edge-classify run`. Lines are only appended, so that earlier ones survive any failure. Readers
-leave out a line that was cut short.
+leave out a line that was cut short (`train.touch_map`).
 """
 
 from __future__ import annotations
 
 import errno
-import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 from edge.config import parse_json
 from edge.errors import InputError
@@ -29,33 +26,6 @@ LONGEST_LINE = 1 << 16
 NOT_A_MAP = "not a map; give a file that `run --map` wrote"
 
 
-class Head(NamedTuple):
-    """The first line of a run: coordinate frame, unit of length, tasks."""
-
-    frame: str
-    unit: str
-    tasks: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Touch:
-    """One contact on the map.
-
-    Attributes:
-        position: (x, y, z) in the map's frame.
-        onset_s: seconds on the run's clock.
-        labels: {task: label}, None where the model could not tell.
-        confidence: {task: share of the votes}.
-        flags: of any of its decisions.
-    """
-
-    position: tuple[float, float, float]
-    onset_s: float
-    labels: dict[str, str | None] = field(default_factory=dict)
-    confidence: dict[str, float] = field(default_factory=dict)
-    flags: tuple[str, ...] = ()
-
-
 def map_writer(
     path: str | os.PathLike[str], info: ModelInfo, patient: Patience = impatient
 ) -> LineWriter:
@@ -67,18 +37,14 @@ def map_writer(
         InputError: the file cannot be opened, is not a map, or is one of another arm.
     """
     name = os.fspath(path)
-    head = Head("skin" if info.chain is None else info.chain.base, info.layout.length_unit, ())
+    frame = "skin" if info.chain is None else info.chain.base
+    head = {"event": "map", "frame": frame, "unit": info.layout.length_unit}
     torn = False
     if os.path.lexists(name):
         with open_regular(name, LARGEST_BYTES) as former:
-            start = former.read(LONGEST_LINE)
-            first = next(_entries(start.split(b"\n"), name), None)
-            if first is not None:
-                _head(name, *first, head)
-            # A full disk may have cut the first line short.
-            elif not b'{"event": "map"'.startswith(start[:15]):
-                raise InputError(f"{name}: {NOT_A_MAP}")
-            former.seek(-min(len(start), 1), os.SEEK_END)
+            first_line = former.readline(LONGEST_LINE)
+            _check_head(first_line, head, name)
+            former.seek(-min(len(first_line), 1), os.SEEK_END)
             torn = former.read() not in (b"", b"\n")
     with refusing(f"{name}: cannot be written"):
         file = os.open(name, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
@@ -93,7 +59,7 @@ def map_writer(
         torn = False
 
     writer = LineWriter(name, write, _line, patient)
-    writer.put({"event": "map", **head._asdict(), "tasks": list(info.tasks)})
+    writer.put({**head, "tasks": list(info.tasks)})
     return writer
 
 
@@ -103,81 +69,18 @@ def _line(event: Mapping[str, Any]) -> str | None:
     return json_line(event) if placed or event["event"] == "map" else None
 
 
-def _entries(lines: Iterable[bytes], name: str) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Number and object of each complete line."""
-    for number, line in enumerate(lines, 1):
-        with suppress(InputError):
-            entry = parse_json(line, name)
-            if isinstance(entry, dict):
-                yield number, entry
-
-
-def _head(name: str, number: int, entry: Mapping[str, Any], former: Head | None = None) -> Head:
-    """The head of a run, which must be in the frame of a former one, if there is one."""
+def _check_head(line: bytes, head: Mapping[str, str], name: str) -> None:
+    """Check that the first line of a map has the frame and the unit of this run's head."""
     try:
-        head = Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
-    except (KeyError, TypeError):
-        raise _no_line(name, number) from None
-    if entry.get("event") != "map":
-        raise _no_line(name, number)
-    if former is not None and head[:2] != former[:2]:
-        raise InputError(
-            f"{name}: line {number} begins a run in the frame {head.frame} ({head.unit}), another "
-            f"is in {former.frame} ({former.unit}); keep a map for each"
-        )
-    return head
-
-
-def _no_line(name: str, number: int) -> InputError:
-    return InputError(f"{name}: line {number} is not of a map; give a file that `run --map` wrote")
-
-
-class TouchMap:
-    """The contacts of one or more runs in one frame; iterating reads the file line by line."""
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Open a map.
-
-        Raises:
-            InputError: the file is missing, or is not a map.
-        """
-        self.path = os.fspath(path)
-        for number, entry in self._entries():
-            self.head = _head(self.path, number, entry)
+        former = parse_json(line, name)
+        same = all(former[key] == value for key, value in head.items())
+    except (InputError, KeyError, TypeError):
+        # A full disk may have cut the line short.
+        if b'{"event": "map"'.startswith(line[:15]):
             return
-        raise InputError(f"{self.path}: {NOT_A_MAP}")
-
-    def _entries(self) -> Iterator[tuple[int, dict[str, Any]]]:
-        with open_regular(self.path, LARGEST_BYTES) as file:
-            yield from _entries(iter(lambda: file.readline(LONGEST_LINE), b""), self.path)
-
-    def __iter__(self) -> Iterator[Touch]:
-        """The contacts with all tasks decided, in the order of their last decisions.
-
-        Raises:
-            InputError: a line is not of a map, or begins a run in another frame.
-        """
-        tasks = self.head.tasks
-        waiting: dict[tuple[int, float], Touch] = {}
-        for number, entry in self._entries():
-            if entry.get("event") == "map":
-                tasks, waiting = _head(self.path, number, entry, self.head).tasks, {}
-                continue
-            try:
-                key = int(entry["contact"]), float(entry["onset_s"])
-                x, y, z = (float(v) for v in entry["place"])
-                touch = waiting.pop(key, Touch((x, y, z), key[1]))
-                task, label = str(entry["task"]), entry["label"]
-                confidence = float(entry["confidence"])
-                flags = [str(f) for f in entry.get("flags", ()) if f not in touch.flags]
-                if not all(map(math.isfinite, (x, y, z, key[1], confidence))):
-                    raise ValueError("not finite")
-            except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-                raise _no_line(self.path, number) from None
-            touch.labels[task] = None if label is None else str(label)
-            touch.confidence[task] = confidence
-            touch = replace(touch, flags=(*touch.flags, *flags))
-            if len(touch.labels) == len(tasks):
-                yield touch
-            else:
-                waiting[key] = touch
+        raise InputError(f"{name}: {NOT_A_MAP}") from None
+    if not same:
+        raise InputError(
+            f"{name}: is in the frame {former['frame']} ({former['unit']}), this run in the frame "
+            f"{head['frame']} ({head['unit']}); keep a map for each"
+        )

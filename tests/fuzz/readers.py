@@ -21,13 +21,13 @@ from edge.cli import main as edge_main
 from edge.errors import InputError
 from edge.model.explanation import Space
 from edge.model.model import Model
-from edge.runtime.touch_map import TouchMap
 from edge.touch.arm import Chain
 from tests.fuzz import mutate
 from tests.train.importers.test_importers import dsa
 from tests.train.importers.test_log_importers import FRAMES, STORES, array, write_bag, write_mcap
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
+from train.touch_map import TouchMap
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "edge" / "demo"

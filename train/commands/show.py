@@ -61,8 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
         touches = [(path, load(path)) for path in arguments.recording]
         comparison.draw(touches, out, model=model, dark=arguments.dark)
     elif not recorded:
-        from edge.runtime.touch_map import TouchMap
         from train.draw import touch_map as picture
+        from train.touch_map import TouchMap
 
         info = None if model is None else model.info
         picture.draw(TouchMap(first), out, first, arguments.task, info)

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.info import ModelInfo
-from edge.runtime.touch_map import TouchMap
 from train.draw.sketch import link_positions
+from train.touch_map import TouchMap
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"

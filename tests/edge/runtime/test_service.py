@@ -14,7 +14,7 @@ import pytest
 
 from edge import demo
 from edge.cli import parser
-from edge.runtime import touch_map as touchmap
+from train.touch_map import TouchMap
 
 ROOT = Path(__file__).parents[3]
 UNIT = ROOT / "board" / "edge-classify.service"
@@ -49,7 +49,7 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(manager, t
     assert out.endswith("\n")
     lines = [json.loads(line) for line in out.splitlines()]
     assert lines[-1]["event"] == "end"
-    assert len(list(touchmap.TouchMap(place))) == len(
+    assert len(list(TouchMap(place))) == len(
         {line["contact"] for line in lines if line["event"] == "decision"}
     )
 

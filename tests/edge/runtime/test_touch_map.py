@@ -19,6 +19,7 @@ from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import MAX_CONTACTS, ContactTracker
+from train.touch_map import TouchMap
 
 FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release_s=0.05)
 
@@ -110,7 +111,7 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, capsys):
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     decisions = [line for line in lines if line["event"] == "decision"]
     assert len({line["contact"] for line in decisions}) == 2
-    found = touchmap.TouchMap(place)
+    found = TouchMap(place)
     assert found.head[:2] == (Model(demo.MODEL).info.chain.base, "metre")
     first, second = touches = list(found)
     assert first.labels == {
@@ -173,40 +174,18 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     others = [{**event, "task": t, "label": t, "flags": ["short"]} for t in ("category", "object")]
     onset = {"event": "onset", "contact": 1, "onset_s": 0.5}
     write(path, info, [onset, event])
-    assert not list(touchmap.TouchMap(path))  # two tasks are still open
+    assert not list(TouchMap(path))  # two tasks are still open
     path.unlink()
     write(path, info, [onset, event, *others, {**event, "contact": 2, "place": None}])
     with path.open("a") as damaged:
         damaged.write('{"event": "decision", "pla')
     write(path, info, [event, *others])
-    first, second = touchmap.TouchMap(path)
+    first, second = TouchMap(path)
     assert first == second
     assert first.position == (0.1, 0.2, 0.3)
     assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
     assert first.flags == ("tie", "short")
     assert "\n\n" not in path.read_text()
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("", "not a map"),
-        ("[1]\n", "not a map"),
-        ("hello\n", "not a map"),
-        ('{"event": "decision"}\n', "line 1 is not of a map"),
-        ('{"event": "map", "frame": "a", "unit": "metre"}\n', "line 1 is not of a map"),
-        (
-            '{"event": "map", "frame": "a", "unit": "metre", "tasks": []}\n'
-            '{"event": "map", "frame": "b", "unit": "metre", "tasks": []}\n',
-            "line 2 begins a run in the frame b",
-        ),
-    ],
-)
-def test_what_is_not_a_map_is_named(tmp_path, text, sentence):
-    path = tmp_path / "some.jsonl"
-    path.write_text(text)
-    with pytest.raises(InputError, match=sentence):
-        list(touchmap.TouchMap(path))
 
 
 ANOTHER = json.dumps({"event": "map", "frame": "another", "unit": "metre", "tasks": []})
@@ -229,7 +208,7 @@ def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(tmp
     path = tmp_path / "map.jsonl"
     path.write_text(left)
     write(path, Model(demo.MODEL).info, [])
-    assert list(touchmap.TouchMap(path)) == []
+    assert list(TouchMap(path)) == []
 
 
 def test_a_full_disk_costs_lines_and_not_decisions():
@@ -250,7 +229,7 @@ def test_only_the_head_of_a_long_map_is_read_before_a_run(tmp_path):
     tracemalloc.start()
     try:
         write(path, info, [])
-        assert touchmap.TouchMap(path).head.frame == info.chain.base
+        assert TouchMap(path).head.frame == info.chain.base
         assert tracemalloc.get_traced_memory()[1] < 1 << 20
     finally:
         tracemalloc.stop()
