@@ -5,9 +5,9 @@ import pytest
 from edge.demo import FOLDER
 from edge.recording import load
 from edge.touch.arm import Chain
-from edge.touch.feature_sets import SETS
 from edge.touch.features import WINDOW_S, feature_vector
 from edge.touch.track import ContactTracker, first_contact
+from train.feature_sets import SETS
 
 FRAMES = 120
 

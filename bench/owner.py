@@ -19,11 +19,11 @@ import numpy as np
 from joblib import cpu_count
 
 from edge.recording import load, save
-from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import DRAWN_WITH_JOINTS, candidates
 from train.choose import LEAVE_OUT, Choosing
 from train.dataset import DataSet, load_trials
+from train.feature_sets import expand
 from train.mix import ALONE, ONCE, SIMULATED, mix
 from train.pipeline import ContactClassifier
 

@@ -31,10 +31,10 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from edge.cli import dispatch
-from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import candidates
 from train.dataset import DataSet, load_trials
+from train.feature_sets import expand
 from train.fitting import fit
 from train.progress import bar
 from train.rules import RISK

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
 from edge.cli import dispatch
-from edge.touch.feature_sets import expand
 from edge.touch.features import FEATURES, SAMPLES
 from train.dataset import read
 from train.evaluate import stratified_folds
+from train.feature_sets import expand
 from train.rules import THRESHOLDS
 from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S

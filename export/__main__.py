@@ -14,11 +14,11 @@ from edge.commands.options import add_arm, open_arm, within
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.touch import measures
-from edge.touch.feature_sets import SETS
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import measure, save
 from train.choose import LEAVE_OUT, TRIAL
 from train.dataset import read
+from train.feature_sets import SETS
 from train.fitting import MOST_TRIALS, fit
 from train.projection import KINDS
 from train.report.summary import summary

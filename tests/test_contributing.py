@@ -15,8 +15,8 @@ import train
 import train.importers
 from edge import cli
 from edge.recording import load
-from edge.touch.feature_sets import SETS
 from train.__main__ import main
+from train.feature_sets import SETS
 from train.report.section import Section, Table
 from train.study import run as study
 

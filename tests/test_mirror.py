@@ -9,8 +9,6 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("edge", "train", "export")
 
 TOPICS = {
-    # Named sets of features, and what their names compose.
-    "edge/touch/test_feature_sets.py",
     # Commands, as a user runs them one after another.
     "edge/commands/test_live_commands.py",
     "edge/commands/test_replay_verify.py",

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.feature_sets import expand
 from train.agreement import products
 from train.evaluate import NEIGHBOURS, SHRINKAGES, Labels, SearchGrid
+from train.feature_sets import expand
 from train.pipeline import Choice
 from train.projection import KINDS
 

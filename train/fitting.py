@@ -15,13 +15,13 @@ from scipy.spatial.distance import cdist
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from edge.touch.feature_sets import expand
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.candidates import Candidate, candidates
 from train.choose import LEAVE_OUT, Choosing, Chosen, kinds_of
 from train.dataset import DataSet, load_trials, read
 from train.evaluate import Labels
+from train.feature_sets import expand
 from train.mix import mix
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier

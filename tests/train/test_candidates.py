@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from edge.touch.feature_sets import expand
 from tests.train.test_agreement import TASKS
 from train.candidates import PLAIN, WITH_JOINTS, candidates, costs
+from train.feature_sets import expand
 from train.pipeline import Choice
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
-from edge.touch.feature_sets import SETS
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.crossval import MAX_COMPONENTS, MAX_K
 from train.evaluate import Labels, Result, SearchGrid, group_folds, stratified_folds
+from train.feature_sets import SETS
 from train.report import figures
 from train.report.score import grid_search, interval, majority, nested, percent, score
 from train.report.section import Row, Section, Table
@@ -116,7 +116,7 @@ def section(context: Context) -> Section:
             "trials, fixed and movable; the paper's claim is about such objects.",
             "The paper's way is its three features, unscaled, with PCA and k-NN. The best of its "
             "grid is the score that its search maximised, by leave-one-out, which flatters. "
-            "Feature sets are those of `edge/touch/feature_sets.py`. Extra trees take their usual "
+            "Feature sets are those of `train/feature_sets.py`. Extra trees take their usual "
             "settings. `make export` chooses among the feature sets by itself.",
         ],
         [Table("methods", title, rows)],

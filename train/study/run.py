@@ -11,9 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from edge.errors import InputError
-from edge.touch.feature_sets import expand
 from train.cluster import on_cluster
 from train.dataset import load_trials
+from train.feature_sets import expand
 from train.progress import bar
 from train.report.page import write
 from train.report.section import Numbers, Section, counted

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.feature_sets import expand
 from edge.touch.features import WINDOW_S
 from train.candidates import candidates
 from train.choose import TRIAL, Chosen, kinds_of
 from train.dataset import DataSet, Recordings, load_trials
 from train.evaluate import Result
+from train.feature_sets import expand
 from train.fitting import fit
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))

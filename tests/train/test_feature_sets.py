@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
-from edge.touch.feature_sets import SETS, expand
 from edge.touch.features import FEATURES, feature_vector, widths
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import TRANSFORMS, feature
 from tests.edge.touch.pressed import followed, pressed
+from train.feature_sets import SETS, expand
 
 SKIN = SkinLayout(
     4,
