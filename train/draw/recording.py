@@ -18,7 +18,7 @@ from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
 from train.arms import arm_of
-from train.draw.sketch import draw_side
+from train.draw.sketch import draw_side, simulated
 
 FRAMES = 6
 HORIZON_S = 2.0
@@ -40,7 +40,8 @@ def draw(
         threshold: counts above which a taxel is in contact; the recording's own where None.
 
     Raises:
-        InputError: a sketch is asked for without a known arm, or `out` cannot be written.
+        InputError: a sketch is asked for without a known arm or of a damaged `meta.simulation`, or
+            `out` cannot be written.
     """
     from matplotlib.figure import Figure
 
@@ -54,6 +55,7 @@ def draw(
         recording = recording.for_joints(chain.names)
     if scene and chain is None:
         raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
+    drawn = simulated(recording, where) if scene else {}
     contact = first_contact(recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S))
     onset, series = contact or (float(recording.t[0]), None)
     heights = [1.7, 3.2, 4.0][: 3 if scene else 2]
@@ -73,7 +75,8 @@ def draw(
             axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
             axis.set_ylim(bottom=0.0)
     if scene and chain is not None:
-        draw_side(figure.add_subplot(grid[2, : FRAMES // 2]), recording, chain, layout, onset)
+        side = figure.add_subplot(grid[2, : FRAMES // 2])
+        draw_side(side, recording, chain, layout, onset, drawn)
         _push(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, chain, layout, onset)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from edge.config import ConfigTable
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
+from train.simulate.schema import OBJECT
 
 DEPTH_M, STANDS_M = 0.12, 0.15
 """Depth of an object, and its foot's distance below the contact, where the scene gives none."""
@@ -23,7 +25,7 @@ LOST_S = 0.3
 """Seconds without contact after which an object that tips has fallen."""
 
 MOMENTS = (("at onset", 0.0, "0.45", "--", "//"), ("1.2 s on", WINDOW_S, "tab:blue", "-", "\\\\"))
-"""What is drawn: its name, seconds from onset, colour, line and hatching."""
+"""The moments that are drawn: name, seconds from onset, colour, line and hatching."""
 
 Place = tuple[np.ndarray, np.ndarray, float]
 """Position (3,) of a contact, the skin's outward normal there (3,), and metres along the skin to
@@ -36,16 +38,39 @@ def link_positions(chain: Chain, q: Any) -> np.ndarray:
     return np.vstack([np.zeros(3), *(part.pose(q[: part.dof])[:3, 3] for part in chains)])
 
 
+def simulated(recording: Recording, where: str) -> dict[str, Any]:
+    """The `family`, `effects` and `values` of a simulated recording's object; {} of any other.
+
+    Raises:
+        InputError: `meta.simulation` lacks one of them, or a value cannot be drawn.
+    """
+    table = ConfigTable(recording.meta.get("simulation", {}), where, "meta.simulation.")
+    if not table.raw:
+        return {}
+    given = table.table("values")
+    values = {
+        key: given.number(key, 0.0, field.low, open_low=field.open_low)
+        for key, field in OBJECT.items()
+        if given.has(key)
+    }
+    return {"family": table.text("family"), "effects": table.texts("effects"), "values": values}
+
+
 def draw_side(
-    axis: Any, recording: Recording, chain: Chain, layout: SkinLayout, onset: float
+    axis: Any,
+    recording: Recording,
+    chain: Chain,
+    layout: SkinLayout,
+    onset: float,
+    drawn: dict[str, Any],
 ) -> None:
     """Draw the arm at onset and at the end of the window, in the x-z plane of its base.
 
-    A simulated object stands on its table, and slides, leans or turns there.
+    An object that was simulated (`drawn`, see `simulated`) stands on its table, and slides, leans
+    or turns there.
     """
     joints = recording.joints
     assert joints is not None
-    drawn = recording.meta.get("simulation", {})
     first: Place | None = None
     motion = ""
     for text, later, style, line, hatch in MOMENTS:
@@ -156,7 +181,7 @@ def _thing(
     else:
         outline[:, 0] += slid
         if "turning" in effects and aside is not None and foot is not None:
-            angle = slid * aside / ((foot / 3.0) ** 2 + aside**2)
+            angle = slid * aside / max((foot / 3.0) ** 2 + aside**2, 1e-12)
             _from_above(axis, foot, aside, slid, angle, **style)
             motion = f", turns by {math.degrees(angle):.0f} degrees" if slid else ""
     axis.fill(*(start + outline * [ahead, 1.0]).T, alpha=0.25, **style)

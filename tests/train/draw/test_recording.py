@@ -1,5 +1,7 @@
 """A recording as a picture, with or without a contact and the sketch of its arm."""
 
+from dataclasses import replace
+
 import pytest
 
 from edge import demo
@@ -27,3 +29,28 @@ def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(make_
     with pytest.raises(InputError, match="there is no arm to sketch"):
         draw(load(tmp_path / "quiet.npz"), tmp_path / "no.png", scene=True)
     assert not (tmp_path / "no.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (5, "meta.simulation must be a table, not 5"),
+        ({"values": 5}, "meta.simulation.values must be a table, not 5"),
+        ({"values": None}, "meta.simulation.values is missing"),
+        ({"values": {"height_m": "tall"}}, "meta.simulation.values.height_m must be a number"),
+        ({"values": {"stem_count": -3}}, "meta.simulation.values.stem_count must be a number "),
+        ({"effects": "sliding"}, "meta.simulation.effects must be a list of texts, not 'sliding'"),
+        ({"family": None}, "meta.simulation.family is missing"),
+    ],
+)  # fmt: skip
+def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(
+    edit, sentence, tmp_path, capsys
+):
+    touch = load(TOUCH)
+    valid = {"family": "rigid", "effects": ["sliding"], "values": {}}
+    edited = {**valid, **edit} if isinstance(edit, dict) else edit
+    file = tmp_path / "edited.npz"
+    save(file, replace(touch, meta={**touch.meta, "simulation": edited}))
+    assert main(["show", str(file)]) == 0
+    assert main(["show", str(file), "--scene"]) == 2
+    assert f"train: {file}: {sentence}" in capsys.readouterr().err
