@@ -228,7 +228,9 @@ def _rows(path: Path, data: bytes) -> list[list[str]]:
 def _of_arrays(path: Path, data: bytes) -> _Table:
     """The table of the arrays in an .npy or .mat file, a row for each entry of their first axis."""
     file = io.BytesIO(data)
-    stored = {"": np.load(file)} if path.suffix.lower() == ".npy" else loadmat(file)
+    stored = (
+        {"": np.lib.format.read_array(file)} if path.suffix.lower() == ".npy" else loadmat(file)
+    )
     arrays = {
         key: np.atleast_1d(array)
         for key, array in stored.items()

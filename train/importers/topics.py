@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import parse_json, read_json, shown
+from edge.config import ConfigTable, parse_json, read_json, shown
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
@@ -56,12 +56,12 @@ class Log:
 
     Attributes:
         path: of the log.
-        beside: the contents of the JSON file beside it.
+        beside: the JSON file beside it.
         arm: whose joint angles are wanted, or None for all.
     """
 
     path: Path
-    beside: dict[str, Any]
+    beside: ConfigTable
     arm: Chain | None = None
     _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(
         default_factory=lambda: defaultdict(list)
@@ -79,11 +79,9 @@ class Log:
             InputError: the file is not a JSON object.
         """
         file = path.with_name(path.stem + ".json")
-        beside = read_json(file) if file.is_file() else {}
-        if not isinstance(beside, dict):
-            raise InputError(f"{file}: must be a JSON object with labels, skin, arm")
-        if arm is None and "arm" in beside:
-            arm = Chain.from_dict(beside["arm"], where=f"{file}: arm")
+        beside = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
+        if arm is None and beside.has("arm"):
+            arm = Chain.from_dict(beside.get("arm"), where=f"{file}: arm")
         return cls(path, beside, arm)
 
     def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
@@ -139,13 +137,13 @@ class Log:
         shape = [int(dimension.size) for dimension in message.layout.dim]
         values = np.asarray(message.data)[message.layout.data_offset :]
         if len(shape) != 2:
-            skin = self.beside.get("skin", {})
-            if "rows" not in skin or "cols" not in skin:
+            skin = self.beside.table("skin", {})
+            if not (skin.has("rows") and skin.has("cols")):
                 raise InputError(
                     f"{self.path}: {topic} does not state its rows and columns; put them as "
                     f'{{"skin": {{"rows": ..., "cols": ...}}}} into {self.path.stem}.json beside it'
                 )
-            shape = [skin["rows"], skin["cols"]]
+            shape = [skin.whole("rows"), skin.whole("cols")]
         if values.size != math.prod(shape):
             raise InputError(
                 f"{self.path}: a message of {topic} has {values.size} values, not {shape}"
@@ -182,8 +180,8 @@ class Log:
         joints, names = self._angles(t)
         rows, cols = shapes.pop()
         meta: dict[str, Any] = {
-            **({"labels": self.beside["labels"]} if "labels" in self.beside else {}),
-            "skin": {"rows": rows, "cols": cols, **self.beside.get("skin", {})},
+            "labels": dict(self.beside.table("labels", {}).raw),
+            "skin": {"rows": rows, "cols": cols, **self.beside.table("skin", {}).raw},
             **({} if names is None else {"joint_names": list(names)}),
             **({} if self.arm is None else {"arm": self.arm.to_dict()}),
             "source": f"{self.path.name} {name}",
@@ -228,7 +226,7 @@ class Log:
 
     def _only(self, what: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
         """The one topic of a kind with its messages, or the one that the JSON file names."""
-        name = self.beside.get(f"{what}_topic")
+        name = self.beside.get(f"{what}_topic", None)
         if name is None and len(topics) > 1:
             raise InputError(
                 f"{self.path}: {what} are on {', '.join(sorted(topics))}; name one of them as "

@@ -200,6 +200,24 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
     assert np.array_equal(imported(tmp_path, "rosbag", path).frames, FRAMES)
 
 
+@pytest.mark.parametrize(
+    ("beside", "sentence"),
+    [
+        ("[]", "grasp.json: the file must be a table, not []"),
+        ('{"labels": 5}', "grasp.json: labels must be a table, not 5"),
+        ('{"skin": [1]}', "grasp.json: skin must be a table, not [1]"),
+        ('{"arm": 5}', "grasp.json: arm: "),
+    ],
+)
+def test_a_file_beside_the_log_that_cannot_be_used_is_one_sentence(
+    tmp_path, capsys, beside, sentence
+):
+    path = write_bag(tmp_path / "grasp", 2, [array(STORES[2], f) for f in FRAMES], joints=False)
+    (tmp_path / "grasp.json").write_text(beside)
+    assert main(["import", "rosbag", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert sentence in capsys.readouterr().err
+
+
 def write_mcap(path, *, cdr, **options):
     types = STORES[2]
 
