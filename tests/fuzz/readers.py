@@ -63,7 +63,7 @@ def command(main: Callable[[list[str]], int], *words: object) -> None:
     """Run a command line and check its exit status and what it prints.
 
     Raises:
-        InputError: the exit status is 2; the last sentence printed to stderr.
+        InputError: the exit status is 2; all that it printed to stderr.
         Wrong: the exit status or a printed text is not allowed.
     """
     out, err = io.StringIO(), io.StringIO()
@@ -72,21 +72,22 @@ def command(main: Callable[[list[str]], int], *words: object) -> None:
     errors = err.getvalue().replace("\r", "\n").strip()
     if status not in (0, 1, 2) or (status == 2 and not errors):
         raise Wrong(f"exit status {status} with {errors!r} on stderr")
-    for text in (out.getvalue(), errors):
-        check_printable(text.replace("\n", ""))
+    if characters := unprintable((out.getvalue() + errors).replace("\n", "")):
+        raise Wrong(f"prints {characters} unescaped")
     if status == 2:
-        raise InputError(errors.splitlines()[-1])
+        raise InputError(" ".join(errors.splitlines()))
 
 
-def check_printable(text: str) -> None:
-    """Raise Wrong where a text holds control characters or cannot be encoded."""
-    for c in text:
-        if (c < " " and c != "\t") or "\x7f" <= c < "\xa0" or c in "\u202e\u2028":
-            raise Wrong(f"prints {c!r} unescaped")
-    try:
-        text.encode()
-    except UnicodeEncodeError as error:
-        raise Wrong(f"prints text that cannot be encoded: {error}") from None
+def unprintable(text: str) -> list[str]:
+    """The characters of a text that act on a terminal or that no file can hold."""
+    return [
+        c
+        for c in text
+        if (c < " " and c != "\t")
+        or "\x7f" <= c < "\xa0"
+        or "\ud800" <= c <= "\udfff"
+        or c in "\u202e\u2028"
+    ]
 
 
 def importing(kind: str, *more: str) -> Callable[[Path], None]:
