@@ -99,11 +99,6 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
         help="ignore joint angles older than this (default: %(default)s)",
     )
     parser.add_argument(
-        "--joints-shared-clock",
-        action="store_true",
-        help="the lines carry the time of this machine's monotonic clock",
-    )
-    parser.add_argument(
         "--web",
         metavar="HOST:PORT",
         nargs="?",

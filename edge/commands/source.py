@@ -169,7 +169,6 @@ def open_joints(
             names=None if arm is None else arm.names,
             now=clock.real if isinstance(clock, PacedClock) else clock.now,
             oldest_s=arguments.joints_oldest,
-            shared_clock=arguments.joints_shared_clock,
         )
         yield stream
         if stream.malformed:

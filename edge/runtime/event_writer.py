@@ -11,8 +11,9 @@ import os
 import socket
 import sys
 import threading
-from collections import deque
+import time
 from collections.abc import Callable, Iterable, Mapping
+from queue import SimpleQueue
 from typing import Any, TextIO
 
 from edge.errors import InputError
@@ -79,9 +80,8 @@ class LineWriter:
         self.name = name
         self.lost, self.problem, self.gone = 0, "", False
         self._write, self._form, self._patient = write, form, patient
-        self._lines: deque[bytes] = deque()
-        """Lines that wait; the first stays here while it is written."""
-        self._changed = threading.Condition()
+        self._lines: SimpleQueue[bytes | None] = SimpleQueue()
+        """Lines that wait, and None at the end."""
         self._closed = False
         self._thread = threading.Thread(target=self._work, name=f"lines to {name}", daemon=True)
         self._thread.start()
@@ -91,48 +91,39 @@ class LineWriter:
         text = self._form(event)
         if text is None:
             return
-        with self._changed:
-            while len(self._lines) >= MOST_LINES and not self.gone and self._patient():
-                self._changed.wait(PATIENCE_S)
-            if self.gone or self._closed or len(self._lines) >= MOST_LINES:
-                self._lose(1, UNREAD)
-            else:
-                self._lines.append(text.encode(errors="backslashreplace") + b"\n")
-                self._changed.notify_all()
+        while self._full() and not self.gone and self._patient():
+            time.sleep(PATIENCE_S)
+        if self.gone or self._closed or self._full():
+            self._lose(1, UNREAD)
+        else:
+            self._lines.put(text.encode(errors="backslashreplace") + b"\n")
+
+    def _full(self) -> bool:
+        return self._lines.qsize() >= MOST_LINES
 
     def _lose(self, lines: int, problem: str) -> None:
         self.lost += lines
         self.problem = self.problem or problem
 
     def _work(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._lines or self._closed)
-                if not self._lines or self.gone:
-                    return
+        for line in iter(self._lines.get, None):
             try:
-                self._write(self._lines[0])
+                self._write(line)
             except (OSError, ValueError) as error:  # ValueError: the file is closed
                 self._lose(1, getattr(error, "strerror", "") or str(error))
                 self.gone |= isinstance(error, BrokenPipeError | ValueError)
-            with self._changed:
-                self._lines.popleft()
-                if self.gone:
-                    self.lost += len(self._lines)
-                    self._lines.clear()
-                self._changed.notify_all()
 
     def close(self) -> None:
         """Give the waiting lines a second to leave, or as long as patience lasts."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
+        self._closed = True
+        self._lines.put(None)
         self._thread.join(CLOSE_S)
         while self._thread.is_alive() and self._patient():
             self._thread.join(CLOSE_S)
         if self._thread.is_alive():
             self.gone = True
-            self._lose(len(self._lines), UNREAD)
+            # The line that is being written counts in place of the end.
+            self._lose(self._lines.qsize(), UNREAD)
 
 
 class Lines:

@@ -4,7 +4,8 @@ A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock,
 joint in radians. A line may name its joints, `"names": ["elbow", ...]`; its angles are then put in
 the arm's order, and those of other joints are ignored. The sender's clock need not be ours. The
 quickest tenth of the recent lines gives the offset between the two clocks, and a line that took
-longer is older by the difference.
+longer is older by the difference. With a line whose time goes back, everything begins anew: the
+sender's clock was set, or the sender was started again.
 """
 
 from __future__ import annotations
@@ -32,18 +33,11 @@ LOG = logging.getLogger(__name__)
 OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
 LONGEST_LINE = 65536
-MOST_LINES, MOST_READS, MOST_BYTES = 64, 64, 65536
-"""Lines, datagrams and bytes taken in a frame, so that a flood does not stop the loop. Of more
-lines the newest are taken: two senders at 1 kHz give 20 lines in a frame."""
-RECENT, LEAST_RECENT = 64, 8
-"""Lines that give the clocks' offset, and the least of them that can tell a wrong time."""
-AHEAD_S = 0.02
-"""A line whose time is further ahead of the others' than this is wrong. If others follow it, the
-sender's clock was set, and the offset follows too."""
-BACKWARD_LINES = 16
-"""Lines in a row whose time goes back, after which the sender's clock was set back."""
-RESTART_S = 1.0
-"""A sender whose time goes back by more than this has started anew."""
+MOST_LINES, MOST_BYTES = 64, 65536
+"""Lines and bytes taken in a frame, so that a flood does not stop the loop. Of more lines the
+newest are taken: two senders at 1 kHz give 20 lines in a frame."""
+RECENT = 64
+"""Lines that give the clocks' offset."""
 SILENT_S = 1.0
 """After so long without a line from the chosen sender, another one may take its place."""
 
@@ -68,7 +62,6 @@ class Joints:
         names: Sequence[str] | None = None,
         now: Callable[[], float],
         oldest_s: float = OLDEST_S,
-        shared_clock: bool = False,
     ) -> None:
         """Listen to a source.
 
@@ -79,17 +72,14 @@ class Joints:
                 are ignored where this is None.
             now: the loop's clock.
             oldest_s: greatest age of a pose.
-            shared_clock: the sender's `t` is on the loop's clock (both on one machine,
-                CLOCK_MONOTONIC).
         """
         self._source, self._dof, self._now = source, dof, now
         self._names = None if names is None else tuple(names)
-        self._oldest, self._shared = oldest_s, shared_clock
+        self._oldest = oldest_s
         self._rest = b""
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
         self._recent: deque[float] = deque(maxlen=RECENT)
-        """Arrival minus t of the last lines, rejected ones included."""
-        self._backward = 0
+        """Arrival minus t of the last lines."""
         self._ended = False
         self.malformed = 0
         """Number of lines that were not used."""
@@ -105,7 +95,8 @@ class Joints:
         self._take()
         if not self._poses:
             return None
-        sent = t if self._shared else t - self._offset()
+        # A line without delay gives the offset of the sender's clock.
+        sent = t - sorted(self._recent)[len(self._recent) // 10]
         after: tuple[float, NDArray[np.float64]] | None = None
         for pose in reversed(self._poses):
             if pose[0] <= sent:
@@ -125,9 +116,7 @@ class Joints:
     def _take(self) -> None:
         """Parse the lines that have come."""
         arrived, data = self._now(), b""
-        for _ in range(MOST_READS):
-            if self._ended or len(data) >= MOST_BYTES:
-                break
+        while not self._ended and len(data) < MOST_BYTES:
             piece = self._source()
             self._ended = piece is None
             if not piece:
@@ -146,10 +135,6 @@ class Joints:
     def _bad(self, problem: str, lines: int = 1) -> None:
         self.malformed += lines
         self.problem = problem
-
-    def _offset(self) -> float:
-        """Arrival minus t of a line without delay."""
-        return sorted(self._recent)[len(self._recent) // 10]
 
     def _line(self, line: bytes, arrived: float) -> None:
         try:
@@ -171,19 +156,10 @@ class Joints:
             q = [q[column] for column in columns]
         if len(q) != self._dof:
             return self._bad(f"a line has {len(q)} angles, the arm has {self._dof}")
-        self._recent.append(arrived - t)
-        # The lines of a file, on a shared clock, may come all at once.
-        enough = len(self._recent) >= LEAST_RECENT and not self._shared
-        if enough and arrived - t < self._offset() - AHEAD_S:
-            return self._bad("its time is ahead of the other lines'")
         if self._poses and t <= self._poses[-1][0]:
-            self._backward += 1
-            if t > self._poses[-1][0] - RESTART_S and self._backward < BACKWARD_LINES:
-                return self._bad("time goes back")
             self._poses.clear()
             self._recent.clear()
-            self._recent.append(arrived - t)
-        self._backward = 0
+        self._recent.append(arrived - t)
         self._poses.append((float(t), np.array(q, dtype=np.float64)))
 
 

@@ -101,7 +101,7 @@ def test_run_flags_a_decision_whose_joints_never_came(edge, exported, recordings
 
 
 def test_run_takes_joints_from_stdin(exported, recordings):
-    """Lines on the fake's own clock, so that its virtual time finds them all."""
+    """All lines come at once: some poses are known, and later ones are missing."""
     trial = recording.load(recordings / "hard_2.npz")
     sent = "".join(
         json.dumps({"t": t, "q": q}) + "\n"
@@ -109,12 +109,11 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     )
     done = subprocess.run(
         [sys.executable, "-m", "edge", "run", "--model", str(exported / "model.onnx"),
-         "--fake", str(recordings / "hard_2.npz"), "--joints", "stdin", "--joints-shared-clock"],
+         "--fake", str(recordings / "hard_2.npz"), "--joints", "stdin"],
         cwd=ROOT, input=sent + "nonsense\n", capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert done.returncode == 0
     flags = [e["flags"] for e in lines(done.stdout) if e["event"] == "decision"]
-    # 63 lines are 0.63 s of a window that ends at 1.4 s: known at first, then missing.
     assert all("missing_pose" in f for f in flags)
     assert "unusable lines: 1; the last one: a line is not" in done.stderr
 

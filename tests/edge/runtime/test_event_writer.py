@@ -88,7 +88,8 @@ def test_a_line_that_comes_after_the_end_is_lost_and_counted():
 
 
 def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
-    monkeypatch.setattr(event_writer, "MOST_LINES", 10)
+    monkeypatch.setattr(event_writer, "MOST_LINES", 100)
+    monkeypatch.setattr(event_writer, "PATIENCE_S", 1e-4)
     reading, writing = os.pipe()
     got = []
 
