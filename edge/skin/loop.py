@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import signal
 from collections import Counter
@@ -115,17 +114,6 @@ class Schedule:
 
 
 @contextmanager
-def garbage_aside() -> Iterator[None]:
-    """Leave the objects there are out of garbage collection, so that one in the block is short."""
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-
-
-@contextmanager
 def stop_on(*signals: int) -> Iterator[Stop]:
     """Let a signal end the loop after the current frame; a second one terminates at once."""
     stop = Stop()
@@ -176,14 +164,13 @@ class Loop:
 
     def frames(self) -> Iterator[Frame]:
         """Read until the time is over or a stop is asked for."""
-        with garbage_aside():
-            while not self._stop.asked:
-                due = self.schedule.wait(self._stop)
-                # A thousandth of a tick allows for rounding.
-                ended = due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s
-                if ended or self._stop.asked:
-                    return
-                frame = self.skin.read()
-                if self.joints is not None:
-                    frame = replace(frame, joints=self.joints.at(frame.t))
-                yield frame
+        while not self._stop.asked:
+            due = self.schedule.wait(self._stop)
+            # A thousandth of a tick allows for rounding.
+            ended = due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s
+            if ended or self._stop.asked:
+                return
+            frame = self.skin.read()
+            if self.joints is not None:
+                frame = replace(frame, joints=self.joints.at(frame.t))
+            yield frame

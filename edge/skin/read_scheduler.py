@@ -1,14 +1,11 @@
 """The chips to read next, where one bus cannot carry the whole skin at the loop's rate.
 
-While nothing touches, the chips are read in turn, as many in a frame as the wire carries. During a
-contact, the chips at and around the touched taxels are read in every frame, and the others share
-the rest of the wire. A taxel that was not read keeps its last value and its own time
-(`Frame.times`).
+The chips that have waited longest come first, as many in a frame as the wire carries. During a
+contact, the chips at and around the touched taxels come before all others, except those that are
+overdue. A taxel that was not read keeps its last value and its own time (`Frame.times`).
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +13,15 @@ from numpy.typing import NDArray
 from edge.i2c.chip import UNUSED
 from edge.i2c.tca9548a import SELECT_BITS, VERIFY_BITS
 from edge.skin.file import SkinFile
-from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
 MARGIN = 0.9
 """Share of a period for planned readings; retries and checks need the rest."""
-SPARE = 0.15
-"""Share of the wire for chips away from the contact, so that none is forgotten."""
+OVERDUE_FRAMES = 12
+"""A chip that has waited for so many frames comes before those at a contact."""
 OLDEST_FRAMES = 25
-"""After so many frames without a reading a taxel is no longer valid. With `SPARE` of a bus for
-the rest, a full turn through 32 chips takes at most 20 frames."""
+"""After so many frames without a reading a taxel is no longer valid. Of 32 chips on a bus, none
+waits for more than 20."""
 
 
 class ReadScheduler:
@@ -67,36 +63,23 @@ class ReadScheduler:
 
     def _plan(self, b: int, felt: NDArray[np.bool_]) -> list[int]:
         bus, read_at = self._buses[b], self._read_at[b]
-        bits = MARGIN * bus.clock_hz / self._rate_hz
-        hot = np.any(self._near[b] & felt, axis=1).tolist()
-        oldest_first = np.argsort(read_at, kind="stable").tolist()
-        near = [i for i in oldest_first if hot[i]]
-        away = [i for i in oldest_first if not hot[i]]
+        left = MARGIN * bus.clock_hz / self._rate_hz
+        away = ~np.any(self._near[b] & felt, axis=1)
+        waiting = self._tick - read_at < OVERDUE_FRAMES
         chosen: list[int] = []
-        left = self._take(chosen, near, bus, (1 - SPARE) * bits) + SPARE * bits
-        left = self._take(chosen, away, bus, left)
-        self._take(chosen, near, bus, left)
-        if not chosen:
-            chosen.append(oldest_first[0])  # even a wire too slow for one chip reads one
+        connected = set()
+        for i in np.lexsort((read_at, away, waiting)).tolist():
+            chip = bus.chips[i]
+            channel = chip.mux, chip.channel
+            left -= chip.frame_bits + self.select_bits * (channel not in connected)
+            # Even a wire too slow for one chip reads one.
+            if left < 0 and chosen:
+                break
+            chosen.append(i)
+            connected.add(channel)
         chosen.sort()
         read_at[chosen] = self._tick
         return chosen
-
-    def _take(self, chosen: list[int], wanted: Sequence[int], bus: BusSpec, bits: float) -> float:
-        """Add chips while the bits last, and return the bits left."""
-        connected = {(bus.chips[i].mux, bus.chips[i].channel) for i in chosen}
-        for i in wanted:
-            if i in chosen:
-                continue
-            chip = bus.chips[i]
-            channel = chip.mux, chip.channel
-            cost = chip.frame_bits + self.select_bits * (channel not in connected)
-            if cost > bits:
-                break
-            bits -= cost
-            chosen.append(i)
-            connected.add(channel)
-        return bits
 
 
 def with_neighbours(mask: NDArray[np.bool_], wraps: bool) -> NDArray[np.bool_]:
