@@ -35,7 +35,6 @@ from edge.fake.player import frame_bits
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.skin.file import SkinFile, frame_rate, load
-from edge.skin.loop import garbage_aside
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import first_contact
@@ -95,8 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
 def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
     """The contents of board.json; `skin` is the one whose wire time is calculated, or None."""
     real_s, own_s = time.perf_counter(), time.process_time()
-    with garbage_aside():
-        repeats = [time_stages(model, rounds // REPEATS) for _ in range(REPEATS)]
+    repeats = [time_stages(model, rounds // REPEATS) for _ in range(REPEATS)]
     real_s, own_s = time.perf_counter() - real_s, time.process_time() - own_s
     waited, load = round(max(0.0, 1.0 - own_s / real_s), 3), round(os.getloadavg()[0], 2)
     if waited > BUSY_SHARE:
