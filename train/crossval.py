@@ -55,10 +55,10 @@ def neighbours(
 ) -> NDArray[np.int64]:
     """Each trial's neighbours among the others: (n, components, k) rows, nearest first.
 
-    Coordinates and distances have the same bits as those of a `Projection` and of the exported
-    graph. Equal trials are equally far from any other, and at distance 0 from each other; equal
-    distances are in the order of the rows. Components beyond the numerical rank add nothing, so the
-    neighbours repeat.
+    Coordinates and distances are those of a `Projection` and of the exported graph, to the bit
+    where eigenvalues are as far apart as `Spectrum.leading` says. Equal trials are equally far from
+    any other, and at distance 0 from each other; equal distances are in the order of the rows.
+    Components beyond the numerical rank add nothing, so the neighbours repeat.
 
     Args:
         X: (n, features * samples).

@@ -135,9 +135,11 @@ class Spectrum:
         """(c, p) the first principal axes up to sign, faster than by `principal_axes`.
 
         The fast way is taken if the last axis has more than `WELL_CONDITIONED` of the first one's
-        variance, and no two eigenvalues are closer than `CLOSE_EIGENVALUES`. An axis is then
-        accurate to 1e-16 / `WELL_CONDITIONED` over the relative gap of its eigenvalue. Otherwise
-        `principal_axes` is used, so that the axes are always those of a `Projection`.
+        variance, and no two eigenvalues are closer than `CLOSE_EIGENVALUES`. Let g be an axis'
+        share of the largest variance times the relative gap of its eigenvalue. The axis is accurate
+        to about 1e-16 / g. With g of 1e-4 or more, coordinates along these axes have the bits of a
+        `Projection`; with less, few of them differ, by one unit of the grid. Otherwise
+        `principal_axes` gives the very axes of a `Projection`.
         """
         top = self.values[: count + 1]
         if (
@@ -163,12 +165,17 @@ class Spectrum:
         Args:
             labels: (n,) class indices.
             shrinkage: above 0.
+
+        Raises:
+            InputError: the shrinkage is not above 0.
         """
         weights = self._lift(self.directions(labels, shrinkage))
         return np.asarray(weights * _signs(weights.T))
 
     def directions(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
         """(r, c) the `discriminants` in the eigenvectors' basis, to be multiplied by `scores`."""
+        if not shrinkage > 0.0:
+            raise InputError(f"the shrinkage of lda must be above 0, not {shrinkage:g}")
         n = len(labels)
         ridge = shrinkage * float(self.values.sum()) / n
         root = 1.0 / np.sqrt(self.values + ridge)
@@ -288,7 +295,7 @@ class Projection(TransformerMixin, BaseEstimator):
             nor, with `lda`, than one less than the classes.
         features: names of the feature types, in the order of X.
         kind: one of `KINDS`.
-        shrinkage: of the within-class scatter; only `lda` uses it.
+        shrinkage: of the within-class scatter, above 0; only `lda` uses it.
         widths: columns of each feature type; None if equal.
 
     Attributes:
@@ -324,7 +331,7 @@ class Projection(TransformerMixin, BaseEstimator):
 
         Raises:
             InputError: the features are too large or too small for distances, the kind is
-                unknown, or it needs labels.
+                unknown, or `lda` has no labels or a shrinkage that is not above 0.
         """
         X = np.asarray(X, dtype=np.float64)
         self.n_features_in_ = X.shape[1]

@@ -10,7 +10,7 @@ from edge.errors import InputError
 from train.crossval import accuracies, neighbours, votes_right
 from train.dataset import load_trials
 from train.pipeline import vote
-from train.projection import Projection, Spectrum, principal_axes
+from train.projection import Projection, Spectrum, on_grid, principal_axes
 
 # The oracle warns where every trial has a label of its own.
 pytestmark = pytest.mark.filterwarnings("ignore:The number of unique classes")
@@ -144,21 +144,41 @@ def subspace_gap(ours: np.ndarray, exact: np.ndarray) -> float:
     return worst
 
 
+def rows_of(shape, values, rng):
+    """Centred rows with these singular values."""
+    left = np.linalg.qr(rng.normal(size=(shape[0], len(values))))[0]
+    left = np.linalg.qr(left - left.mean(axis=0))[0]
+    return left * values @ np.linalg.qr(rng.normal(size=(shape[1], len(values))))[0].T
+
+
 @pytest.mark.parametrize("shape", [(60, 24), (24, 60)])
 @pytest.mark.parametrize("decades", [2, 3.9, 8, 15])
 def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     """Below 1e-4 of the largest singular value the covariance is not trusted any more."""
-    rng = np.random.default_rng(5)
     side = min(shape)
-    left = np.linalg.qr(rng.normal(size=(shape[0], side)))[0]
-    left = np.linalg.qr(left - left.mean(axis=0))[0]
-    right = np.linalg.qr(rng.normal(size=(shape[1], side)))[0]
-    X = left * 10.0 ** -np.linspace(0, decades, side) @ right.T
+    X = rows_of(shape, 10.0 ** -np.linspace(0, decades, side), np.random.default_rng(5))
     ours = Spectrum(X).leading(side - 2)
     _, exact, _ = principal_axes(X)
     assert len(ours) == min(side - 2, len(exact))
     assert subspace_gap(ours, exact[: len(ours)]) < 1e-7
     assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7
+
+
+@pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (0.02, 0.005), (2e-4, 0.5)])
+@pytest.mark.parametrize("shape", [(60, 120), (120, 60)])
+def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(shape, share, gap):
+    """Where the last axis' share of the largest variance times its relative gap is 1e-4."""
+    rng = np.random.default_rng(7)
+    for components in (2, 5, 19):
+        falling = share ** np.linspace(0.0, 0.5, components)
+        beyond = falling[-1] * np.sqrt(1.0 - gap) * 0.5 ** np.arange(3.0)
+        X = rows_of(shape, np.concatenate([falling, beyond]), rng)
+        model = Projection("none", components, ["max_force"]).fit(X)
+        ours = Spectrum(X).leading(components)
+        signs = np.sign((ours @ model.weights_).diagonal())
+        d = X - model.mean_
+        z = model.grid_.project(d, on_grid(ours.T))
+        assert (z * signs == model.transform(X)).all()
 
 
 def test_the_neighbours_are_those_of_a_projection_fitted_without_the_trial():

@@ -203,9 +203,12 @@ def test_trials_that_are_all_equal_have_no_discriminant(value):
     assert fitted.transform(np.zeros((2, 120))).shape == (2, 0)
 
 
-def test_discriminants_without_labels_and_unknown_projections_are_refused():
+def test_discriminants_without_labels_or_shrinkage_and_unknown_projections_are_refused():
     with pytest.raises(InputError, match="needs labels"):
         Projection(kind="lda").fit(features(30))
+    for shrinkage in (0.0, -0.1, np.nan):
+        with pytest.raises(InputError, match="shrinkage of lda must be above 0, not"):
+            Projection(kind="lda", shrinkage=shrinkage).fit(features(30), np.repeat(["a", "b"], 15))
     with pytest.raises(InputError, match="one of pca, lda, not 'nca'"):
         Projection(kind="nca").fit(features(30))
 
