@@ -1,8 +1,10 @@
 """Measure what a model's number format costs and gives, on the graph that ships.
 
-The exported graph computes on whole numbers in float64. This program runs it beside two copies: one
-with every number in float32, and one whose matrices are in int8 besides (ONNX Runtime's dynamic
-quantisation). Each row says the time of a decision, the size, and how many labels become others.
+The exported graph computes on whole numbers in float64. This program runs it beside three copies:
+one that rounds nothing to whole numbers, one with every number in float32 besides, and one whose
+matrices are in int8 besides (ONNX Runtime's dynamic quantisation). Each row says the time of a
+decision, the size, how many labels become others, and how many of the neighbours' distances have
+other bits where a vector is decided alone than where all are decided at once.
 """
 
 from __future__ import annotations
@@ -39,6 +41,23 @@ def _round_to_float32(tensor: onnx.TensorProto) -> None:
         tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
 
 
+def _without(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> None:
+    """Remove nodes of one input and one output: their input takes the place of their output."""
+    given = {node.output[0]: node.input[0] for node in nodes}
+    for node in nodes:
+        graph.node.remove(node)
+    for node in graph.node:
+        node.input[:] = [given.get(name, name) for name in node.input]
+
+
+def unrounded(model: onnx.ModelProto) -> onnx.ModelProto:
+    """A copy of a graph that rounds nothing to whole numbers."""
+    copy = onnx.ModelProto()
+    copy.CopyFrom(model)
+    _without(copy.graph, [node for node in copy.graph.node if node.op_type == "Round"])
+    return copy
+
+
 def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
     """A copy of a graph with every float64 in float32."""
     copy = onnx.ModelProto()
@@ -50,19 +69,15 @@ def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
         if value.type.tensor_type.elem_type == TensorProto.DOUBLE:
             value.type.tensor_type.elem_type = TensorProto.FLOAT
     stored = {tensor.name for tensor in graph.initializer}
-    plain: dict[str, str] = {}
-    for node in list(graph.node):
+    for node in graph.node:
         for attribute in node.attribute:
             if node.op_type == "Cast" and attribute.i == TensorProto.DOUBLE:
                 attribute.i = TensorProto.FLOAT
             elif attribute.HasField("t"):
                 _round_to_float32(attribute.t)
-        if node.op_type == "Cast" and node.input[0] in stored:
-            # Matrices are stored in float32 already; nothing is left to convert.
-            plain[node.output[0]] = node.input[0]
-            graph.node.remove(node)
-    for node in graph.node:
-        node.input[:] = [plain.get(name, name) for name in node.input]
+    # Matrices are stored in float32 already; nothing is left to convert.
+    casts = [node for node in graph.node if node.op_type == "Cast" and node.input[0] in stored]
+    _without(graph, casts)
     return copy
 
 
@@ -79,8 +94,11 @@ def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:
 
 def answers(
     model: onnx.ModelProto, vectors: NDArray[Any], tasks: list[str]
-) -> tuple[NDArray[np.int64], float]:
-    """The labels (tasks, n) of vectors, and the median microseconds of one decision."""
+) -> tuple[NDArray[np.int64], float, float]:
+    """The labels (tasks, n) of vectors, and the median microseconds of one decision.
+
+    Last comes the share of the distances with other bits where each vector is decided alone.
+    """
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
@@ -91,17 +109,23 @@ def answers(
         model.SerializeToString(), options, providers=["CPUExecutionProvider"]
     )
     labels = session.run([f"{task}_label" for task in tasks], {"features": vectors})
+
+    def distances(some: NDArray[Any]) -> NDArray[Any]:
+        return np.hstack(session.run([f"{t}_distances" for t in tasks], {"features": some}))
+
+    alone = np.vstack([distances(vector[None]) for vector in vectors])
+    changed = float((alone != distances(vectors)).mean())
     times = []
     for _ in range(ROUNDS):
         began = time.perf_counter()
         for i in range(CALLS):
             session.run(None, {"features": vectors[i % len(vectors)][None]})
         times.append((time.perf_counter() - began) / CALLS * 1e6)
-    return np.stack(labels), statistics.median(times)
+    return np.stack(labels), statistics.median(times), changed
 
 
 def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
-    """A row for each number format: microseconds, kilobytes, and labels that become others.
+    """A row for each number format: time, size, labels and distances that become others.
 
     Args:
         model: an exported model.
@@ -119,23 +143,28 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
         )
     vectors = vectors[np.isfinite(vectors).all(axis=1)]
     shipped = onnx.load(model)
-    in_single = in_float32(shipped)
+    real = unrounded(shipped)
+    in_single = in_float32(real)
     with tempfile.TemporaryDirectory() as folder:
         formats = {
             "whole numbers in float64 (as shipped)": (shipped, np.float64),
+            "float64, nothing rounded": (real, np.float64),
             "float32": (in_single, np.float32),
             "int8 matrices": (in_int8(in_single, Path(folder)), np.float32),
         }
     results = [answers(graph, vectors.astype(dtype), tasks) for graph, dtype in formats.values()]
-    shipped_labels, _ = results[0]
+    shipped_labels, *_ = results[0]
     return [
         {
             "format": name,
             "decision us": round(microseconds, 1),
             "size kB": round(graph.ByteSize() / 1e3, 1),
             "other labels %": round(100 * float((labels != shipped_labels).mean()), 2),
+            "other distances alone %": round(100 * changed, 1),
         }
-        for (name, (graph, _)), (labels, microseconds) in zip(formats.items(), results, strict=True)
+        for (name, (graph, _)), (labels, microseconds, changed) in zip(
+            formats.items(), results, strict=True
+        )
     ]
 
 

@@ -23,9 +23,9 @@ def rows(monkeypatch):
 
 
 def test_each_format_has_its_price_and_the_shipped_one_no_other_label(rows):
-    assert [row["format"].split()[0] for row in rows] == ["whole", "float32", "int8"]
+    assert [row["format"].split()[0] for row in rows] == ["whole", "float64,", "float32", "int8"]
     assert all(tuple(row) == FORMAT and row["decision us"] > 0.0 for row in rows)
-    assert rows[0]["other labels %"] == 0.0
+    assert rows[0]["other labels %"] == rows[0]["other distances alone %"] == 0.0
 
 
 @pytest.mark.parametrize("file", ["golden/golden.npz", "../edge/demo/pillow-movable.npz"])
@@ -38,12 +38,22 @@ def test_labels_that_differ_are_counted(monkeypatch):
     """A copy that answers every second vector otherwise has half of the labels wrong."""
     monkeypatch.setattr(arithmetic, "in_int8", lambda model, folder: model)
     shipped = np.zeros((2, 8), np.int64)
-    answers = iter([(shipped, 1.0), (shipped + np.arange(8) % 2, 2.0), (shipped + 1, 3.0)])
-    monkeypatch.setattr(arithmetic, "answers", lambda *_: next(answers))
+    answers = iter([shipped, shipped, shipped + np.arange(8) % 2, shipped + 1])
+    monkeypatch.setattr(arithmetic, "answers", lambda *_: (next(answers), 1.0, 0.0))
 
     rows = arithmetic.compare(GOLDEN / "model.onnx", GOLDEN / "golden.npz")
 
-    assert [row["other labels %"] for row in rows] == [0.0, 50.0, 100.0]
+    assert [row["other labels %"] for row in rows] == [0.0, 0.0, 50.0, 100.0]
+
+
+def test_the_copy_that_rounds_nothing_has_all_other_operators():
+    shipped = onnx.load(GOLDEN / "model.onnx")
+    copy = arithmetic.unrounded(shipped)
+
+    onnx.checker.check_model(copy, full_check=True)
+    assert {node.op_type for node in shipped.graph.node} - {"Round"} == {
+        node.op_type for node in copy.graph.node
+    }
 
 
 def test_the_copy_in_float32_has_no_float64_left():
@@ -59,4 +69,4 @@ def test_what_the_program_writes_the_report_reads(tmp_path, monkeypatch, rows, c
 
     assert arithmetic.main(["--model", "m", "--golden", "g", "--out", str(path)]) == 0
     assert read_formats(path) == json.loads(path.read_text()) == rows
-    assert capsys.readouterr().out.count("\n") == 3
+    assert capsys.readouterr().out.count("\n") == 4

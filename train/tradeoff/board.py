@@ -72,7 +72,7 @@ def estimated_s(board: str, step: str = "the frame that decides") -> float:
     return INSTRUCTIONS[step] / (1e9 * ESTIMATED[board])
 
 
-FORMAT = ("format", "decision us", "size kB", "other labels %")
+FORMAT = ("format", "decision us", "size kB", "other labels %", "other distances alone %")
 
 
 def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:

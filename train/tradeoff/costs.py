@@ -178,7 +178,8 @@ def section(measured: Measured) -> Section:
         _row(
             measured,
             str(row["format"]),
-            f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the labels differ",
+            f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the labels differ; "
+            f"{row['other distances alone %']:.0f} % of the distances depend on the batch",
             f"{row['decision us']:.0f} us to decide",
         )
         for row in measured.formats
@@ -197,9 +198,10 @@ def section(measured: Measured) -> Section:
             "stands the 95 % interval of this difference. A larger taxel carries the sum of the "
             "forces on its area.",
             "Number formats are those of the graph that ships, by `python -m export.arithmetic` on "
-            "this machine: the labels that differ are counted on the model's golden vectors. Only "
-            "the shipped format gives the same bits everywhere. A board's time is an estimate, see "
-            "the section on the board.",
+            "this machine. The labels that differ are counted on the model's golden vectors. A "
+            "distance depends on the batch where it has other bits if its vector is decided alone: "
+            "only whole numbers give the same bits in any order of summation, and so on every "
+            "machine. A board's time is an estimate, see the section on the board.",
         ],
         [Table("costs", "Points of accuracy, and the price", rows, timed=(TIME,), narrow=3)],
     )
