@@ -7,7 +7,13 @@ import pytest
 from edge.errors import InputError
 from train.tradeoff import board, costs
 
-ROW = {"format": "float32", "decision us": 20.0, "size kB": 10.0, "other labels %": 0.5}
+ROW = {
+    "format": "float32",
+    "decision us": 20.0,
+    "size kB": 10.0,
+    "other labels %": 0.5,
+    "other distances alone %": 2.0,
+}
 
 
 def test_number_formats_are_rows_beside_the_other_costs():
@@ -15,7 +21,9 @@ def test_number_formats_are_rows_beside_the_other_costs():
 
     first, *boards = table.rows
     assert first["what"] == "float32"
-    assert first["price"] == "10 kB; 0.5 % of the labels differ"
+    assert first["price"] == (
+        "10 kB; 0.5 % of the labels differ; 2 % of the distances depend on the batch"
+    )
     assert first[costs.TIME] == "20 us to decide"
     assert [row["t, points"] for row in boards] == ["the same bits"] * 3
     assert table.timed == (costs.TIME,)
