@@ -54,3 +54,8 @@ def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
         indices = zip(factors, list(zip(*pairs, strict=True))[1:], strict=True)
         out[task] = {f: tuple(map(names[f].index, labels)) for f, labels in indices}
     return out
+
+
+def families(y: Labels) -> list[tuple[str, ...]]:
+    """The tasks that are decided together: a product and its two factors each."""
+    return [(task, *factors) for task, factors in factors_of(y).items()]

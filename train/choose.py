@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.recording import Recording
+from train.agreement import families
 from train.candidates import Candidate, costs, places_of
 from train.dataset import DataSet
 from train.evaluate import (
@@ -26,6 +27,7 @@ from train.evaluate import (
 from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
+from train.stopping import held_out
 
 FEWEST_GROUPS = 3
 """Objects that a class needs before entire objects can be left out."""
@@ -73,13 +75,14 @@ class Chosen:
     Attributes:
         choice: the features, scaling, projection and numbers.
         accuracy: nested accuracy of the entire choice, with entire groups left out where
-            `left_out` is not `trial`.
+            `left_out` is not `trial`. Tasks that agree are decided together, as the model does.
         by_trial: the same with single trials left out.
         left_out: `trial`, or the label whose groups were left out.
-        candidates: nested accuracy of each candidate's own choice of numbers.
+        candidates: nested accuracy of each candidate's own choice of numbers, by the task alone.
         picks: the best settings of each candidate.
         folds: (n,) of `accuracy`.
-        by_fold: the choice without each fold's trials, whose answers `accuracy` counts.
+        by_fold: [fold]{task: the choice without the fold's trials}, whose decisions `accuracy`
+            counts: those of the task and of the tasks that are decided together with it.
     """
 
     choice: Choice
@@ -89,7 +92,7 @@ class Chosen:
     candidates: tuple[Result, ...] = ()
     picks: tuple[Choice, ...] = ()
     folds: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
-    by_fold: tuple[Choice, ...] = ()
+    by_fold: tuple[dict[str, Choice], ...] = ()
 
 
 class Choosing:
@@ -135,12 +138,17 @@ class Choosing:
             count = QUICK_FOLDS if quick else GROUP_FOLDS if len(groups) <= FEW else 10
             self._group_folds = group_folds(groups, count)
 
-    def _tables(self, window_s: float, nested: bool, what: str) -> tuple[AnswerTable, AnswerTable]:
+    def _features(self, window_s: float) -> NDArray[np.float64]:
+        """(n, p) of every candidate."""
+        return self._dataset.with_kernels(window_s).features(window_s, self._samples)
+
+    def _tables(
+        self, X: NDArray[np.float64], nested: bool, what: str
+    ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where there are any.
 
         Without groups, both are the answers to left-out trials.
         """
-        X = self._dataset.with_kernels(window_s).features(window_s, self._samples)
         grids = [grid for candidate in self.tried for grid in candidate.grids]
         answers = partial(
             evaluate,
@@ -166,13 +174,14 @@ class Choosing:
         ]
         y = self._y
         if not any(grid.targets for grid in grids):
-            y = {task: y[task] for task in y if task in self._grouped}
+            needed = self._grouped.union(*(f for f in families(y) if self._grouped & {*f}))
+            y = {task: y[task] for task in y if task in needed}
         with progress:
             return trials, answers(y, self._group_folds, unseen, progress=progress.update)
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
         """{task: answers of the candidate that is best in plain cross-validation}."""
-        trials, groups = self._tables(window_s, False, f"{window_s:g} s")
+        trials, groups = self._tables(self._features(window_s), False, f"{window_s:g} s")
         right: dict[str, NDArray[np.bool_]] = {}
         for task in self._y:
             table = groups if task in self._grouped else trials
@@ -224,8 +233,10 @@ class Choosing:
             {task: its settings}, the fold of each trial, and
             [fold]{task: the choice made without the fold's trials}.
         """
-        trials, groups = self._tables(window_s, True, "choosing")
+        X = self._features(window_s)
+        trials, groups = self._tables(X, True, "choosing")
         without: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
+        without_groups: list[dict[str, Choice]] = [{} for _ in range(int(groups.folds.max()) + 1)]
         chosen: dict[str, Chosen] = {}
         for task in self._y:
             grouped = task in self._grouped
@@ -236,6 +247,11 @@ class Choosing:
             for by_task, choice in zip(without, chosen_without, strict=True):
                 by_task[task] = choice
             picked = [trials.choices[task].index(choice) for choice in chosen_without]
+            if task in groups.right:
+                unseen = groups.choices[task]
+                places = groups.by_fold(task, costs(unseen, self._widths), margin=margin)
+                for by_task, place in zip(without_groups, places, strict=True):
+                    by_task[task] = unseen[place]
             nested = table.by_fold(task, prices, margin=margin)
             accuracies = [
                 table.answered(task, nested),
@@ -252,9 +268,66 @@ class Choosing:
                 tuple(rest),
                 tuple(choices[table.chosen(task, prices, places)] for places in own),
                 table.folds,
-                tuple(choices[place] for place in nested),
             )
-        return chosen, trials.folds, without
+        plans = {self._leave_out: (groups.folds, without_groups), TRIAL: (trials.folds, without)}
+        form = self._dataset.names, tuple(self._widths.values())
+        return decided_together(chosen, X, self._y, plans, *form, jobs=self._jobs), *plans[TRIAL]
+
+
+def decided_together(
+    chosen: Mapping[str, Chosen],
+    X: NDArray[np.float64],
+    y: Labels,
+    plans: Mapping[str, tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]],
+    features: Sequence[str],
+    widths: Sequence[int],
+    own: NDArray[np.bool_] | None = None,
+    jobs: int = 1,
+) -> dict[str, Chosen]:
+    """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a model.
+
+    A model decides tasks that agree together (`edge.model.agreement`).
+
+    Args:
+        chosen: {task: its settings}, with the accuracies of the task by itself.
+        X, y, features, widths: of the trials.
+        plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its trials}}.
+        own: (n,) whether a trial is the owner's, see `ContactClassifier.fit`.
+        jobs: processes.
+    """
+    family_of = {task: family for family in families(y) for task in family}
+    right: dict[tuple[str, str], NDArray[np.bool_]] = {}
+    for family in dict.fromkeys(family_of.values()):
+        for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
+            folds, choices = plans[left_out]
+            some = [{task: by_task[task] for task in family} for by_task in choices]
+            right |= {(left_out, task): np.zeros(len(X), dtype=bool) for task in family}
+            by_fold = held_out(X[None], y, folds, some, features, widths, own, jobs)
+            for fold, answers in enumerate(by_fold):
+                for task, (labels, *_) in answers.items():
+                    asked = folds == fold
+                    right[left_out, task][asked] = labels[0] == y[task][asked]
+
+    def counted(task: str, left_out: str, result: Result) -> Result:
+        if task not in family_of:
+            return result
+        hits = right[left_out, task][(plans[left_out][0] >= 0) & (y[task] != "")]
+        assert result.hits is not None
+        more = int(hits.sum()) - int(result.hits.sum())
+        return replace(result, right=result.right + more, hits=hits)
+
+    return {
+        task: replace(
+            settings,
+            accuracy=counted(task, settings.left_out, settings.accuracy),
+            by_trial=counted(task, TRIAL, settings.by_trial),
+            by_fold=tuple(
+                {each: by_task[each] for each in family_of.get(task, (task,))}
+                for by_task in plans[settings.left_out][1]
+            ),
+        )
+        for task, settings in chosen.items()
+    }
 
 
 def without_folds(

@@ -7,8 +7,10 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from edge.errors import InputError
@@ -233,6 +235,7 @@ def load_trials(
     arm: Chain | None = None,
     partial: bool = False,
     progress: bool = False,
+    jobs: int = 1,
 ) -> DataSet:
     """Follow the contacts of recordings.
 
@@ -253,6 +256,7 @@ def load_trials(
         arm: for recordings with joint angles that name no arm.
         partial: keep trials that have a label for some task.
         progress: show progress bars on stderr.
+        jobs: processes.
 
     Raises:
         InputError: a file cannot be used, the skins differ, or nothing is labelled or touched.
@@ -283,20 +287,11 @@ def load_trials(
     trials: list[Trial] = []
     untouched: list[tuple[Path, dict[str, str]]] = []
     unused: list[Path] = []
-    for recording, path in bar(kept, desc="following", unit=" trials", disable=not progress):
-        try:
-            tracker = ContactTracker(
-                for_device(reference, recording.layout),
-                settings,
-                chain=chain,
-                horizon_s=horizon_s,
-                features=names,
-                joints=joints,
-            )
-            touches = contacts(recording, tracker)
-            labels = labels_of(recording, len(touches))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+    tracked = {"chain": chain, "horizon_s": horizon_s, "features": names, "joints": joints}
+    work = (delayed(_followed)(*pair, reference, settings, **tracked) for pair in kept)
+    results = Parallel(n_jobs=jobs, return_as="generator")(work)
+    shown = bar(results, total=len(kept), desc="following", unit=" trials", disable=not progress)
+    for (recording, path), (touches, labels) in zip(kept, shown, strict=True):
         if not touches:
             untouched.append((path, recording.labels))
         if len(touches) > len(labels):
@@ -344,6 +339,18 @@ def load_trials(
         {need: left for need, left in (*lacking.items(), ("joint angles", bare)) if left},
         tuple(unused),
     )
+
+
+def _followed(
+    recording: Recording, path: Path, layout: SkinLayout, settings: TrackSettings, **tracked: Any
+) -> tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]:
+    """The contacts of a recording, and the labels of those that are trials."""
+    try:
+        tracker = ContactTracker(for_device(layout, recording.layout), settings, **tracked)
+        touches = contacts(recording, tracker)
+        return touches, labels_of(recording, len(touches))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> list[tuple[float, FeatureSeries]]:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,15 +26,12 @@ from edge.statistics import wilson
 from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of, types_of
-from train.projection import Spectrum
 from train.scaling import centred_and_scaled, finite, widths_of
+from train.search import Decomposition, SearchGrid
 
 FOLDS = 10
 SEED = 2012
 """Of the folds, so that they are the same for the same labels."""
-COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
-SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
-NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
 
 Labels = Mapping[str, NDArray[np.str_]]
 """{task: (n,) labels}."""
@@ -74,54 +70,6 @@ class Result:
         return wilson(self.right, self.total)
 
 
-@dataclass(frozen=True)
-class SearchGrid:
-    """Candidates that share a decomposition of the features.
-
-    Attributes:
-        scaling: one of `train.scaling.SCALINGS`.
-        projection: one of `train.projection.KINDS`.
-        features: names of the features taken; all where empty.
-        components: numbers of components, rising; `lda` takes all its directions.
-        most_directions: of `lda`, those that separate best first; all where None.
-        shrinkages: of `lda`, the largest first.
-        neighbours: values of k, rising.
-        targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
-        tasks: the tasks it is a candidate for; all where empty.
-        weights: of simulated trials and the owner's, see `train.pipeline.Choice`.
-    """
-
-    scaling: str = "none"
-    projection: str = "pca"
-    features: tuple[str, ...] = ()
-    components: tuple[int, ...] = COMPONENTS
-    most_directions: int | None = None
-    shrinkages: tuple[float, ...] = SHRINKAGES
-    neighbours: tuple[int, ...] = NEIGHBOURS
-    targets: tuple[str, ...] = ()
-    tasks: tuple[str, ...] = ()
-    weights: tuple[int, int] = (1, 1)
-
-    def choices(self, directions: int) -> list[Choice]:
-        """Every candidate, in the order of `_answers`.
-
-        Args:
-            directions: how many discriminants there are at most.
-        """
-        if self.projection == "pca":
-            cells = [(c, 0.01) for c in self.components]
-        else:
-            taken = min(directions, self.most_directions or directions)
-            cells = [(taken, shrinkage) for shrinkage in self.shrinkages]
-        return [
-            Choice(
-                self.scaling, c, k, self.projection, s, self.features, self.targets, self.weights
-            )
-            for c, s in cells
-            for k in self.neighbours
-        ]
-
-
 def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int64]:
     """(n,) folds in which each class is spread evenly; the same for the same labels."""
     order = np.random.default_rng(SEED).permutation(len(y))
@@ -136,73 +84,6 @@ def group_folds(groups: NDArray[np.str_], count: int = 20) -> NDArray[np.int64]:
     names, members = np.unique(groups, return_inverse=True)
     order = np.random.default_rng(SEED).permutation(len(names))
     return np.asarray((order % count)[members], dtype=np.int64)
-
-
-def _nearest(squares: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(m, k) columns of the smallest of (m, n), nearest first, equal ones in their order.
-
-    Which of several equal ones is the last of the k is left open.
-    """
-    places = np.sort(np.argpartition(squares, k - 1, axis=1)[:, :k], axis=1)
-    order = np.argsort(np.take_along_axis(squares, places, axis=1), axis=1, kind="stable")
-    return np.take_along_axis(places, order, axis=1)
-
-
-def _rounded(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coordinates (n, c) and (m, c) in whole steps, so coarse that `_squares` are exact.
-
-    A step is 2^-22 of the largest coordinate, or a little more where c is above 128. Equal trials
-    stay equal, though a matrix product may round their coordinates differently.
-    """
-    columns = max(a.shape[1], 1)
-    bits = (51 - (columns - 1).bit_length()) // 2
-    exponent = np.frexp(max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)))[1]
-    return np.rint(np.ldexp(a, bits - exponent)), np.rint(np.ldexp(b, bits - exponent))
-
-
-def _squares(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, n) squared distances of rows a (m, c) to rows b (n, c) of `_rounded`."""
-    products = a @ b.T
-    products *= -2.0
-    products += (a * a).sum(axis=1)[:, None]
-    products += (b * b).sum(axis=1)
-    return products
-
-
-def _neighbours(
-    spectrum: Spectrum,
-    new: NDArray[np.float64],
-    labels: NDArray[np.int64] | None,
-    grid: SearchGrid,
-    first: NDArray[np.int64],
-) -> NDArray[np.int64]:
-    """(projections, test, k) places among the trials of a spectrum, for each of the grid's.
-
-    The coordinates are those of `train.projection.Projection` but for its rounding of weights.
-
-    Args:
-        new: (test, p) rows.
-        labels: (targets, n) of the rows of the spectrum; None for principal components.
-        first: a row of the spectrum for each trial, which may count several times.
-    """
-    k = min(grid.neighbours[-1], len(first))
-    if labels is not None:
-        scores, places = spectrum.scores_of(new), []
-        for shrinkage in grid.shrinkages:
-            directions = np.hstack([spectrum.directions(target, shrinkage) for target in labels])
-            directions = directions[:, : grid.most_directions]
-            known, tested = _rounded(spectrum.scores[first] @ directions, scores @ directions)
-            places.append(_nearest(_squares(tested, known), k))
-        return np.stack(places)
-    axes = spectrum.leading(grid.components[-1]).T
-    known, tested = _rounded(spectrum.rows[first] @ axes, new @ axes)
-    squares, places = np.zeros((len(tested), len(known))), []
-    for low, high in pairwise((0, *grid.components)):
-        squares += _squares(tested[:, low:high], known[:, low:high])
-        places.append(_nearest(squares, k))
-    return np.stack(places)
 
 
 def _answers(
@@ -221,22 +102,23 @@ def _answers(
     with threadpool_limits(1):
         for grid in grids:
             for tasks, counts in _counted(grid, classes, own, train):
-                rows, members = np.repeat(train, counts), train[counts > 0]
                 if fitted_for != (grid.scaling, grid.features, counts.tobytes()):
                     fitted_for = grid.scaling, grid.features, counts.tobytes()
-                    part = X[:, columns_of(grid.features, features, widths)]
+                    rows, members = np.repeat(train, counts), train[counts > 0]
+                    columns = columns_of(grid.features, features, widths)
                     types = types_of(grid.features, features, widths)
-                    mean, gain, known = centred_and_scaled(part[rows], grid.scaling, *types)
-                    spectrum, new = Spectrum(known), (part[test] - mean) * gain
+                    mean, gain, known = centred_and_scaled(
+                        X[np.ix_(rows, columns)], grid.scaling, *types
+                    )
+                    labels_of = {task: labels[rows] for task, labels in classes.items()}
                     first = (np.cumsum(counts) - counts)[counts > 0]
-                pca = grid.projection == "pca"
+                    new = (X[np.ix_(test, columns)] - mean) * gain
+                    decomposition = Decomposition(known, new, labels_of, first)
                 near = None
                 for task in tasks:
+                    if near is None or (grid.projection == "lda" and not grid.targets):
+                        near = decomposition.neighbours(grid, task)
                     labels = classes[task]
-                    if near is None or not (pca or grid.targets):
-                        targets = [classes[t][rows] for t in grid.targets or (task,)]
-                        separated = None if pca else np.stack(targets)
-                        near = _neighbours(spectrum, new, separated, grid, first)
                     right = votes_right(near, labels[members], labels[test])
                     places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
                     # One row for each candidate: for each projection, each k.

@@ -152,6 +152,7 @@ def fit(
             arm=arm,
             partial=True,
             progress=progress,
+            jobs=jobs,
         )
         fixed = threshold is not None or onset is not None
         if not fixed and "threshold_counts" not in raw.own[0].meta.get("skin", {}):

@@ -15,19 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from train.choose import FEWEST_GROUPS, QUICK_FOLDS, TRIAL, Chosen
+from train.choose import FEWEST_GROUPS, QUICK_FOLDS, TRIAL, Chosen, decided_together
 from train.dataset import DataSet
 from train.evaluate import (
     FOLDS,
     AnswerTable,
     Labels,
-    SearchGrid,
     evaluate,
     group_folds,
     stratified_folds,
 )
 from train.labels import ENOUGH
 from train.pipeline import Choice
+from train.search import SearchGrid
 
 FEWEST_OWN = 3
 """The owner's trials with a label for a task from which on it is fitted."""
@@ -110,7 +110,10 @@ def mix(
     groups = None if leave_out == TRIAL else dataset.part(own).groups(leave_out)
     if groups is not None and len(set(groups.tolist())) >= FEWEST_GROUPS:
         by_group = answers(group_folds(groups, count))
-    without: list[dict[str, Choice]] = [{} for _ in range(int(by_trial.folds.max()) + 1)]
+    plans: dict[str, tuple[NDArray[np.int64], list[dict[str, Choice]]]] = {
+        left_out: (table.folds, [{} for _ in range(int(table.folds.max()) + 1)])
+        for left_out, table in ((leave_out, by_group), (TRIAL, by_trial))
+    }
     notes = [
         f"{int(own.sum())} of your own trials beside {int((~own).sum())} simulated ones, on which "
         "the settings are chosen (the table); the other accuracies are those on your own"
@@ -126,8 +129,9 @@ def mix(
         rank = np.arange(len(table.choices[task]))
         rule = rank, (rank[:1] if labelled[task] < ENOUGH else None)
         best = table.choices[task][table.chosen(task, *rule)]
-        for choice_of, place in zip(without, by_trial.by_fold(task, *rule), strict=True):
-            choice_of[task] = table.choices[task][place]
+        for left_out, each in ((leave_out, by_group), (TRIAL, by_trial)):
+            for by_task, place in zip(plans[left_out][1], each.by_fold(task, *rule), strict=True):
+                by_task[task] = each.choices[task][place]
         chosen[task] = replace(
             settled,
             choice=best,
@@ -135,7 +139,6 @@ def mix(
             by_trial=by_trial.nested(task, *rule),
             left_out=TRIAL if table is by_trial else leave_out,
             folds=table.folds,
-            by_fold=tuple(table.choices[task][place] for place in table.by_fold(task, *rule)),
         )
         names = {
             ONCE: "both",
@@ -152,7 +155,8 @@ def mix(
                 f"simulated trials no longer help {task}: export your own alone, which also "
                 "chooses the features by them"
             )
-    return chosen, by_trial.folds, without, notes
+    form = dataset.names, dataset.widths(samples)
+    return decided_together(chosen, features, y, plans, *form, own, jobs), *plans[TRIAL], notes
 
 
 def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> SearchGrid:

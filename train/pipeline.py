@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from edge.errors import InputError
+from edge.model.agreement import agreed
 from edge.model.teaching import nearest_of_label
 from edge.touch.features import FEATURES
 from train.agreement import factors_of
@@ -102,6 +104,21 @@ class Choice:
         if own is not None:
             counts = np.where(own, self.weights[1], self.weights[0])
         return np.where(labels == "", 0, counts)
+
+
+class Decided(NamedTuple):
+    """A task's decisions on some vectors.
+
+    Attributes:
+        labels: (m,) indices.
+        distances: (m, classes) squared distance of the nearest answer with each label, see
+            `label_distances` and `edge.model.agreement`, as a multiple of `spreads_`.
+        nearest: (m,) distance of the nearest trial.
+    """
+
+    labels: NDArray[np.int64]
+    distances: NDArray[np.float64]
+    nearest: NDArray[np.float64]
 
 
 class ContactClassifier:
@@ -235,8 +252,23 @@ class ContactClassifier:
         """(m, k) places of the smallest squares (m, members); of equal ones the first."""
         return np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
 
+    def decide(self, X: NDArray[np.float64]) -> dict[str, Decided]:
+        """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the graph's votes."""
+        labels, distances, nearest = {}, {}, {}
+        for task, known in self.labels_.items():
+            squares = self.squares(task, X)
+            labels[task] = vote(known[self.nearest(task, squares)])
+            to_labels = label_distances(squares, known, len(self.classes_[task]))
+            distances[task] = to_labels / self.spreads_[task]
+            nearest[task] = np.sqrt(squares.min(axis=1))
+        for task, factors in self.products_.items():
+            together, nearest_answers = agreed(task, factors, distances)
+            labels |= together
+            distances |= nearest_answers
+        return {task: Decided(labels[task], distances[task], nearest[task]) for task in labels}
+
     def predict(self, X: NDArray[np.float64]) -> dict[str, NDArray[np.str_]]:
-        """{task: (m,) labels} for vectors (m, p)."""
+        """{task: (m,) labels} for vectors (m, p), each task's own vote."""
         return {
             task: self.classes_[task][vote(labels[self.nearest(task, self.squares(task, X))])]
             for task, labels in self.labels_.items()

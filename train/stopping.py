@@ -32,16 +32,13 @@ from scipy.special import expit
 from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
-from edge.model.agreement import agreed
 from edge.model.stopping import NOVELTY_RATE, Novelty, Stopping, margin
 from edge.touch.features import FEATURES
 from train.pipeline import (
     Choice,
     ContactClassifier,
     columns_of,
-    label_distances,
     types_of,
-    vote,
 )
 from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
@@ -71,25 +68,56 @@ def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answ
 
 def _answers(model: ContactClassifier, x: NDArray[np.float64]) -> dict[str, tuple[Any, ...]]:
     """{task: labels, margins and nearest distances} of vectors (m, p)."""
-    labels, to_labels, nearest = {}, {}, {}
-    for task, known in model.labels_.items():
-        squares = model.squares(task, x)
-        labels[task] = vote(known[model.nearest(task, squares)])
-        to_labels[task] = label_distances(squares, known, len(model.classes_[task]))
-        to_labels[task] /= model.spreads_[task]
-        nearest[task] = np.sqrt(squares.min(axis=1))
-    for task, factors in model.products_.items():
-        together, distances = agreed(task, factors, to_labels)
-        labels |= together
-        to_labels |= distances
-    margins = {
-        task: [margin(d, int(c)) for d, c in zip(to_labels[task].tolist(), named, strict=True)]
-        for task, named in labels.items()
-    }
-    return {
-        task: (model.classes_[task][named], margins[task], nearest[task])
-        for task, named in labels.items()
-    }
+    answered = {}
+    for task, (labels, distances, nearest) in model.decide(x).items():
+        pairs = zip(distances.tolist(), labels, strict=True)
+        margins = [margin(to_labels, int(label)) for to_labels, label in pairs]
+        answered[task] = model.classes_[task][labels], margins, nearest
+    return answered
+
+
+def held_out(
+    X: NDArray[np.float64],
+    y: Mapping[str, NDArray[np.str_]],
+    folds: NDArray[np.int64],
+    fold_choices: Sequence[Mapping[str, Choice]],
+    features: Sequence[str],
+    widths: Sequence[int] | None,
+    own: NDArray[np.bool_] | None = None,
+    jobs: int = 1,
+) -> list[Answers]:
+    """[fold] what is decided about the fold's trials, in their order, by models without them.
+
+    Args:
+        X: (decision points, n, p).
+        y: {task: (n,) labels}; empty where a trial has none.
+        folds: (n,) from 0, or -1 for trials that are never left out.
+        fold_choices: [fold]{task: Choice}.
+        features, widths: of the vectors; see `SequentialClassifier`.
+        own: see `ContactClassifier.fit`.
+        jobs: processes.
+    """
+    work = (
+        delayed(_fold)(X, y, folds == fold, choices, features, widths, own)
+        for fold, choices in enumerate(fold_choices)
+    )
+    return list(Parallel(n_jobs=jobs)(work))
+
+
+def _fold(
+    X: NDArray[np.float64],
+    y: Mapping[str, NDArray[np.str_]],
+    left_out: NDArray[np.bool_],
+    choices: Mapping[str, Choice],
+    features: Sequence[str],
+    widths: Sequence[int] | None,
+    own: NDArray[np.bool_] | None,
+) -> Answers:
+    others = {task: y[task][~left_out] for task in y}
+    owned = None if own is None else own[~left_out]
+    models = _models(X[:, ~left_out], others, choices, features, widths, owned)
+    with threadpool_limits(1):
+        return answers(models, X[:, left_out])
 
 
 def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[float, float]:
@@ -209,8 +237,8 @@ class SequentialClassifier:
         types = types_of(kept, self.features, widths)
         self.decision_points_ = _models(X[..., self.columns_], y, self.choices, *types, own)
         self.n_features_in_ = len(self.columns_)
-        work = (delayed(self._fold)(X, y, folds == k, fold_choices[k], own) for k in range(count))
-        by_fold = Parallel(n_jobs=self.jobs)(work)
+        form = self.features, self.widths
+        by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
         most = finest({task: y[task] for task in self.choices})
         nearest = np.empty(X.shape[:2])
         for k, answers_of in enumerate(by_fold):
@@ -246,20 +274,6 @@ class SequentialClassifier:
                 slopes, intercepts, tuple(rules[task]), len(wrong), int(wrong.sum()), RISK
             )
         return self
-
-    def _fold(
-        self,
-        X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
-        left_out: NDArray[np.bool_],
-        choices: Mapping[str, Choice],
-        own: NDArray[np.bool_] | None,
-    ) -> Answers:
-        others = {task: y[task][~left_out] for task in y}
-        owned = None if own is None else own[~left_out]
-        models = _models(X[:, ~left_out], others, choices, self.features, self.widths, owned)
-        with threadpool_limits(1):
-            return answers(models, X[:, left_out])
 
     @property
     def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:

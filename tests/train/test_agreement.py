@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from train.agreement import factors_of, products
+from train.agreement import factors_of, families, products
 
 TASKS = {
     "category": np.array(["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]),
@@ -24,6 +24,7 @@ def test_each_label_of_a_product_stands_for_a_pair_and_no_task_is_in_two():
     assert factors_of(TASKS) == {
         "category": {"mobility": (0, 1, 0, 1), "softness": (0, 0, 1, 1)},
     }
+    assert families(TASKS) == [("category", "mobility", "softness")]
 
 
 def test_a_pair_that_was_never_met_makes_no_product():

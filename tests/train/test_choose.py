@@ -8,9 +8,11 @@ import pytest
 
 import train
 from edge.recording import save
-from train.choose import groupable, kinds_of, without_folds
-from train.evaluate import AnswerTable
-from train.pipeline import Choice
+from train.choose import Chosen, decided_together, groupable, kinds_of, without_folds
+from train.evaluate import AnswerTable, Result
+from train.pipeline import Choice, ContactClassifier
+
+TWO = ("max_force", "contact_area")
 
 
 def test_whole_objects_can_be_left_out_where_each_class_has_several():
@@ -62,6 +64,35 @@ def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_
     by_group = AnswerTable(folds // 2, {"t": [near, far]}, {"t": np.stack([~right] * 2)})
     assert without_folds("t", by_trial, by_trial, prices, 0.0) == [near] * 3
     assert without_folds("t", by_trial, by_group, prices, 0.0) == [far] * 3
+
+
+def test_tasks_that_agree_are_scored_as_they_are_decided_together():
+    """Against models fitted without each fold; each task by itself decides otherwise."""
+    rng = np.random.default_rng(1)
+    mobility, softness = (np.array(list(pair))[rng.integers(0, 2, 60)] for pair in ("fm", "rs"))
+    y = {"mobility": mobility, "softness": softness, "category": np.char.add(softness, mobility)}
+    X = rng.normal(size=(60, 6))
+    X[:, 0] += mobility == "m"
+    X[:, 3] += softness == "s"
+    choices = {task: Choice("IV", 2, 3, "lda") for task in y}
+    folds, alone = np.arange(60) % 5, Result(0, 60, hits=np.zeros(60, dtype=bool))
+    chosen = {task: Chosen(choice, alone, alone, "trial") for task, choice in choices.items()}
+    plans = {"trial": (folds, [choices] * 5)}
+    decided = decided_together(chosen, X, y, plans, TWO, (3, 3))
+    by_itself, together = 0, {task: np.zeros(60, dtype=bool) for task in y}
+    for fold in range(5):
+        train, test = folds != fold, folds == fold
+        model = ContactClassifier(choices, TWO, (3, 3))
+        model.fit(X[train], {task: labels[train] for task, labels in y.items()})
+        for task, (labels, *_) in model.decide(X[test]).items():
+            together[task][test] = model.classes_[task][labels] == y[task][test]
+        by_itself += (model.predict(X[test])["category"] == y["category"][test]).sum()
+    for task, settings in decided.items():
+        assert (settings.accuracy.hits == together[task]).all()
+        assert settings.accuracy.right == settings.by_trial.right == together[task].sum()
+        assert settings.by_fold == (choices,) * 5
+    assert (together["category"] == (together["mobility"] & together["softness"])).all()
+    assert by_itself != together["category"].sum()
 
 
 FEW = {"features": ["max_force"], "projection": "pca", "scaling": "none", "k": 1, "jobs": 1}

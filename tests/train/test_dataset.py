@@ -33,6 +33,17 @@ def test_trials_and_tasks_of_a_folder(recordings):
     assert data.units["contact_motion"] == "metre"
 
 
+def test_several_processes_follow_the_contacts_as_one_does(recordings, folder):
+    alone, shared = (load_trials([recordings], jobs=jobs) for jobs in (1, 2))
+    assert [t.path for t in shared.trials] == [t.path for t in alone.trials]
+    assert shared.features().tobytes() == alone.features().tobytes()
+    touch = load(folder / "soft_1.npz")
+    touch.meta["contacts"] = [{}, {}]
+    save(folder / "soft_9.npz", touch)
+    with pytest.raises(InputError, match=r"soft_9.npz: meta.contacts labels 2 contacts, 1 "):
+        load_trials([folder], jobs=2)
+
+
 def test_training_and_the_board_compute_the_same_bits(recordings, exported):
     model = Model(exported / "model.onnx")
     data = load_trials([recordings], horizon_s=1.2)

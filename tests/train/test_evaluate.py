@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from train.evaluate import SearchGrid, choose, evaluate, fits, group_folds, stratified_folds
+from train.evaluate import choose, evaluate, fits, group_folds, stratified_folds
 from train.pipeline import ContactClassifier
+from train.search import SearchGrid
 
 TWO = ("max_force", "contact_area")
 GRIDS = (

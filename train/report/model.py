@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
-from train.pipeline import Choice, ContactClassifier, vote
+from train.pipeline import Choice, ContactClassifier
 from train.report import page
 from train.report.figures import confusion, lines, picture
 from train.report.score import interval, percent
@@ -74,26 +74,28 @@ def _left_out(
     widths: Sequence[int],
     own: NDArray[np.bool_] | None,
     task: str,
-    choice: Choice,
+    choices: Mapping[str, Choice],
     test: NDArray[np.int64],
 ) -> tuple[list[NDArray[np.str_]], dict[int, Explanation]]:
     """[quarter] (test,) answers, and explanations of the wrong ones and of some others."""
     classes, index = np.unique(y[task], return_inverse=True)
-    counting = choice.counts(y[task], own) > 0
+    counting = choices[task].counts(y[task], own) > 0
     counting[test] = False
     others = np.flatnonzero(counting)
     quarter_of, said = stratified_folds(y[task][others], QUARTERS), []
     for quarter in range(QUARTERS):
         train = others[quarter_of <= quarter]
-        model = ContactClassifier(
-            {task: replace(choice, k=min(choice.k, len(train)))}, features, widths
-        ).fit(
-            X[train],
-            {name: labels[train] for name, labels in y.items()},
-            None if own is None else own[train],
-        )
-        rows = model.neighbours(task, X[test])[1]
-        said.append(classes[vote(index[train][rows])])
+        owned = None if own is None else own[train]
+        known = {name: labels[train] for name, labels in y.items()}
+        counted = {name: (c.counts(known[name], owned) > 0).sum() for name, c in choices.items()}
+        fewer = {
+            name: replace(choice, k=min(choice.k, counted[name]))
+            for name, choice in choices.items()
+            if counted[name]
+        }
+        model = ContactClassifier(fewer, features, widths).fit(X[train], known, owned)
+        said.append(model.classes_[task][model.decide(X[test])[task].labels])
+    rows = model.neighbours(task, X[test])[1]
     key, c = model.spaces_[task], model.components_[task]
     p = model.projections_[key]
     space = Space(
@@ -118,7 +120,8 @@ def _left_out(
 
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     """{task: the answers that its nested accuracy counts}."""
-    choices = [choice for chosen in fitted.chosen.values() for choice in chosen.by_fold]
+    by_fold = [by_task for chosen in fitted.chosen.values() for by_task in chosen.by_fold]
+    choices = [choice for by_task in by_fold for choice in by_task.values()]
     dataset = fitted.measured.of([name for choice in choices for name in choice.features])
     tasks = {*fitted.chosen, *(target for choice in choices for target in choice.targets)}
     y = {task: dataset.labels(task) for task in tasks}
@@ -128,10 +131,10 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         truth = np.where(tested, y[task], "")
         said = np.tile(truth, (QUARTERS, 1))
         answers[task] = Answers(np.unique(y[task]).tolist(), truth, said, {})
-        for fold, choice in enumerate(chosen.by_fold):
+        for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
-                cases.append((task, choice, test))
+                cases.append((task, by_task, test))
     X, widths = dataset.features(fitted.window_s, fitted.samples), dataset.widths(fitted.samples)
     left_out = partial(_left_out, X, y, dataset.names, widths, dataset.own)
     results = Workers(jobs, progress=False).map("report", left_out, cases)

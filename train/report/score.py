@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, accuracies, neighbours
-from train.evaluate import Labels, Result, SearchGrid, evaluate
+from train.evaluate import Labels, Result, evaluate
 from train.pipeline import vote
+from train.search import SearchGrid
 
 
 def percent(share: float) -> float:

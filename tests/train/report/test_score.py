@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from train.crossval import accuracies, neighbours
-from train.evaluate import SearchGrid, stratified_folds
+from train.evaluate import stratified_folds
 from train.report.score import (
     Result,
     grid_search,
@@ -17,6 +17,7 @@ from train.report.score import (
     score,
     transfer,
 )
+from train.search import SearchGrid
 
 ONE = ("max_force",)
 

@@ -1,0 +1,145 @@
+"""Settings that share a decomposition of features, and the neighbours that each of them finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.neighbors import NearestNeighbors
+
+from train.pipeline import Choice
+from train.projection import Spectrum
+
+COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
+SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
+NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
+
+
+@dataclass(frozen=True)
+class SearchGrid:
+    """Candidates that share a decomposition of the features.
+
+    Attributes:
+        scaling: one of `train.scaling.SCALINGS`.
+        projection: one of `train.projection.KINDS`.
+        features: names of the features taken; all where empty.
+        components: numbers of components, rising; `lda` takes all its directions.
+        most_directions: of `lda`, those that separate best first; all where None.
+        shrinkages: of `lda`, the largest first.
+        neighbours: values of k, rising.
+        targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
+        tasks: the tasks it is a candidate for; all where empty.
+        weights: of simulated trials and the owner's, see `train.pipeline.Choice`.
+    """
+
+    scaling: str = "none"
+    projection: str = "pca"
+    features: tuple[str, ...] = ()
+    components: tuple[int, ...] = COMPONENTS
+    most_directions: int | None = None
+    shrinkages: tuple[float, ...] = SHRINKAGES
+    neighbours: tuple[int, ...] = NEIGHBOURS
+    targets: tuple[str, ...] = ()
+    tasks: tuple[str, ...] = ()
+    weights: tuple[int, int] = (1, 1)
+
+    def choices(self, directions: int) -> list[Choice]:
+        """Every candidate, in the order of `_answers`.
+
+        Args:
+            directions: how many discriminants there are at most.
+        """
+        if self.projection == "pca":
+            cells = [(c, 0.01) for c in self.components]
+        else:
+            taken = min(directions, self.most_directions or directions)
+            cells = [(taken, shrinkage) for shrinkage in self.shrinkages]
+        return [
+            Choice(
+                self.scaling, c, k, self.projection, s, self.features, self.targets, self.weights
+            )
+            for c, s in cells
+            for k in self.neighbours
+        ]
+
+
+def _nearest(known: NDArray[np.float64], tested: NDArray[np.float64], k: int) -> NDArray[np.int64]:
+    """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in their order.
+
+    Which of several equal ones is the last of the k is left open. The distances of whole numbers
+    are exact. They are taken in blocks, so that (m, n) of them are never in memory.
+    """
+    if not known.shape[1]:
+        return np.tile(np.arange(k), (len(tested), 1))
+    search = NearestNeighbors(n_neighbors=k, algorithm="brute", metric="sqeuclidean").fit(known)
+    squares, rows = search.kneighbors(tested)
+    order = np.lexsort((rows, squares), axis=1)
+    return np.take_along_axis(rows, order, axis=1)
+
+
+def _rounded(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Coordinates (n, c) and (m, c) in whole steps, so coarse that squared distances are exact.
+
+    A step is 2^-22 of the largest coordinate, or a little more where c is above 128. Equal trials
+    stay equal, though a matrix product may round their coordinates differently.
+    """
+    columns = max(a.shape[1], 1)
+    bits = (51 - (columns - 1).bit_length()) // 2
+    exponent = np.frexp(max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)))[1]
+    return np.rint(np.ldexp(a, bits - exponent)), np.rint(np.ldexp(b, bits - exponent))
+
+
+class Decomposition:
+    """Training rows and new ones along principal axes or discriminants, each computed once.
+
+    The coordinates are those of `train.projection.Projection` but for its rounding of weights.
+
+    Args:
+        rows: (n, p) of training, scaled and centred; a trial that counts twice is there twice.
+        new: (m, p) others, scaled and centred alike.
+        labels: {task: (n,) class indices} of the training rows.
+        first: (trials,) a row of each trial.
+    """
+
+    def __init__(
+        self,
+        rows: NDArray[np.float64],
+        new: NDArray[np.float64],
+        labels: Mapping[str, NDArray[np.int64]],
+        first: NDArray[np.int64],
+    ) -> None:
+        self._spectrum, self._new, self._labels, self._first = Spectrum(rows), new, labels, first
+        self._new_scores: NDArray[np.float64] | None = None
+        self._along: dict[tuple[str, float], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+
+    def neighbours(self, grid: SearchGrid, task: str) -> NDArray[np.int64]:
+        """(projections, m, k) places among the trials, for each projection of a grid."""
+        k = min(grid.neighbours[-1], len(self._first))
+        if grid.projection == "pca":
+            axes = self._spectrum.leading(grid.components[-1]).T
+            known, tested = _rounded(self._spectrum.rows[self._first] @ axes, self._new @ axes)
+            return np.stack([_nearest(known[:, :c], tested[:, :c], k) for c in grid.components])
+        places = []
+        for shrinkage in grid.shrinkages:
+            each = [self._discriminants(target, shrinkage) for target in grid.targets or (task,)]
+            coordinates = (
+                np.hstack(some)[:, : grid.most_directions] for some in zip(*each, strict=True)
+            )
+            places.append(_nearest(*_rounded(*coordinates), k))
+        return np.stack(places)
+
+    def _discriminants(
+        self, task: str, shrinkage: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coordinates (trials, c) and (m, c) along the discriminants of a task's labels."""
+        if self._new_scores is None:
+            self._new_scores = self._spectrum.scores_of(self._new)
+        if (task, shrinkage) not in self._along:
+            directions = self._spectrum.directions(self._labels[task], shrinkage)
+            known = (self._spectrum.scores @ directions)[self._first]
+            self._along[task, shrinkage] = known, self._new_scores @ directions
+        return self._along[task, shrinkage]
