@@ -1,9 +1,9 @@
 """Explain a model's decisions on recordings.
 
-Prints the training trials nearest to a touch, the features that pulled it towards each of them, and
-the least change of a single feature that would have given another answer. The number of a feature
-says how much nearer, as a squared distance, it brings the touch to a trial than the mean of all
-training trials would. `python -m train show REC --model model.onnx` draws the curves.
+Prints the training trials nearest to a touch, the features for and against the answer, and the
+least change of a single feature that would have given another answer. A feature's number says how
+much nearer, as a squared distance, it brings the touch to the nearest trial with the answer than to
+the nearest one with another label. `python -m train show REC --model model.onnx` draws the curves.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from edge.recording import Recording, find, load
 MOST = 3
 """Features and changes that a line names."""
 DIRECTED = 0.5
-"""Part of its size that the mean of a change has if it goes one way."""
+"""A change goes one way if its mean is more than this share of its size."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -60,8 +60,8 @@ def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict
         answer, rows = labels.index(decision.label), decision.neighbours.tolist()
         given = recording.labels.get(task)
         truth = labels.index(given) if given in labels else None
-        form = info.features, info.widths, truth
-        why = explain(Space.of(model, task), vector, rows, answer, *form)
+        space = Space.of(model, task)
+        why = explain(space, vector, rows, answer, info.features, info.widths, truth)
 
         def trial(near: Near, labels: tuple[str, ...] = labels) -> dict[str, Any]:
             return {**near._asdict(), "label": labels[near.label], "trial": info.trial(near.row)}
@@ -85,24 +85,27 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
     votes = round(line["confidence"] * len(nearest))
     plural = "s" * (len(nearest) != 1)
     lines = [f"{line['task']}: {label}, by {votes} of {len(nearest)} vote{plural}"]
-    for near in [*nearest, *([rival] if rival else [])]:
-        other = ", the nearest of another label" if near is rival else ""
-        lines.append(f"  {near['distance']:7.3f}  {near['trial']}, {near['label']}{other}")
-        lines += wrapped(pulls_text(near["pulls"]), " " * 11)
+    lines += ["  The nearest training trials, each with its distance:", *map(trial_text, nearest)]
     if rival:
-        pulled = f"rather than {rival['label']}: {pulls_text(line['pulls'])}"
-        lines += wrapped(pulled, "  ")
+        lines += ["  The nearest one with another label:", trial_text(rival)]
+        strongest = list(line["pulls"].items())[:MOST]
+        pulls = ", ".join(f"{name} {pull:+.2f}" for name, pull in strongest)
+        compared = f"for (+) and against (-) {label}, compared with {rival['label']}"
+        lines += wrapped(f"Features {compared}: {pulls}.", "  ")
     for change in line["changes"][:MOST]:
-        how = "higher" if change["mean"] > 0.0 else "lower"
-        how = how if abs(change["mean"]) > DIRECTED * change["size"] else "of another course,"
-        name = change["feature"]
-        lines += wrapped(
-            f"{change['label']}, were {name} ({info.units[name]}) {how} by {change['size']:.2g}",
-            "  ",
-        )
+        size = f"{change['size']:.2g} {plural_of(info.units[change['feature']])}".rstrip()
+        how = f"were {'higher' if change['mean'] > 0.0 else 'lower'} by {size}"
+        if abs(change["mean"]) <= DIRECTED * change["size"]:
+            how = f"varied in another way, by {size} on average"
+        lines += wrapped(f"It would be {change['label']} if {change['feature']} {how}.", "  ")
     return "\n".join(lines)
 
 
-def pulls_text(pulls: dict[str, float]) -> str:
-    """The strongest pulls."""
-    return ", ".join(f"{name} {pull:+.2f}" for name, pull in list(pulls.items())[:MOST])
+def trial_text(trial: dict[str, Any]) -> str:
+    """A training trial: distance, name and label."""
+    return f"  {trial['distance']:7.3f}  {trial['trial']}: {trial['label']}"
+
+
+def plural_of(unit: str) -> str:
+    """The unit behind a number; nothing for a ratio."""
+    return f"{unit}s" if unit.isalpha() else unit.removesuffix("1")

@@ -1,28 +1,28 @@
-"""Why a model answers as it does: what drew a touch towards a training trial, feature by feature.
+"""Why a model answers as it does: how much each feature drew a touch towards a training trial.
 
-A touch's coordinates are z = W'd, where d are its features less their mean in training, scaled. Its
-squared distance to a trial at b is |z|^2 + |b|^2 - 2 b'z. The last term is a sum over the features:
-2 b'W_f'd_f is how much nearer feature f brings the touch to the trial than its mean would.
+A touch's coordinates are z = W'd, where d are its features less their mean in training, scaled and
+cut off at the training data's reach. Its squared distance to a trial at b is
+|z|^2 + |b|^2 - 2 b'z. The last term is a sum over the features: 2 b'W_f'd_f is how much nearer
+feature f brings the touch to the trial than its mean would.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.files import parsing, read_bytes
-from edge.model import onnx_file
-from edge.model.model import LARGEST_BYTES, Model
+from edge.files import parsing
+from edge.model.model import Model
 
 STEPS = (1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
 """Multiples of the change that makes the rival as near; several votes may take more."""
 
 
 class Space(NamedTuple):
-    """What a task compares touches by.
+    """The coordinates in which a task compares touches, and the training trials in them.
 
     Attributes:
         columns: (p,) of the feature vectors that it takes.
@@ -30,6 +30,7 @@ class Space(NamedTuple):
         weights: (p, c) from scaled differences to coordinates.
         rows: (n, c) training trials.
         labels: (n,) indices of their labels.
+        reach, limit: the sizes at which scaled differences, and coordinates, are cut off.
     """
 
     columns: NDArray[np.int64]
@@ -38,42 +39,52 @@ class Space(NamedTuple):
     weights: NDArray[np.float64]
     rows: NDArray[np.float64]
     labels: NDArray[np.int64]
+    reach: float = np.inf
+    limit: float = np.inf
 
     @classmethod
     def of(cls, model: Model, task: str) -> Space:
         """Read a task's space, at the full window, from the model file.
 
         Raises:
-            InputError: the file is damaged, or was changed since the model was loaded.
+            InputError: the file is damaged.
         """
         with parsing(model.path, "a model that can be explained", "; export it again"):
-            nodes, constants = onnx_file.graph(read_bytes(model.path, LARGEST_BYTES))
+            contents, components = model.contents, model.info.tasks[task].components
+            neighbours = f"{task}_neighbours"
 
-            def constant(name: str) -> NDArray[np.float64]:
-                """A constant, or its value at the last decision point."""
-                if name in constants:
-                    return constants[name].astype(np.float64)
-                operator, (source, *_) = nodes[name]
-                return constant(source)[-1] if operator == "Gather" else constant(source)
+            def constant(name: str) -> NDArray[Any]:
+                return contents.constant(name, -1)
 
-            # From the neighbours back to the features, through each operator's first input. Of two
-            # products the one nearer to the features is the gain.
-            name, path = f"{task}_neighbours", {}
-            while name in nodes:
-                operator, (name, *path[operator]) = nodes[name]
-            unit, c = constant(nodes[f"{task}_distances"][1][1]), model.info.tasks[task].components
-            columns = path.get("Gather")
-            rows = constant(path["Gemm"][0]).T[:, :c] * (-0.5 * unit)
-            rows[np.isinf(constant(path["Gemm"][1]))] = np.inf  # trials without a label
-            voters = next(given for _, given in nodes.values() if f"{task}_neighbours" in given)
+            # Of two operators of a kind, the one nearer to the features counts.
+            path = contents.path(neighbours)
+            further = dict(reversed(path))
+            limits = [float(constant(bounds[1])) for operator, bounds in path if operator == "Clip"]
+            unit = constant(contents.makers[f"{task}_distances"].inputs[1])
+            rows = constant(further["Gemm"][0]).T[:, :components] * (-0.5 * unit)
+            rows[np.isinf(constant(further["Gemm"][1]))] = np.inf  # trials without a label
+            columns = further.get("Gather")
+            voters = next(node.inputs for node in contents.nodes if neighbours in node.inputs)
             return cls(
-                constants[columns[0]] if columns else np.arange(model.info.width),
-                constant(path["Sub"][0]),
-                constant(path["Mul"][0]),
-                constant(path["MatMul"][0])[:, :c] * unit,
+                constant(columns[0]) if columns else np.arange(model.info.width),
+                constant(further["Sub"][0]),
+                constant(further["Mul"][0]),
+                constant(further["MatMul"][0])[:, :components] * unit,
                 rows,
-                constants[voters[0]],
+                constant(voters[0]),
+                limits[0],
+                limits[1] * float(unit),
             )
+
+    def differences(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,) scaled differences of a feature vector from the mean."""
+        scaled = (vector[self.columns] - self.mean) * self.gain
+        return np.clip(scaled, -self.reach, self.reach)
+
+    def coordinates(self, differences: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(c,) coordinates of scaled differences."""
+        z = np.clip(differences, -self.reach, self.reach) @ self.weights
+        return np.clip(z, -self.limit, self.limit)
 
     def vote(self, z: NDArray[np.float64], k: int) -> int:
         """The label of the k nearest trials; of tied ones that of the nearest."""
@@ -146,38 +157,39 @@ def explain(
     """
     feature_of = np.repeat(features, widths)[space.columns]
     members = {name: feature_of == name for name in features if name in feature_of}
-    d = (vector[space.columns] - space.mean) * space.gain
-    parts = np.array([d[own] @ space.weights[own] for own in members.values()])
-    z = parts.sum(axis=0)
-    squares = ((space.rows - z) ** 2).sum(axis=1)
+    differences = space.differences(vector)
+    shifts = np.array([differences[own] @ space.weights[own] for own in members.values()])
+    squares = ((space.rows - space.coordinates(differences)) ** 2).sum(axis=1)
 
     def pulls(towards: NDArray[np.float64]) -> dict[str, float]:
-        by_feature = zip(members, (2.0 * parts @ towards).tolist(), strict=True)
+        by_feature = zip(members, (2.0 * shifts @ towards).tolist(), strict=True)
         return dict(sorted(by_feature, key=lambda pull: -abs(pull[1])))
 
     def near(row: int) -> Near:
         distance = float(np.sqrt(squares[row]))
         return Near(row, int(space.labels[row]), distance, pulls(space.rows[row]))
 
-    nearest, own = tuple(map(near, voters)), space.labels == label
-    if own.all():
+    nearest, answered = tuple(map(near, voters)), space.labels == label
+    if answered.all():
         return Explanation(nearest)
     others = space.labels == truth
-    others = others if truth != label and others.any() else ~own
-    a, b = (int(np.where(those, squares, np.inf).argmin()) for those in (own, others))
-    apart = space.rows[a] - space.rows[b]
+    others = others if truth != label and others.any() else ~answered
+    own, rival = (int(np.where(of, squares, np.inf).argmin()) for of in (answered, others))
+    direction = space.rows[own] - space.rows[rival]
     changes = []
     for name, columns in members.items():
-        slope = 2.0 * space.weights[columns] @ apart
+        slope = 2.0 * space.weights[columns] @ direction
         if not slope.any():
             continue
-        step = slope * (min(squares[a] - squares[b], 0.0) / (slope @ slope))
-        for change in (times * step for times in STEPS):
-            answer = space.vote(z + change @ space.weights[columns], len(voters))
+        step = slope * (min(squares[own] - squares[rival], 0.0) / (slope @ slope))
+        for times in STEPS:
+            changed = differences.copy()
+            changed[columns] += times * step
+            answer = space.vote(space.coordinates(changed), len(voters))
             if answer != label:
-                x = change / space.gain[columns]
-                size = float(np.sqrt((x**2).mean()))
-                changes.append(((change**2).mean(), Change(name, answer, size, float(x.mean()))))
+                x = times * step / space.gain[columns]
+                change = Change(name, answer, float(np.sqrt((x**2).mean())), float(x.mean()))
+                changes.append((times**2 * (step**2).mean(), change))
                 break
     ordered = tuple(change for _, change in sorted(changes, key=lambda pair: pair[0]))
-    return Explanation(nearest, near(b), pulls(apart), ordered)
+    return Explanation(nearest, near(rival), pulls(direction), ordered)

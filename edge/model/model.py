@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from edge.errors import EdgeError, InputError
-from edge.files import open_regular, parsing
+from edge.files import read_bytes
 from edge.model import onnx_file
 from edge.model.agreement import agreed
 from edge.model.info import METADATA_KEY, ModelInfo
@@ -66,6 +66,7 @@ class Model:
 
     Attributes:
         path: of the file.
+        contents: of the file.
         info: its metadata.
         version: the first eight digits of the file's SHA-256.
 
@@ -75,18 +76,20 @@ class Model:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         """Load the file."""
-        name = os.fspath(path)
-        contents, stat, digest = _contents(name)
-        text = contents.metadata.get(METADATA_KEY)
+        self.path = name = os.fspath(path)
+        if not os.path.lexists(name) and "\0" not in name:
+            raise InputError(f"{name}: no such model; make one with `make export`")
+        data = read_bytes(name, LARGEST_BYTES)
+        self.contents = onnx_file.read(data, name)
+        text = self.contents.metadata.get(METADATA_KEY)
         if text is None:
             raise InputError(
                 f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
             )
-        self.path = name
-        self.version = digest[:8]
+        self.version = hashlib.sha256(data).hexdigest()[:8]
         # First the format: an older one has other operators, but is named by its number.
         self.info = ModelInfo.from_json(text, name)
-        onnx_file.check(contents, name)
+        onnx_file.check(self.contents, name)
         runtime = _onnxruntime()
         options = runtime.SessionOptions()
         # One thread is fastest for models of this size.
@@ -96,80 +99,48 @@ class Model:
         options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
         options.enable_cpu_mem_arena = False
         try:
-            # By its name, as a session made from bytes keeps a second copy of the file.
             self._session = runtime.InferenceSession(
-                name, options, providers=["CPUExecutionProvider"]
+                data, options, providers=["CPUExecutionProvider"]
             )
         except Exception as error:  # onnxruntime's own exceptions share no base but this
             raise InputError(
                 f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
             ) from None
-        if not _is(name, stat):
-            raise InputError(f"{name}: was changed while it was read; start again")
-        self._check(name)
         self._names = [output.name for output in self._session.get_outputs()]
-        # Input and outputs are arrays of ours that ONNX Runtime reads and writes in place: a
-        # decision then allocates next to nothing.
-        self._shape = (self.info.width,)
-        self._input = np.zeros((1, *self._shape))
-        self._last = len(self.decision_points_s) - 1
-        self._decision_point = np.full(1, self._last, dtype=np.int64)
-        outputs: dict[str, NDArray[Any]] = {
-            output.name: np.zeros(
-                [1, *output.shape[1:]], np.int64 if "int64" in output.type else np.float64
-            )
-            for output in self._session.get_outputs()
-        }
-        self._binding = self._session.io_binding()
-        value = runtime.OrtValue.ortvalue_from_numpy
-        self._binding.bind_ortvalue_input("features", value(self._input))
-        if self.info.decision_points_s:
-            self._binding.bind_ortvalue_input("decision_point", value(self._decision_point))
-        for output, array in outputs.items():
-            self._binding.bind_ortvalue_output(output, value(array))
-        self._answers = [
-            _Answer(
-                task,
-                entry.labels,
-                outputs[f"{task}_label"],
-                outputs[f"{task}_scores"][0],
-                outputs[f"{task}_distances"][0],
-                outputs[f"{task}_neighbours"][0],
-                outputs[f"{task}_label_distances"][0] if self.info.has_label_distances else None,
-            )
-            for task, entry in self.info.tasks.items()
-        ]
-        self._out_of_range = outputs["out_of_range"]
+        self._check()
 
-    def _check(self, name: str) -> None:
-        inputs = self._session.get_inputs()
-        shape = inputs[0].shape if inputs else []
-        if not inputs or inputs[0].name != "features" or inputs[0].type != "tensor(double)":
-            raise InputError(f"{name}: has no float64 input `features`; export it again")
-        optional = self._session.get_overridable_initializers()
-        more = [(i.name, i.type, list(i.shape)) for i in optional]
-        if len(inputs) > 1 or more != (
-            [("decision_point", "tensor(int64)", [1])] if self.info.decision_points_s else []
-        ):
-            raise InputError(
-                f"{name}: its inputs and its decision points disagree; export it again"
-            )
-        if len(shape) != 2 or shape[1] != self.info.width:
-            raise InputError(
-                f"{name}: takes {shape[1:]} features, its metadata says {self.info.width}; "
-                "export it again"
-            )
-        outputs = {output.name: output.shape for output in self._session.get_outputs()}
-        widths: dict[str, list[int]] = {"out_of_range": []}
-        for task, entry in self.info.tasks.items():
-            widths |= {f"{task}_label": [], f"{task}_scores": [len(entry.labels)]}
-            widths |= {f"{task}_distances": [entry.k], f"{task}_neighbours": [entry.k]}
-            if self.info.has_label_distances:
-                widths[f"{task}_label_distances"] = [len(entry.labels)]
-        for output, width in widths.items():
-            if output not in outputs or outputs[output][1:] != width:
-                wide = f" of width {width[0]}, as its metadata says" if width else ""
-                raise InputError(f"{name}: has no output {output}{wide}; export it again")
+    def _check(self) -> None:
+        """Refuse a graph whose inputs and outputs are not those that the metadata describes."""
+        info, session = self.info, self._session
+        expected: dict[str, tuple[str, list[int]]] = {
+            "features": ("tensor(double)", [info.width]),
+            "out_of_range": ("tensor(double)", []),
+        }
+        if info.decision_points_s:
+            expected["decision_point"] = "tensor(int64)", []
+        for task, entry in info.tasks.items():
+            expected |= {
+                f"{task}_label": ("tensor(int64)", []),
+                f"{task}_scores": ("tensor(double)", [len(entry.labels)]),
+                f"{task}_distances": ("tensor(double)", [entry.k]),
+                f"{task}_neighbours": ("tensor(int64)", [entry.k]),
+            }
+            if info.has_label_distances:
+                expected[f"{task}_label_distances"] = "tensor(double)", [len(entry.labels)]
+        inputs = [*session.get_inputs(), *session.get_overridable_initializers()]
+        declared = {x.name: (x.type, x.shape[1:]) for x in (*inputs, *session.get_outputs())}
+        for name, (kind, shape) in expected.items():
+            if declared.get(name) != (kind, shape):
+                raise InputError(
+                    f"{self.path}: its graph has no {kind} {name} of shape {shape}, which its "
+                    "metadata describes; export it again"
+                )
+        for given in inputs:
+            if given.name not in expected:
+                raise InputError(
+                    f"{self.path}: has an input {given.name}, which no exported model has; export "
+                    "it again"
+                )
 
     @property
     def named(self) -> str | None:
@@ -184,29 +155,30 @@ class Model:
     def run(
         self, vectors: NDArray[np.float64], decision_point: int | None = None
     ) -> dict[str, NDArray[Any]]:
-        """The graph's outputs for vectors (n, width), unguarded; for checks and benchmarks.
+        """The graph's outputs for vectors (n, width).
 
         Args:
             vectors: measured over the window of the decision point.
             decision_point: index in `decision_points_s`; None for the last.
+
+        Raises:
+            InputError: the model has no such decision point, or its file is damaged.
         """
+        last = len(self.decision_points_s) - 1
+        point = last if decision_point is None else decision_point
+        if not 0 <= point <= last:
+            raise InputError(f"{self.path}: has the decision points 0 to {last}, not {point}")
         given: dict[str, NDArray[Any]] = {"features": vectors}
         if self.info.decision_points_s:
-            given["decision_point"] = np.array([self._place(decision_point)], dtype=np.int64)
-        values = self._session.run(self._names, given)
+            given["decision_point"] = np.array([point], dtype=np.int64)
+        try:
+            values = self._session.run(self._names, given)
+        except Exception as error:  # an index past its tensor, a shape that came out otherwise
+            raise self._broken(str(error)) from None
         return dict(zip(self._names, values, strict=True))
 
-    def _place(self, decision_point: int | None) -> int:
-        if decision_point is None:
-            return self._last
-        if not 0 <= decision_point <= self._last:
-            raise InputError(
-                f"{self.path}: has the decision points 0 to {self._last}, not {decision_point}"
-            )
-        return decision_point
-
     def decide(self, vector: ArrayLike, decision_point: int | None = None) -> dict[str, Decision]:
-        """Decide all tasks for one feature vector; not for several threads at once.
+        """Decide all tasks for one feature vector.
 
         Args:
             vector: (width,) measured over the window of the decision point.
@@ -217,43 +189,34 @@ class Model:
                 after scaling; the model has no such decision point, or its file is damaged.
         """
         x = np.asarray(vector, dtype=np.float64)
-        if x.shape != self._shape:
+        if x.shape != (self.info.width,):
             raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
-        self._input[0] = x
-        self._decision_point[0] = self._place(decision_point)
-        try:
-            self._session.run_with_iobinding(self._binding)
-        except Exception as error:  # an index past its tensor, a shape that came out otherwise
-            raise self._broken(str(error)) from None
-        out_of_range = self._out_of_range.item() > 0.0
-        labels: dict[str, Any] = {answer.task: answer.label[0] for answer in self._answers}
+        outputs = {name: value[0] for name, value in self.run(x[None], decision_point).items()}
+        labels: dict[str, Any] = {task: outputs[f"{task}_label"] for task in self.info.tasks}
         if min(labels.values()) < 0:
             raise self._refusal(x)
-        distances = {
-            answer.task: answer.label_distances.copy()
-            for answer in self._answers
-            if answer.label_distances is not None
+        distances: dict[str, Any] = {
+            task: outputs.get(f"{task}_label_distances") for task in self.info.tasks
         }
         for task, factors in self.info.products.items():
-            together, nearest = agreed(task, factors, distances)
-            labels |= together
-            distances |= nearest
+            agreed_labels, agreed_distances = agreed(task, factors, distances)
+            labels |= agreed_labels
+            distances |= agreed_distances
         decisions: dict[str, Decision] = {}
-        for answer in self._answers:
-            index, shares = int(labels[answer.task]), answer.scores.tolist()
-            if index >= len(answer.labels) or not 0.0 <= shares[index] <= 1.0:
-                raise self._broken(
-                    f"{answer.task} is answered by label {index} of {len(answer.labels)}"
-                )
-            decisions[answer.task] = Decision(
-                answer.labels[index],
+        for task, entry in self.info.tasks.items():
+            index, scores = int(labels[task]), outputs[f"{task}_scores"]
+            shares = scores.tolist()
+            if index >= len(shares) or not 0.0 <= shares[index] <= 1.0:
+                raise self._broken(f"{task} is answered by label {index} of {len(shares)}")
+            decisions[task] = Decision(
+                entry.labels[index],
                 shares[index],
-                answer.scores.copy(),
-                answer.distances.copy(),
-                answer.neighbours.copy(),
+                scores,
+                outputs[f"{task}_distances"],
+                outputs[f"{task}_neighbours"],
                 shares.count(max(shares)) > 1,
-                distances.get(answer.task),
-                out_of_range,
+                distances[task],
+                bool(outputs["out_of_range"] > 0.0),
             )
         return decisions
 
@@ -291,41 +254,6 @@ def require_joints(model: Model, dof: int | None, where: str) -> None:
             f"{where}: has {dof or 'no'} joint angles, but the model needs {needed} of each frame; "
             "record them, or export a model without joints"
         )
-
-
-class _Answer(NamedTuple):
-    """A task and the arrays into which ONNX Runtime writes its answer."""
-
-    task: str
-    labels: tuple[str, ...]
-    label: NDArray[np.int64]
-    scores: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    neighbours: NDArray[np.int64]
-    label_distances: NDArray[np.float64] | None
-
-
-def _contents(name: str) -> tuple[onnx_file.Contents, os.stat_result, str]:
-    """The file's contents, its identity, to see whether it changes, and its SHA-256."""
-    if not os.path.lexists(name) and "\0" not in name:
-        raise InputError(f"{name}: no such model; make one with `make export`")
-    with open_regular(name, LARGEST_BYTES) as file:
-        stat = os.fstat(file.fileno())
-        with parsing(name, "a model", "; copy or export it again"):
-            data = file.read(LARGEST_BYTES)
-            return onnx_file.read(data, name), stat, hashlib.sha256(data).hexdigest()
-
-
-def _is(name: str, stat: os.stat_result) -> bool:
-    """Whether the file is still the same, unchanged."""
-    try:
-        now = os.stat(name)
-    except OSError:
-        return False
-    return all(
-        getattr(now, part) == getattr(stat, part)
-        for part in ("st_dev", "st_ino", "st_size", "st_mtime_ns", "st_ctime_ns")
-    )
 
 
 def _onnxruntime() -> Any:

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ OPERATORS = frozenset(
 MOST_NODES = 1000
 """An exported model has about 20 nodes, and 15 more for each task."""
 
-GRAPH, OPSETS, METADATA, FUNCTIONS = 7, 8, 14, 25
+GRAPH, METADATA, FUNCTIONS = 7, 14, 25
 """Fields of a ModelProto."""
 NODES, INITIALIZERS, SPARSE = 1, 5, 15
 """Fields of a GraphProto."""
@@ -33,7 +34,7 @@ OPERATOR, ATTRIBUTES, DOMAIN = 4, 5, 7
 """Fields of a NodeProto."""
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 """Fields of an attribute that is a number or several: it holds no tensor and no graph."""
-EXTERNAL_DATA, DATA_LOCATION = 13, 14
+TENSOR_NAME, EXTERNAL_DATA, DATA_LOCATION = 8, 13, 14
 """Fields of a TensorProto."""
 
 TYPES = {1: "<f4", 7: "<i8", 9: "|b1", 11: "<f8"}
@@ -43,19 +44,61 @@ Message = dict[int, list[int | memoryview]]
 """{field number: its values}: a number, or the bytes of a text or of a message within."""
 
 
+class Node(NamedTuple):
+    """A node of the graph."""
+
+    operator: str
+    inputs: list[str]
+    outputs: list[str]
+
+
 @dataclass
 class Contents:
-    """Operators, metadata and opsets of a model file."""
+    """Nodes, constants and metadata of a model file."""
 
-    operators: list[tuple[str, str]] = field(default_factory=list)
-    """(domain, operator) of each node."""
+    data: bytes
+    """The whole file."""
+    nodes: list[Node] = field(default_factory=list)
+    tensors: dict[str, Message] = field(default_factory=dict)
+    """{name of a constant: the fields of its TensorProto}."""
     metadata: dict[str, str] = field(default_factory=dict)
-    opsets: dict[str, int | memoryview] = field(default_factory=dict)
-    """{domain: version}."""
-    external: bool = False
-    """A tensor's values lie in another file."""
-    unusual: bool = False
-    """The model holds functions, graphs within graphs, sparse tensors or tensors in attributes."""
+    foreign: list[str] = field(default_factory=list)
+    """What it holds that no exported model holds."""
+
+    @cached_property
+    def makers(self) -> dict[str, Node]:
+        """{output: its node}."""
+        return {output: node for node in self.nodes for output in node.outputs}
+
+    def constant(self, name: str, point: int | None = None) -> NDArray[Any]:
+        """A constant, or the constant that a value is taken from.
+
+        Args:
+            name: of the constant, or of a value that `Gather` and `Cast` make of one.
+            point: the decision point at which to take such a value; None for all of them.
+
+        Raises:
+            KeyError: there is none of the name.
+        """
+        if name in self.tensors:
+            tensor: Any = self.tensors[name]
+            return np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]]).reshape(tensor.get(1, []))
+        node = self.makers[name]
+        values = self.constant(node.inputs[0], point)
+        return values if point is None or node.operator != "Gather" else values[point]
+
+    def path(self, output: str) -> list[tuple[str, list[str]]]:
+        """The nodes from the features to an output, through the first input of each.
+
+        Returns:
+            Operator and further inputs of each node, in the order of computation.
+        """
+        nodes = []
+        while output in self.makers:
+            node = self.makers[output]
+            output, *further = node.inputs
+            nodes.append((node.operator, further))
+        return nodes[::-1]
 
 
 def _varint(data: memoryview, at: int) -> tuple[int, int]:
@@ -102,33 +145,16 @@ def _messages(message: Message, number: int) -> Sequence[Message]:
     return [_message(value) for value in message.get(number, ())]
 
 
+def _texts(message: Message, number: int) -> list[str]:
+    values = message.get(number, [])
+    if any(isinstance(value, int) for value in values):
+        raise ValueError("a number where a text belongs")
+    return [bytes(value).decode() for value in values]
+
+
 def _text(message: Message, number: int) -> str:
     """The last of a field's values, as protobuf takes them; empty without a value."""
-    values = message.get(number, [b""])
-    if isinstance(values[-1], int):
-        raise ValueError("a number where a text belongs")
-    return bytes(values[-1]).decode("utf-8")
-
-
-def _walk(data: bytes) -> Contents:
-    """The contents of a model file; ValueError or IndexError where it is none."""
-    contents = Contents()
-    model = _message(memoryview(data))
-    contents.unusual = FUNCTIONS in model
-    for opset in _messages(model, OPSETS):
-        contents.opsets[_text(opset, 1)] = opset.get(2, [0])[-1]
-    for entry in _messages(model, METADATA):
-        contents.metadata[_text(entry, 1)] = _text(entry, 2)
-    for graph in _messages(model, GRAPH):
-        contents.unusual |= SPARSE in graph
-        for node in _messages(graph, NODES):
-            contents.operators.append((_text(node, DOMAIN), _text(node, OPERATOR)))
-            for attribute in _messages(node, ATTRIBUTES):
-                contents.unusual |= not attribute.keys() <= NUMBERS
-        for tensor in _messages(graph, INITIALIZERS):
-            contents.external |= EXTERNAL_DATA in tensor
-            contents.external |= any(tensor.get(DATA_LOCATION, ()))
-    return contents
+    return ["", *_texts(message, number)][-1]
 
 
 def read(data: bytes, name: str) -> Contents:
@@ -137,12 +163,34 @@ def read(data: bytes, name: str) -> Contents:
     Raises:
         InputError: it is not an ONNX model; the sentence names the file.
     """
+    contents = Contents(data)
+    foreign = contents.foreign
     try:
-        contents = _walk(data)
+        model = _message(memoryview(data))
+        unusual = FUNCTIONS in model
+        for entry in _messages(model, METADATA):
+            contents.metadata[_text(entry, 1)] = _text(entry, 2)
+        for graph in _messages(model, GRAPH):
+            unusual |= SPARSE in graph
+            for fields in _messages(graph, NODES):
+                domain, operator = _text(fields, DOMAIN), _text(fields, OPERATOR)
+                contents.nodes.append(Node(operator, _texts(fields, 1), _texts(fields, 2)))
+                if domain not in ("", "ai.onnx") or operator not in OPERATORS:
+                    foreign.append(f"operator {domain}.{operator}".replace(" .", " "))
+                for attribute in _messages(fields, ATTRIBUTES):
+                    unusual |= not attribute.keys() <= NUMBERS
+            for tensor in _messages(graph, INITIALIZERS):
+                contents.tensors[_text(tensor, TENSOR_NAME)] = tensor
+                if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
+                    foreign.append("weights in another file")
     except (IndexError, ValueError):  # a field that runs past its message, or of no known kind
-        contents = Contents()
-    if not contents.operators or not contents.opsets:
+        contents.nodes.clear()
+    if not contents.nodes:
         raise InputError(f"{name}: not an ONNX model; copy or export it again")
+    if unusual:
+        foreign.append("functions, inner graphs or sparse tensors")
+    if len(contents.nodes) > MOST_NODES:
+        foreign.append(f"{len(contents.nodes)} nodes")
     return contents
 
 
@@ -152,35 +200,8 @@ def check(contents: Contents, name: str) -> None:
     Raises:
         InputError: one sentence that names the file.
     """
-    if contents.external:
-        raise InputError(f"{name}: its weights lie in another file; a model must be one file")
-    foreign = sorted(
-        f"operator {domain}.{operator}" if domain else f"operator {operator}"
-        for domain, operator in contents.operators
-        if domain not in ("", "ai.onnx") or operator not in OPERATORS
-    )
-    if contents.unusual:
-        foreign.append("functions, inner graphs or sparse tensors")
-    if len(contents.operators) > MOST_NODES:
-        foreign.append(f"{len(contents.operators)} nodes")
-    if foreign:
-        raise InputError(f"{name}: has {foreign[0]}, as no exported model has; export it again")
-
-
-def graph(data: bytes) -> tuple[dict[str, tuple[str, list[str]]], dict[str, NDArray[Any]]]:
-    """{output: (operator, inputs)} and {name: constant} of an exported model's bytes."""
-    nodes: dict[str, tuple[str, list[str]]] = {}
-    constants: dict[str, NDArray[Any]] = {}
-    for part in _messages(_message(memoryview(data)), GRAPH):
-        for node in _messages(part, NODES):
-            inputs, outputs = ([str(name, "utf-8") for name in node.get(i, ())] for i in (1, 2))  # type: ignore[arg-type]
-            nodes |= dict.fromkeys(outputs, (_text(node, OPERATOR), inputs))
-        for tensor in _messages(part, INITIALIZERS):
-            kind: Any = tensor[2][-1]
-            if kind in TYPES:
-                values: Any = np.frombuffer(tensor[9][-1], TYPES[kind])  # type: ignore[arg-type]
-                constants[_text(tensor, 8)] = values.reshape(tensor.get(1, []))
-    return nodes, constants
+    for reason in contents.foreign:
+        raise InputError(f"{name}: has {reason}, as no exported model has; export it again")
 
 
 def rewritten(
@@ -204,10 +225,10 @@ def _constants_changed(
 ) -> Iterator[bytes | memoryview]:
     kinds = {np.dtype(kind): number for number, kind in TYPES.items()}
     for number, value, unchanged in _fields(graph):
-        if number == INITIALIZERS and (name := _text(_message(value), 8)) in constants:
+        if number == INITIALIZERS and (name := _text(_message(value), TENSOR_NAME)) in constants:
             array = np.ascontiguousarray(constants[name])
             tensor = [_field(1, size) for size in array.shape]
-            tensor += [_field(2, kinds[array.dtype]), _field(8, name.encode())]
+            tensor += [_field(2, kinds[array.dtype]), _field(TENSOR_NAME, name.encode())]
             yield _field(INITIALIZERS, b"".join([*tensor, _field(9, array.tobytes())]))
         else:
             yield unchanged

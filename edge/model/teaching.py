@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.files import parsing, read_bytes
+from edge.files import parsing
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY
-from edge.model.model import LARGEST_BYTES, Model
+from edge.model.model import Model
+from edge.model.onnx_file import Contents
 
 NEAREST_OF_LABEL = 3
 LABEL_SHARE = 20
@@ -105,26 +106,23 @@ def taught(
             raise InputError(
                 f"{name}: has no label that the model knows ({known}); label it, or export anew"
             )
-    data = read_bytes(model.path, LARGEST_BYTES)
+    contents = model.contents
     with parsing(model.path, "a model that can be taught", "; export it again"):
-        nodes, constants = onnx_file.graph(data)
         changed: dict[str, NDArray[Any]] = {}
         for task, entry in info.tasks.items():
             index = {label: i for i, label in enumerate(entry.labels)}
             new = np.array([index.get(own.get(task, ""), -1) for own in labels])
-            z = np.stack(
-                [_coordinates(nodes, constants, task, p, x) for p, x in enumerate(vectors)]
-            )
-            columns, lengths = constants[f"columns of {task}"], constants[f"lengths of {task}"]
-            more = {"columns": -2.0 * z.swapaxes(1, 2) * (new >= 0), "lengths": (z**2).sum(axis=2)}
-            more["lengths"][:, new < 0] = np.inf
-            for key, old in (("columns", columns), ("lengths", lengths)):
-                values = more[key].reshape(*old.shape[:-1], len(names)).astype(old.dtype)
+            z = np.stack([coordinates(contents, task, p, x) for p, x in enumerate(vectors)])
+            lengths = np.where(new < 0, np.inf, (z**2).sum(axis=2))
+            more = {"columns": -2.0 * z.swapaxes(1, 2) * (new >= 0), "lengths": lengths}
+            for key, values in more.items():
+                old = contents.constant(f"{key} of {task}")
+                values = values.reshape(*old.shape[:-1], len(names)).astype(old.dtype)
                 changed[f"{key} of {task}"] = np.concatenate([old, values], axis=-1)
-            every = np.concatenate([constants[f"labels of {task}"], new])
-            changed[f"labels of {task}"] = every
-            if f"members of {task}" in constants:
-                for key, table in label_tables(every, len(entry.labels)).items():
+            all_labels = np.concatenate([contents.constant(f"labels of {task}"), new])
+            changed[f"labels of {task}"] = all_labels
+            if f"members of {task}" in contents.tensors:
+                for key, table in label_tables(all_labels, len(entry.labels)).items():
                     changed[f"{key} of {task}"] = table
     digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
     after = replace(
@@ -134,34 +132,20 @@ def taught(
         taught=info.taught + len(names),
         data_digest=digest,
     )
-    return onnx_file.rewritten(data, changed, {METADATA_KEY: after.to_json()})
+    return onnx_file.rewritten(contents.data, changed, {METADATA_KEY: after.to_json()})
 
 
-def _coordinates(
-    nodes: Mapping[str, tuple[str, list[str]]],
-    constants: Mapping[str, NDArray[Any]],
-    task: str,
-    point: int,
-    x: NDArray[np.float64],
+def coordinates(
+    contents: Contents, task: str, point: int, x: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(m, c) whole coordinates of vectors (m, width), by the graph's own operators."""
-
-    def value(name: str) -> NDArray[Any]:
-        if name in constants:
-            return constants[name]
-        operator, (source, *_) = nodes[name]
-        return value(source)[point] if operator == "Gather" else value(source)
-
-    way, name = [], nodes[nodes[f"{task}_neighbours"][1][0]][1][0]
-    while name in nodes:
-        operator, (name, *given) = nodes[name]
-        way.append((operator, given))
-    for operator, given in reversed(way):
-        a = [value(name).astype(np.float64) for name in given]
+    *steps, _, _ = contents.path(f"{task}_neighbours")  # the last two take the coordinates
+    for operator, further in steps:
+        values = [contents.constant(name, point) for name in further]
         if operator == "Gather":
-            x = x[:, value(given[0])]
+            x = x[:, values[0]]
         elif operator in ("Sub", "Mul", "MatMul"):
-            x = {"Sub": np.subtract, "Mul": np.multiply, "MatMul": np.matmul}[operator](x, a[0])
+            x = {"Sub": np.subtract, "Mul": np.multiply, "MatMul": np.matmul}[operator](x, *values)
         else:
-            x = np.clip(x, *a) if operator == "Clip" else np.rint(x)
+            x = np.clip(x, *values) if operator == "Clip" else np.rint(x)
     return x

@@ -21,6 +21,7 @@ from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, ContactClassifier
+from train.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion, lines, picture
 from train.report.score import interval, percent
@@ -100,7 +101,7 @@ def _left_out(
     p = model.projections_[key]
     space = Space(
         model.columns_[key], p.mean_, p.gain_, p.weights_[:, :c], model.rows_[key][:, :c],
-        index[train],
+        index[train], MOST_STEPS * p.grid_.step, p.grid_.limit * p.grid_.unit,
     )  # fmt: skip
 
     def renumbered(near: Near) -> Near:

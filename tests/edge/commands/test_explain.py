@@ -4,6 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from edge import demo
+from edge.commands.explain import text
+from edge.model.model import Model
 from edge.recording import save
 
 
@@ -27,11 +30,27 @@ def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
     status, out, _ = edge("explain", *given, text=True)
     assert status == 0
     assert "category: soft-fixed, by " in out
-    assert "soft_1, soft-fixed\n" in out
-    assert ", rigid-fixed, the nearest of another label\n" in out
-    assert "  rather than rigid-fixed: " in out
-    assert "  rigid-fixed, were " in out
+    assert "  soft_1: soft-fixed\n" in out
+    assert (
+        ": rigid-fixed\n  Features for (+) and against (-) soft-fixed, compared with rigid-" in out
+    )
+    assert "  It would be rigid-fixed if " in out
     assert max(map(len, out.splitlines()[1:])) <= 80
+
+
+@pytest.mark.parametrize(
+    ("mean", "unit", "sentence"),
+    [
+        (-2.0, "taxel", "It would be soft if area were lower by 2 taxels."),
+        (2.0, "radian/s", "It would be soft if area were higher by 2 radian/s."),
+        (0.5, "1", "It would be soft if area varied in another way, by 2 on average."),
+    ],
+)
+def test_a_change_is_a_sentence(mean, unit, sentence):
+    change = {"feature": "area", "label": "soft", "size": 2.0, "mean": mean}
+    line = {"task": "t", "label": "hard", "confidence": 1.0, "nearest": [], "rival": None}
+    info = replace(Model(demo.MODEL).info, units={"area": unit})
+    assert text({**line, "changes": [change]}, info).endswith(f"  {sentence}")
 
 
 def test_a_recording_without_contact_is_one_sentence(edge, exported, make_touch, tmp_path):

@@ -65,13 +65,13 @@ REFUSED = {
     "many nodes": (model([add()] * (onnx_file.MOST_NODES + 1)), "1001 nodes"),
     "weights elsewhere": (
         weights_elsewhere(data_location=TensorProto.EXTERNAL),
-        "its weights lie in another file",
+        "weights in another file, as no exported model has",
     ),
-    "a path alone": (weights_elsewhere(), "its weights lie in another file"),
+    "a path alone": (weights_elsewhere(), "weights in another file, as no exported model has"),
 }
 
 
 @pytest.mark.parametrize(("proto", "sentence"), REFUSED.values(), ids=REFUSED)
 def test_what_no_exported_model_has_is_refused(proto, sentence):
-    with pytest.raises(InputError, match=rf"^m.onnx: (has )?{sentence}"):
+    with pytest.raises(InputError, match=rf"^m.onnx: has {sentence}"):
         check(proto.SerializeToString(), "m.onnx")
