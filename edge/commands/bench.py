@@ -28,13 +28,9 @@ import numpy as np
 
 from edge import __version__
 from edge.classifier import Classifier
-from edge.commands.check import FRAMES
-from edge.commands.options import within
 from edge.commands.output import Output
-from edge.fake.player import frame_bits
 from edge.files import write_whole
 from edge.model.model import Model
-from edge.skin.file import SkinFile, frame_rate, load
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import first_contact
@@ -44,8 +40,9 @@ LOG = logging.getLogger(__name__)
 RATE_HZ = 100.0
 INSIDE = slice(1, -2)
 """The frames of the touch in which a contact is followed but neither begins nor is decided."""
-FEWEST_ROUNDS, MOST_ROUNDS = 100, 1_000_000
 REPEATS = 5
+ROUNDS = 400
+"""How often each stage is timed in each repeat."""
 BUSY_SHARE = 0.05
 """Share of the time in which this process had to wait, from which a machine counts as busy."""
 COLD = "import edge, sys; edge.Classifier(edge.Model(sys.argv[1]))"
@@ -56,23 +53,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument("--out", required=True, metavar="board.json", help="the file to write")
-    parser.add_argument(
-        "--skin", metavar="skin.toml", help="also calculate a frame's time on this skin's wires"
-    )
-    parser.add_argument(
-        "--rounds",
-        type=within(int, FEWEST_ROUNDS, MOST_ROUNDS),
-        default=2000,
-        help="how often each stage is timed (default: %(default)s)",
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, write the file, and print a line for each stage."""
     model = Model(arguments.model)
-    skin = None if arguments.skin is None else load(arguments.skin)
     output = Output.of(arguments)
-    board = measure(model, arguments.rounds, skin)
+    board = measure(model)
     with write_whole(arguments.out) as file:
         file.write(json.dumps(board, indent=1, ensure_ascii=False).encode() + b"\n")
     for name, stage in board["stages"].items():
@@ -82,19 +69,14 @@ def run(arguments: argparse.Namespace) -> int:
         f"memory     {board['memory_mb']:>9.1f} MB\n"
         f"cold start {board['cold_start_ms']:>9.1f} ms (fastest of {REPEATS})"
     )
-    if board["wire"] is not None:
-        output.text(
-            f"wire       {board['wire']['frame_ms']:>9.3f} ms a frame, calculated from the bits "
-            "that the drivers transfer"
-        )
     output.event({"event": "bench", "file": arguments.out}, f"written to {arguments.out}")
     return 0
 
 
-def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
-    """The contents of board.json; `skin` is the one whose wire time is calculated, or None."""
+def measure(model: Model) -> dict[str, Any]:
+    """The contents of board.json."""
     real_s, own_s = time.perf_counter(), time.process_time()
-    repeats = [time_stages(model, rounds // REPEATS) for _ in range(REPEATS)]
+    repeats = [time_stages(model, ROUNDS) for _ in range(REPEATS)]
     real_s, own_s = time.perf_counter() - real_s, time.process_time() - own_s
     waited, load = round(max(0.0, 1.0 - own_s / real_s), 3), round(os.getloadavg()[0], 2)
     if waited > BUSY_SHARE:
@@ -110,19 +92,18 @@ def measure(model: Model, rounds: int, skin: SkinFile | None) -> dict[str, Any]:
         "machine": machine(),
         "load": {"mean_of_a_minute": load, "waited": waited},
         "model": {
-            "sha256": hashlib.sha256(Path(model.path).read_bytes()).hexdigest(),
+            "sha256": hashlib.sha256(model.contents.data).hexdigest(),
             "data_digest": model.info.data_digest,
-            "bytes": os.path.getsize(model.path),
+            "bytes": len(model.contents.data),
             "features": list(model.info.features),
         },
-        "rounds": rounds,
+        "rounds": REPEATS * ROUNDS,
         "stages": {
             stage: min((times[stage] for times in repeats), key=lambda timing: timing["median_us"])
             for stage in repeats[0]
         },
         "memory_mb": round(peak / (1 << 20 if sys.platform == "darwin" else 1 << 10), 1),
         "cold_start_ms": round(cold_start_ms(model.path), 1),
-        "wire": None if skin is None else wire(skin),
     }
 
 
@@ -214,7 +195,6 @@ def machine() -> dict[str, Any]:
     return {
         "name": platform.node(),
         "kind": kind(),
-        "architecture": platform.machine(),
         "cores": os.cpu_count(),
         "system": platform.platform(),
         "versions": versions,
@@ -230,12 +210,3 @@ def kind() -> str:
         name = next(line for line in lines if line.startswith("model name"))
         return name.partition(":")[2].strip()
     return platform.processor() or "unknown"
-
-
-def wire(skin: SkinFile) -> dict[str, Any]:
-    """The wire time of a frame, from the bits that the drivers transfer over a fake bus."""
-    bits = [count / FRAMES for count in frame_bits(skin, FRAMES)]
-    clocks = [bus.clock_hz for bus in skin.buses]
-    rate = frame_rate(bits, clocks)
-    times = {"frame_ms": round(1e3 / rate, 4), "frame_rate_hz": round(rate, 2)}
-    return {"skin": skin.name, "bits": bits, "clock_hz": clocks, **times}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import statistics
 from typing import Any
 
@@ -59,7 +58,7 @@ def described(model: Model) -> dict[str, Any]:
         "event": "model",
         "file": model.path,
         "version": model.version,
-        "bytes": os.path.getsize(model.path),
+        "bytes": len(model.contents.data),
         **json.loads(model.info.to_json()),
     }
 

@@ -81,8 +81,6 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
         parser: of the command.
         web: ends the help of the option for a live page.
     """
-    from edge.runtime.joint_stream import OLDEST_S  # a replay needs no sockets
-
     add_skin(parser)
     parser.add_argument(
         "--joints",
@@ -90,13 +88,6 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
         help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add "names": '
         "[joints] if they are not in the arm's order; without HOST, the port listens on the "
         "loopback interface",
-    )
-    parser.add_argument(
-        "--joints-oldest",
-        type=seconds,
-        default=OLDEST_S,
-        metavar="SECONDS",
-        help="ignore joint angles older than this (default: %(default)s)",
     )
     parser.add_argument(
         "--web",

@@ -38,6 +38,7 @@ LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes, a character
 at most 4."""
 LEAD_S = 0.2
+"""Time that a trial keeps from before its onset."""
 LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
 KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
@@ -64,13 +65,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="a folder for numbered trials (default: %(default)s), or a file for one trial",
     )
     parser.add_argument("--trials", type=within(int, 1, 1e9), help="stop after this many trials")
-    parser.add_argument(
-        "--lead",
-        type=within(float, 0.0, 60.0),
-        default=LEAD_S,
-        metavar="SECONDS",
-        help="time to keep from before onset (default: %(default)s)",
-    )
     parser.add_argument(
         "--length",
         type=within(float, 0.1, 600.0),
@@ -199,8 +193,8 @@ def run(arguments: argparse.Namespace) -> int:
         }
         recorder = Recorder(arguments.out, labels, meta, names, lines)
         tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
-        lead = round(arguments.lead / skin.period_s)
-        trials = Trials(tracker, lead_frames=lead, length_s=arguments.length)
+        lead_frames = round(LEAD_S / skin.period_s)
+        trials = Trials(tracker, lead_frames=lead_frames, length_s=arguments.length)
         LOG.info("waiting for a contact" + (KEYS if by_key else ""))
         for number, (task, label) in enumerate(arguments.label[:9] if by_key else (), 1):
             LOG.info(f"  {number}  {task}={label}")

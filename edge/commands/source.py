@@ -168,7 +168,6 @@ def open_joints(
             dof=dof,
             names=None if arm is None else arm.names,
             now=clock.real if isinstance(clock, PacedClock) else clock.now,
-            oldest_s=arguments.joints_oldest,
         )
         yield stream
         if stream.malformed:

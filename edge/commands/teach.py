@@ -1,9 +1,9 @@
 """Teach a model labelled trials, on the board.
 
-Adds the trials to the nearest neighbours of the model, in the projection that it has, and writes
-the new model and its golden file into a folder. A taught model carries no certificate: it decides
-at the end of its window, and `run --error` refuses it. The next `make export` with the same
-recordings fits everything anew.
+Adds the trials to the nearest neighbours of the model, in the projection that it has. Writes the
+new model into a folder, and a golden file if the model has a golden.npz beside it. A taught model
+carries no certificate: it decides at the end of its window, and `run --error` refuses it. The next
+`make export` with the same recordings fits everything anew.
 """
 
 from __future__ import annotations
@@ -31,9 +31,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
     parser.add_argument(
-        "--golden", type=Path, help="of the model (default: golden.npz beside it, if it is there)"
-    )
-    parser.add_argument(
         "--out", type=Path, default=Path("taught"), help="a folder (default: %(default)s)"
     )
 
@@ -50,14 +47,14 @@ def run(arguments: argparse.Namespace) -> int:
         names.append(str(path))
         labels.append(joined(recording.labels))
         vectors.append([model.info.vector(contact[1], s) for s in model.decision_points_s])
-    golden = arguments.golden or Path(arguments.model).with_name("golden.npz")
+    golden = Path(arguments.model).with_name("golden.npz")
     at_points = np.array(vectors).swapaxes(0, 1)
     data = taught(model, names, at_points, labels)
     target = arguments.out / "model.onnx"
     with write_whole(target) as file:
         file.write(data)
     after = Model(target)
-    if arguments.golden is not None or golden.exists():
+    if golden.exists():
         renew(golden, target.with_name("golden.npz"), after, at_points)
     else:
         LOG.warning(f"{golden}: no such file, so none is written for the taught model")

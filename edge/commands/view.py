@@ -15,7 +15,7 @@ import textwrap
 
 from edge.classifier import Classifier
 from edge.commands import terminal
-from edge.commands.options import add_reading, within
+from edge.commands.options import add_reading
 from edge.commands.source import reading
 from edge.errors import printable
 from edge.events import Decided, Onset
@@ -24,6 +24,7 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 RATE_HZ = 10.0
+"""Pictures per second."""
 FULL_NEWTONS, FULL_FACTOR = 17.0, 50
 """White is the force above which the paper's lab no longer trusted its readings; if the scale is
 unknown, this many times the threshold."""
@@ -32,12 +33,6 @@ unknown, this many times the threshold."""
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", help="model.onnx, to show its decisions too")
-    parser.add_argument(
-        "--rate",
-        type=within(float, 0.1, 60.0),
-        default=RATE_HZ,
-        help="pictures per second (default: %(default)s)",
-    )
     add_reading(parser, " (in place of the terminal)")
 
 
@@ -64,7 +59,7 @@ def decision_text(event: Decided) -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read at the skin's rate, and draw at the rate that the options ask for."""
+    """Read at the skin's rate, and draw at `RATE_HZ`."""
     model = None if arguments.model is None else Model(arguments.model)
     tasks = () if model is None else tuple(model.info.tasks)
     decisions = dict.fromkeys(tasks, "no contact yet")
@@ -78,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     ):
         classifier = None if model is None else Classifier(model, live.skin.layout)
         layout = live.skin.layout if classifier is None else classifier.layout
-        interval_s = 1.0 / arguments.rate - 0.5 * live.skin.period_s
+        interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
         for frame, faults in live.frames():
             typed()
             events = [] if classifier is None else classifier.push(frame)

@@ -147,40 +147,33 @@ class ModelInfo:
 
     def to_json(self) -> str:
         """The metadata as JSON text, as the model file holds it."""
-        calibration: dict[str, Any] = {}
-        if self.decision_points_s and self.novelty is not None:
-            calibration = {
-                "decision_points_s": self.decision_points_s,
-                "stopping": {task: asdict(rules) for task, rules in self.stopping.items()},
-                "novelty": asdict(self.novelty),
-            }
-        kernels = {name: vars(table) for name, table in self.kernels.items()}
-        return json.dumps(
-            {
-                **calibration,
-                "format": FORMAT,
-                "tasks": {name: _to_dict(task) for name, task in self.tasks.items()},
-                "skin": self.layout.to_dict(),
-                "tracking": vars(self.tracking),
-                "window_s": self.window_s,
-                "samples": self.samples,
-                "features": self.features,
-                "units": self.units,
-                "motion_frame": self.motion_frame,
-                "arm": None if self.chain is None else self.chain.to_dict(),
-                **({"joints": self.joints} if self.joints else {}),
-                **({"kernels": kernels} if self.kernels else {}),
-                **({"name": self.name} if self.name else {}),
-                **({"trials": self.trials} if self.trials else {}),
-                **({"taught": self.taught} if self.taught else {}),
-                "rows": self.rows,
-                "data_digest": self.data_digest,
-                "versions": self.versions,
-            },
-            sort_keys=True,
-            allow_nan=False,
-            ensure_ascii=False,
-        )
+        entries = {
+            "format": FORMAT,
+            "tasks": {name: _to_dict(task) for name, task in self.tasks.items()},
+            "skin": self.layout.to_dict(),
+            "tracking": vars(self.tracking),
+            "window_s": self.window_s,
+            "samples": self.samples,
+            "features": self.features,
+            "units": self.units,
+            "motion_frame": self.motion_frame,
+            "arm": None if self.chain is None else self.chain.to_dict(),
+            "rows": self.rows,
+            "data_digest": self.data_digest,
+            "versions": self.versions,
+        }
+        optional = {
+            "decision_points_s": self.decision_points_s,
+            "stopping": {task: asdict(rules) for task, rules in self.stopping.items()},
+            "novelty": self.novelty and asdict(self.novelty),
+            "joints": self.joints,
+            "kernels": {name: vars(table) for name, table in self.kernels.items()},
+            "name": self.name,
+            "trials": self.trials,
+            "taught": self.taught,
+        }
+        entries |= {key: value for key, value in optional.items() if value}
+        return json.dumps(entries, sort_keys=True, allow_nan=False, ensure_ascii=False)
 
     @classmethod
     def from_json(cls, text: str, name: str) -> ModelInfo:
@@ -251,33 +244,36 @@ class ModelInfo:
             ) from None
         of_joints = any(feature.of_joints for feature in types)
         dof = self.joints if self.chain is None else self.chain.dof
-        if self.joints != (dof if of_joints else 0) or of_joints > (self.joints > 0):
-            raise InputError(f"{name}: its features contradict its joints; export it again")
-        if not self.tasks:
-            raise InputError(f"{name}: its metadata names no task; export it again")
-        if self.decision_points_s:
-            before = (0.0, *self.decision_points_s[:-1])
-            rising = all(a < b for a, b in zip(before, self.decision_points_s, strict=True))
-            if (
-                not rising
-                or self.decision_points_s[-1] != self.window_s
+        points = self.decision_points_s
+        contradictions = {
+            "its features contradict its joints": self.joints != (dof if of_joints else 0)
+            or of_joints > (self.joints > 0),
+            "its metadata names no task": not self.tasks,
+            "its decision points are impossible": points
+            and (
+                (0.0, *points) != tuple(sorted({0.0, *points}))
+                or points[-1] != self.window_s
                 or self.stopping.keys() != self.tasks.keys()
                 or self.novelty is None
                 or self.novelty.task not in self.tasks
-            ):
-                raise InputError(f"{name}: its decision points are impossible; export it again")
-        for task, factors in self.products.items():
-            places = [range(len(self.tasks[f].labels)) for f in factors if f in self.tasks]
-            fit = {len(self.tasks[task].labels)} == {len(indices) for indices in factors.values()}
-            pairs = sorted(zip(*factors.values(), strict=fit))
-            if not fit or len(places) != 2 or pairs != list(product(*places)):
-                raise InputError(f"{name}: the factors of {task} are impossible; export it again")
-        if len(self.trials) not in (0, self.rows):
-            raise InputError(
-                f"{name}: names {len(self.trials)} of {self.rows} trials; export it again"
-            )
-        if (self.motion_frame == "world") != (self.chain is not None):
-            raise InputError(f"{name}: its motion frame contradicts its arm; export it again")
+            ),
+            "the factors of a task are impossible": not all(map(self._factors_fit, self.products)),
+            f"names {len(self.trials)} of {self.rows} trials": self.trials
+            and len(self.trials) != self.rows,
+            "its motion frame contradicts its arm": (self.motion_frame == "world")
+            != (self.chain is not None),
+        }
+        for contradiction, holds in contradictions.items():
+            if holds:
+                raise InputError(f"{name}: {contradiction}; export it again")
+
+    def _factors_fit(self, task: str) -> bool:
+        """Whether each pair of the factors' labels is one label of the task."""
+        indices = self.products[task]
+        ranges = [range(len(self.tasks[f].labels)) for f in indices if f in self.tasks]
+        if len(ranges) != 2 or {len(self.tasks[task].labels)} != {*map(len, indices.values())}:
+            return False
+        return sorted(zip(*indices.values(), strict=True)) == list(product(*ranges))
 
 
 def _to_dict(task: Task) -> dict[str, Any]:

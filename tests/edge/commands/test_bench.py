@@ -9,15 +9,16 @@ from edge.cli import main
 from edge.commands import bench
 from edge.commands.bench import summary, touch
 from edge.model.model import Model
-from edge.skin.file import shipped
 from edge.touch.track import ContactTracker, first_contact
 
 
 @pytest.fixture(scope="module")
 def board(exported, tmp_path_factory):
     out = tmp_path_factory.mktemp("bench") / "board.json"
-    given = ["--rounds", "100", "--skin", str(shipped("cody")), "--out", str(out)]
-    assert main(["bench", "--model", str(exported / "model.onnx"), *given]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench, "ROUNDS", 20)
+        given = ["--model", str(exported / "model.onnx"), "--out", str(out)]
+        assert main(["bench", *given]) == 0
     return json.loads(out.read_text())
 
 
@@ -36,7 +37,7 @@ def test_a_busy_machine_is_named_and_the_fastest_round_counts(exported, monkeypa
     monkeypatch.setattr(bench.time, "perf_counter", iter((0.0, 1.0)).__next__)
     monkeypatch.setattr(bench, "time_stages", lambda *_: {"answer": {"median_us": next(rounds)}})
     monkeypatch.setattr(bench, "cold_start_ms", lambda _: 100.0)
-    board = bench.measure(Model(exported / "model.onnx"), 100, None)
+    board = bench.measure(Model(exported / "model.onnx"))
     assert board["stages"] == {"answer": {"median_us": 1}}
     assert board["load"]["waited"] == 0.75
     assert "this machine is busy: bench waited 75% of the time" in caplog.text
@@ -58,13 +59,6 @@ def test_the_model_is_named_by_its_digest(board, exported):
     assert board["model"]["data_digest"] == Model(exported / "model.onnx").info.data_digest
 
 
-def test_wire_time_is_the_busiest_bus_at_its_clock(board):
-    wire = board["wire"]
-    slowest = max(b / hz for b, hz in zip(wire["bits"], wire["clock_hz"], strict=True))
-    assert wire["frame_ms"] == pytest.approx(1e3 * slowest, abs=1e-4)
-    assert 100.0 < wire["frame_rate_hz"] < 200.0
-
-
 def test_percentiles_are_by_nearest_rank():
     expected = {"median_us": 100.5, "p99_us": 198.0, "n": 200}
     assert summary([float(i) for i in range(1, 201)]) == expected
@@ -81,18 +75,10 @@ def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
     assert series.peak[-1] > series.peak[0]
 
 
-@pytest.mark.parametrize(
-    ("given", "sentence"),
-    [
-        (["--skin", "missing.toml"], "missing.toml"),
-        (["--model", "missing.onnx"], "missing.onnx: no such model"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_writes_nothing(given, sentence, exported, tmp_path, capsys):
+def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, capsys):
     out = tmp_path / "board.json"
-    model = ["--model", str(exported / "model.onnx")]
-    assert main(["bench", *model, "--out", str(out), *given]) == 2
+    assert main(["bench", "--model", "missing.onnx", "--out", str(out)]) == 2
     err = capsys.readouterr().err
-    assert sentence in err
+    assert "missing.onnx: no such model" in err
     assert err.count("\n") == 1
     assert not out.exists()

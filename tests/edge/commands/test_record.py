@@ -83,16 +83,16 @@ def record(edge, recordings, tmp_path):
 
 def test_record_saves_a_trial_with_its_lead_in(record, recordings):
     source = load(recordings / "soft_1.npz")
-    given = ("--label", "category=soft-fixed", "--lead", 0.1, "--length", 1.3)
+    given = ("--label", "category=soft-fixed", "--length", 1.3)
     status, (event,), _ = record(*given)
     assert (status, event["complete"], event["joints"]) == (0, True, True)
     trial = load(event["file"])
     assert trial.labels == {"object": "foam", "category": "soft-fixed"}
     assert Path(event["file"]).name == "foam-soft-fixed-001.npz"
-    # Onset is at frame 20: ten frames of lead-in, and 130 from onset on, the last included.
-    np.testing.assert_array_equal(trial.frames, source.frames[10:151])
-    np.testing.assert_array_equal(trial.joints, source.joints[10:151])
-    np.testing.assert_allclose(trial.t, np.arange(141) * 0.01, atol=1e-9)
+    # Onset is at frame 20: 20 frames of lead-in, and 130 from onset on, the last included.
+    np.testing.assert_array_equal(trial.frames, source.frames[:151])
+    np.testing.assert_array_equal(trial.joints, source.joints[:151])
+    np.testing.assert_allclose(trial.t, np.arange(151) * 0.01, atol=1e-9)
     assert trial.layout == source.layout
     assert trial.valid is None
 
@@ -121,13 +121,13 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
     monkeypatch.setattr(Trials, "push", interrupted)
     before = signal.signal(number, signal.SIG_DFL)  # nohup, for one, has SIGHUP ignored
     try:
-        status, (event,), _ = record("--lead", 0.1)
+        status, (event,), _ = record()
     finally:
         signal.signal(number, before)
     assert (status, event["complete"], len(pushed)) == (0, False, 61)
     # Onset is at frame 20.
     source = load(recordings / "soft_1.npz").frames
-    np.testing.assert_array_equal(load(event["file"]).frames, source[10:61])
+    np.testing.assert_array_equal(load(event["file"]).frames, source[:61])
 
 
 def test_a_hangup_is_ignored_where_it_was_ignored_at_the_start():
