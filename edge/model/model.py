@@ -106,27 +106,15 @@ class Model:
             raise InputError(
                 f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
             ) from None
-        self._names = [output.name for output in self._session.get_outputs()]
+        self._outputs = _outputs(self.info)
         self._check()
 
     def _check(self) -> None:
         """Refuse a graph whose inputs and outputs are not those that the metadata describes."""
-        info, session = self.info, self._session
-        expected: dict[str, tuple[str, list[int]]] = {
-            "features": ("tensor(double)", [info.width]),
-            "out_of_range": ("tensor(double)", []),
-        }
-        if info.decision_points_s:
+        session = self._session
+        expected = {"features": ("tensor(double)", [self.info.width]), **self._outputs}
+        if self.info.decision_points_s:
             expected["decision_point"] = "tensor(int64)", []
-        for task, entry in info.tasks.items():
-            expected |= {
-                f"{task}_label": ("tensor(int64)", []),
-                f"{task}_scores": ("tensor(double)", [len(entry.labels)]),
-                f"{task}_distances": ("tensor(double)", [entry.k]),
-                f"{task}_neighbours": ("tensor(int64)", [entry.k]),
-            }
-            if info.has_label_distances:
-                expected[f"{task}_label_distances"] = "tensor(double)", [len(entry.labels)]
         inputs = [*session.get_inputs(), *session.get_overridable_initializers()]
         declared = {x.name: (x.type, x.shape[1:]) for x in (*inputs, *session.get_outputs())}
         for name, (kind, shape) in expected.items():
@@ -172,10 +160,14 @@ class Model:
         if self.info.decision_points_s:
             given["decision_point"] = np.array([point], dtype=np.int64)
         try:
-            values = self._session.run(self._names, given)
-        except Exception as error:  # an index past its tensor, a shape that came out otherwise
+            values = self._session.run(list(self._outputs), given)
+        except Exception as error:  # an index past its tensor, shapes that do not match
             raise self._broken(str(error)) from None
-        return dict(zip(self._names, values, strict=True))
+        outputs = dict(zip(self._outputs, values, strict=True))
+        for name, (_, shape) in self._outputs.items():
+            if outputs[name].shape != (len(vectors), *shape):
+                raise self._broken(f"{name} has the shape {outputs[name].shape}")
+        return outputs
 
     def decide(self, vector: ArrayLike, decision_point: int | None = None) -> dict[str, Decision]:
         """Decide all tasks for one feature vector.
@@ -254,6 +246,21 @@ def require_joints(model: Model, dof: int | None, where: str) -> None:
             f"{where}: has {dof or 'no'} joint angles, but the model needs {needed} of each frame; "
             "record them, or export a model without joints"
         )
+
+
+def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
+    """{output: its type, and its shape for one vector} of a graph with this metadata."""
+    outputs: dict[str, tuple[str, list[int]]] = {"out_of_range": ("tensor(double)", [])}
+    for task, entry in info.tasks.items():
+        outputs |= {
+            f"{task}_label": ("tensor(int64)", []),
+            f"{task}_scores": ("tensor(double)", [len(entry.labels)]),
+            f"{task}_distances": ("tensor(double)", [entry.k]),
+            f"{task}_neighbours": ("tensor(int64)", [entry.k]),
+        }
+        if info.has_label_distances:
+            outputs[f"{task}_label_distances"] = "tensor(double)", [len(entry.labels)]
+    return outputs
 
 
 def _onnxruntime() -> Any:

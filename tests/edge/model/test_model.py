@@ -215,3 +215,15 @@ def test_a_graph_whose_answer_has_another_shape_is_refused(altered):
 
     with pytest.raises(InputError, match=r"no tensor\(double\) object_distances of shape \[3\]"):
         Model(altered(doubled))
+
+
+def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
+    def scalar(proto):
+        node = next(n for n in proto.graph.node if "out_of_range" in n.output)
+        node.CopyFrom(helper.make_node("ReduceSum", [node.input[0]], ["out_of_range"], keepdims=0))
+        output = next(x for x in proto.graph.output if x.name == "out_of_range")
+        del output.type.tensor_type.shape.dim[:]
+
+    model = Model(altered(scalar))
+    with pytest.raises(InputError, match=r"out_of_range has the shape \(\)\); copy or export it"):
+        model.decide(np.zeros(model.info.width))
