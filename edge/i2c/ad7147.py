@@ -13,16 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.i2c.bus import Bus, fetch, read, send, write
-from edge.i2c.chip import Chip, ChipKind, Defaults, FakeChip, Option, Parsed, Sense
+from edge.i2c.chip import Chip, ChipKind, Defaults, FakeChip, Parsed, Sense
 
 STAGES, STAGE_REGISTERS = 12, 8
 SYSTEM, STATUS, RESULTS, DEVICE_ID, STAGE_BANK = 0x00, 0x08, 0x0B, 0x17, 0x80
-DECIMATION = {64: 0x02B0, 128: 0x01B0, 256: 0x00B0}
-"""PWR_CONTROL for 12 stages at full power, by decimation."""
-REFRESH_S = {64: 0.009216, 128: 0.018432, 256: 0.036864}
-"""Time of one conversion of 12 stages; only 64 keeps up with 100 Hz."""
-CALIBRATE_ALL = 0x0FFF
-STAGES_PER_WRITE = 3
+REFRESH_S = 0.009216
+"""Time of a conversion of 12 stages at a decimation of 64; slower ones miss 100 Hz."""
+WRITTEN_AT_ONCE = 3 * STAGE_REGISTERS
 """Some adapters carry at most 61 bytes a transfer (CP2112)."""
 DETECTION = (0x2626, 1600, 1600, 1600, 1600)
 """Sensitivity and offsets of the chip's own touch detection, as in Linux's board files. No result
@@ -45,30 +42,27 @@ def stage_bank(stage: int) -> tuple[int, ...]:
     return (*connection, 0, *DETECTION)
 
 
-CONNECTIONS = np.array([stage_bank(stage)[:3] for stage in range(STAGES)])
+BANKS = sum((stage_bank(stage) for stage in range(STAGES)), ())
+"""The registers of all stages, from `STAGE_BANK` on."""
+CONNECTIONS = np.array(BANKS).reshape(STAGES, STAGE_REGISTERS)[:, :3]
 """(12, 3) registers that say what each stage converts."""
-
-
-def system_registers(decimation: int) -> Row:
-    """PWR_CONTROL, calibration of all stages, and ambient compensation and interrupts, all off."""
-    return (SYSTEM, (DECIMATION[decimation], CALIBRATE_ALL, 0, 0, 0, 0, 0, 0x0400))
-
-
-def start_rows(decimation: int = 64) -> list[Row]:
-    """The rows to write, in order: the stages, then the system registers."""
-    stages = range(0, STAGES, STAGES_PER_WRITE)
-    banks = [sum((stage_bank(s + i) for i in range(STAGES_PER_WRITE)), ()) for s in stages]
-    rows = [(STAGE_BANK + STAGE_REGISTERS * s, bank) for s, bank in zip(stages, banks, strict=True)]
-    return [*rows, system_registers(decimation)]
-
-
-def check_rows(decimation: int = 64) -> list[Row]:
-    """The rows to read back: what each stage converts, and last the system registers.
-
-    A reset changes each of them, so that any one row tells a chip that has lost its settings.
-    """
-    stages = [(STAGE_BANK + STAGE_REGISTERS * s, stage_bank(s)[:3]) for s in range(STAGES)]
-    return [*stages, system_registers(decimation)]
+SYSTEM_ROW: Row = (SYSTEM, (0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400))
+"""PWR_CONTROL (full power, 12 stages, decimation of 64), calibration of all stages, and ambient
+compensation and interrupts, all off."""
+START_ROWS: list[Row] = [
+    *(
+        (STAGE_BANK + i, BANKS[i : i + WRITTEN_AT_ONCE])
+        for i in range(0, len(BANKS), WRITTEN_AT_ONCE)
+    ),
+    SYSTEM_ROW,
+]
+"""The rows to write, in order."""
+CHECK_ROWS: list[Row] = [
+    *((STAGE_BANK + i, BANKS[i : i + 3]) for i in range(0, len(BANKS), STAGE_REGISTERS)),
+    SYSTEM_ROW,
+]
+"""The rows to read back: what each stage converts, and last the system registers. A reset changes
+each of them, so that any one row tells a chip that has lost its settings."""
 
 
 def words(values: tuple[int, ...]) -> bytes:
@@ -111,7 +105,6 @@ class AD7147(Chip):
         bus: Bus,
         address: int,
         *,
-        decimation: int = 64,
         into: NDArray[np.uint8] | int = 2 * STAGES,
     ) -> None:
         """Identify the chip.
@@ -119,7 +112,6 @@ class AD7147(Chip):
         Args:
             bus: a bus or a mux's channel.
             address: 0x2C to 0x2F.
-            decimation: 64, 128 or 256; see `REFRESH_S`.
             into: (24,) bytes that `read` fills; new ones where it is a number.
 
         Raises:
@@ -127,9 +119,8 @@ class AD7147(Chip):
             BusError: the chip does not answer.
         """
         super().__init__(bus, address, words((RESULTS,)), into)
-        self._start = start_rows(decimation)
         self._checks = []
-        for register, values in check_rows(decimation):
+        for register, values in CHECK_ROWS:
             pointer, row = write(address, words((register,))), read(address, 2 * len(values))
             self._checks.append((register, words(values), bus.prepare(pointer, row)))
         self._turn = -1
@@ -144,7 +135,7 @@ class AD7147(Chip):
             WrongChip: a register does not hold what was written.
             BusError: a transaction failed.
         """
-        for register, values in self._start:
+        for register, values in START_ROWS:
             send(self.bus, self.address, words((register, *values)))
             yield
         fetch(self.bus, self.address, words((STATUS,)), 6)
@@ -156,7 +147,7 @@ class AD7147(Chip):
             yield
 
     def healthy(self) -> bool:
-        """Whether the next row of `check_rows`, each in turn, holds what was written."""
+        """Whether the next row of `CHECK_ROWS`, each in turn, holds what was written."""
         self._turn = (self._turn + 1) % len(self._checks)
         _, expected, prepared = self._checks[self._turn]
         self.bus.transfer(prepared)
@@ -201,7 +192,7 @@ class FakeAD7147(FakeChip):
     def reset(self) -> None:
         """Registers as after power-on."""
         self.registers = np.zeros(0x400, dtype=np.uint16)
-        undefined = [self._power_up.randrange(1 << 16) for _ in range(STAGES * STAGE_REGISTERS)]
+        undefined = [self._power_up.randrange(1 << 16) for _ in BANKS]
         self.registers[STAGE_BANK : STAGE_BANK + len(undefined)] = undefined
         self.registers[DEVICE_ID] = 0x1472
         self._pointer = 0
@@ -217,7 +208,7 @@ class FakeAD7147(FakeChip):
         """Words from the pointer on."""
         if self._refresh > 0.0:
             t = t // self._refresh * self._refresh
-        banks = self.registers[STAGE_BANK : STAGE_BANK + STAGES * STAGE_REGISTERS]
+        banks = self.registers[STAGE_BANK : STAGE_BANK + len(BANKS)]
         connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
         power = int(self.registers[SYSTEM])
         last = power >> 4 & 15 if power & 3 == 0 else -1
@@ -226,22 +217,17 @@ class FakeAD7147(FakeChip):
         results[last + 1 :] = 0
         self.registers[RESULTS : RESULTS + STAGES] = results
         first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF
-        return (
-            self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes().ljust(n, b"\0")[:n]
-        )
+        served = self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes()
+        return served.ljust(n, b"\0")[:n]
 
 
 KIND = ChipKind(
     name="ad7147",
     description="a capacitance-to-digital converter",
-    driver=lambda bus, spec, into: AD7147(
-        bus, spec.address, decimation=spec.option("decimation"), into=into
-    ),
+    driver=lambda bus, spec, into: AD7147(bus, spec.address, into=into),
     parse=lambda data, spec: parse(data),
     fake=lambda spec, sense, timed, power_up: FakeAD7147(
-        sense,
-        refresh_s=REFRESH_S[spec.option("decimation")] if timed else 0.0,
-        power_up=power_up,
+        sense, refresh_s=REFRESH_S if timed else 0.0, power_up=power_up
     ),
     frame_bytes=lambda spec: 2 * STAGES,
     highest=lambda spec: 0xFFFE,  # 0xFFFF is the end of its range
@@ -249,6 +235,5 @@ KIND = ChipKind(
     addresses=range(0x2C, 0x30),
     stages=STAGES,
     pointer_bytes=2,
-    options={"decimation": Option(64, tuple(DECIMATION))},
     defaults=lambda options: Defaults(threshold_counts=40, onset_counts=60),
 )

@@ -60,7 +60,7 @@ def test_a_constructor_refuses_another_chip(driver, model, options):
 @pytest.mark.parametrize("name", ["ad7147", "mpr121"])
 def test_every_register_that_does_not_keep_its_value_is_found_by_reading_back(name):
     driver, model_class, address, _ = CHIPS[name]
-    wide, table = (2, ad7147.start_rows()) if name == "ad7147" else (1, mpr121.SETTINGS)
+    wide, table = (2, ad7147.START_ROWS) if name == "ad7147" else (1, mpr121.SETTINGS)
     for register, values in table:
         if not any(values):
             continue  # losing a zero changes nothing
