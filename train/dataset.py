@@ -32,6 +32,7 @@ from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, TrackSettings
 from train.arms import arm_of, joint_angles
+from train.feature_sets import moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
 from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
@@ -185,7 +186,7 @@ class DataSet:
         return replace(
             self,
             names=taken,
-            chain=self.chain if any(feature.moves for feature in types) else None,
+            chain=self.chain if any(map(moves, types)) else None,
             joints=self.joints if any(feature.of_joints for feature in types) else 0,
             kernels={name: table for name, table in self.kernels.items() if name in taken},
         )
@@ -193,7 +194,7 @@ class DataSet:
     @property
     def units(self) -> dict[str, str]:
         """The unit of each feature."""
-        return {name: measures.feature(name).unit(self.layout) for name in self.names}
+        return {name: unit(measures.feature(name), self.layout) for name in self.names}
 
 
 def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
@@ -266,7 +267,7 @@ def load_trials(
     reference = with_thresholds(raw.own[0].layout, threshold, onset)
     reference = replace(reference, dead=_dead(raw.recordings))
     needed = any(feature.of_joints for feature in types)
-    wanting = raw.joints and (needed or any(feature.moves for feature in types))
+    wanting = raw.joints and (needed or any(map(moves, types)))
     every = list(zip(raw.recordings, raw.paths, strict=True))
     kept = [(r, path) for r, path in every if not wanting or r.joints is not None]
     bare = tuple(path for r, path in every if wanting and r.joints is None)
@@ -275,7 +276,7 @@ def load_trials(
         (recording if own is None else recording.for_joints(own.names), path)
         for (recording, path), own in zip(kept, arms, strict=True)
     ]
-    moving = any(feature.moves for feature in types) and None not in arms
+    moving = any(map(moves, types)) and None not in arms
     chain = arms[0] if moving else None
     if chain is not None:
         for own, (_, path) in zip(arms, kept, strict=True):

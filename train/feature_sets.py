@@ -67,7 +67,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from edge.touch.measures import PAPER, QUANTITIES
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import KERNELS, PAPER, QUANTITIES, Feature
 
 _TAXELS = (
     "taxel_force@10",
@@ -110,3 +111,28 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
     """The features of several sets, or single features, in their order, each once."""
     expanded = (feature for name in names for feature in SETS.get(name, (name,)))
     return tuple(dict.fromkeys(expanded))
+
+
+def moves(feature: Feature) -> bool:
+    """Whether a feature is measured in the world's frame where joint angles are known."""
+    return feature.quantity in ("motion", "force_motion", "stiffness")
+
+
+def unit(feature: Feature, layout: SkinLayout) -> str:
+    """The unit of a feature's values on a skin."""
+    text = {
+        "max_force": layout.force_unit,
+        "force": layout.force_unit,
+        "taxel_force": layout.force_unit,
+        "pressure": f"{layout.force_unit}/taxel",
+        "motion": layout.length_unit,
+        "force_motion": layout.length_unit,
+        "stiffness": f"{layout.force_unit}/{layout.length_unit}",
+        "slant": "taxel^2",
+        "joint_change": "radian",
+        "joint_angle": "radian",
+        **dict.fromkeys(KERNELS, "1"),
+    }.get(feature.quantity, "taxel")
+    for transform in feature.transforms:
+        text = "1" if transform == "relative" else f"{transform}({text})"
+    return f"{text}/s" if feature.summary == "rate" else text

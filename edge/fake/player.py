@@ -6,6 +6,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,21 +217,15 @@ def playback(file: SkinFile, recording: Recording, *, loop: bool = False) -> Pla
 
 
 def play(
-    file: SkinFile,
-    recording: Recording,
-    *,
-    loop: bool = False,
-    clock: VirtualClock | None = None,
-    noise_counts: float = 0.0,
-    touch_counts: int | None = None,
+    file: SkinFile, recording: Recording, *, loop: bool = False, **options: Any
 ) -> tuple[Skin, Playback]:
-    """A fake skin that feels a recording.
+    """A fake skin that feels a recording, with further options of `fake_skin`.
 
     Raises:
         InputError: the recording's shape is not the skin's.
     """
     scene = playback(file, recording, loop=loop)
-    skin = fake_skin(file, scene, clock=clock, noise_counts=noise_counts, touch_counts=touch_counts)
+    skin = fake_skin(file, scene, **options)
     scene.start = skin.clock.now()
     return skin, scene
 

@@ -22,8 +22,8 @@ from edge.touch.track import ContactTracker
 PICTURE_S = 0.1
 """Between two pictures."""
 LAST_TRIALS, LAST_NOTICES = 200, 8
-CURVE_S, CURVE_POINTS = 5.0, 100
-"""Of a contact, the page draws so many seconds from its onset, at so many times at most."""
+CURVE_S = 5.0
+"""Of a contact, the page draws so many seconds from its onset."""
 MOST_LABELS, LONGEST_LABEL = 16, 80
 
 
@@ -130,7 +130,6 @@ class Page:
         if contact is None:
             return None
         series = contact.series()
-        series = series.thinned(max(1, -(-series.t.size // CURVE_POINTS)))
         return {
             "ended": contact.ended,
             "taxels": [] if region is None else region.mask.ravel().nonzero()[0].tolist(),

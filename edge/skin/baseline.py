@@ -41,29 +41,21 @@ class Baseline:
         self._now = self._rest.copy()
         self._sign = np.broadcast_to(np.asarray(sign, dtype=np.int32), n)
         self._dead = np.broadcast_to(np.maximum(np.asarray(dead_band, dtype=np.int32), 1), n)
-        self._rising = bool((self._sign == 1).all())
         self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
         self._low = self._rest - (limit << SCALE_BITS)
         self._high = self._rest + (limit << SCALE_BITS)
-        self._counts = self._rounded()
-
-    def _rounded(self) -> NDArray[np.int32]:
-        return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
 
     @property
     def counts(self) -> NDArray[np.int32]:
         """(n,) raw counts of the baseline."""
-        return self._counts
+        return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
 
     def above(self, raw: NDArray[np.uint16]) -> NDArray[np.uint16]:
         """Counts above the baseline (n,), 0 to 65535, with sign and dead band applied."""
-        counts = raw.astype(np.int32)
-        counts -= self._counts
-        if not self._rising:
-            counts *= self._sign
+        counts = (raw.astype(np.int32) - self.counts) * self._sign
         counts *= counts >= self._dead
-        np.minimum(counts, 65535, out=counts)
-        return counts.astype(np.uint16)
+        above: NDArray[np.uint16] = np.minimum(counts, 65535).astype(np.uint16)
+        return above
 
     def follow(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
         """Follow the drift of the `valid` taxels by a step; call it while nothing touches."""
@@ -72,4 +64,3 @@ class Baseline:
         error >>= FOLLOW_BITS
         self._now += np.clip(error, -self._step, self._step) * valid
         np.clip(self._now, self._low, self._high, out=self._now)
-        self._counts = self._rounded()

@@ -187,13 +187,13 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
             array = np.array(table.get(key), dtype=np.float64)
         except (TypeError, ValueError, OverflowError):  # no numbers, or rows of different lengths
             array = np.empty(0)
-        kind = "whole numbers" if key == "baseline" else "numbers"
-        if array.shape != layout.shape or (key == "baseline" and (array % 1.0 != 0.0).any()):
-            rows = f"{layout.rows} rows of {layout.cols} {kind}"
-            raise InputError(f"{table.called(key)} must be {rows}; calibrate again")
-        if not ((array >= 0.0) & (array <= 65535.0)).all():
+        whole = key == "noise" or not (array % 1.0).any()
+        in_range = ((array >= 0.0) & (array <= 65535.0)).all()
+        if array.shape != layout.shape or not (whole and in_range):
+            numbers = "numbers" if key == "noise" else "whole numbers"
             raise InputError(
-                f"{table.called(key)} has a value outside of 0 to 65535; calibrate again"
+                f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} from "
+                "0 to 65535; calibrate again"
             )
         arrays[key] = array
     taken = table.get("taken", None)

@@ -43,7 +43,6 @@ class Periods:
 
     def __init__(self) -> None:
         self._counts: Counter[int] = Counter()
-        self.longest = 0.0
 
     @property
     def n(self) -> int:
@@ -54,7 +53,6 @@ class Periods:
         """Count a period; one longer than a second counts as a second."""
         # A period on a bin's edge must not fall below it by the last bit of a float.
         self._counts[int(min(period_s, 1.0) / self.BIN_S + 1e-6)] += 1
-        self.longest = max(self.longest, period_s)
 
     def percentile(self, percent: float) -> float:
         """The period in seconds that so many percent do not exceed, rounded up to a bin; NaN

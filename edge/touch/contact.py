@@ -57,10 +57,6 @@ class FeatureSeries:
     kernel_cells: NDArray[np.int64] | None = None
     joints: NDArray[np.float64] | None = None
 
-    def thinned(self, every: int) -> FeatureSeries:
-        """Every n-th frame, as a slower wire would deliver them."""
-        return self._frames(slice(None, None, every))
-
     def felt(self, window_s: float) -> FeatureSeries:
         """The frames in which the contact is felt, up to the first one at the window's end.
 

@@ -63,8 +63,6 @@ KERNELS = {"taxel_kernels": 1008, "zone_kernels": 504}
 applied to the skin's cells, at most `KERNEL_CELLS`, and to the whole numbers of all zones."""
 WIDE = ("taxel_force", *KERNELS, "joint_change", "joint_angle")
 """Quantities of many values: one for each cell of the skin (`Cells`), kernel or joint."""
-MOVING = ("motion", "force_motion", "stiffness")
-"""Quantities that are measured in the world's frame where joint angles are known."""
 SIGNED = ("around", "slant", "joint_change", "joint_angle")
 """Quantities that may be negative, and so have no logarithm."""
 
@@ -108,30 +106,6 @@ class Feature:
     transforms: tuple[str, ...] = ()
     summary: str = ""
     samples: int = 0
-
-    def unit(self, layout: SkinLayout) -> str:
-        """The unit of its values on a skin."""
-        unit = {
-            "max_force": layout.force_unit,
-            "force": layout.force_unit,
-            "taxel_force": layout.force_unit,
-            "pressure": f"{layout.force_unit}/taxel",
-            "motion": layout.length_unit,
-            "force_motion": layout.length_unit,
-            "stiffness": f"{layout.force_unit}/{layout.length_unit}",
-            "slant": "taxel^2",
-            "joint_change": "radian",
-            "joint_angle": "radian",
-            **dict.fromkeys(KERNELS, "1"),
-        }.get(self.quantity, "taxel")
-        for transform in self.transforms:
-            unit = "1" if transform == "relative" else f"{transform}({unit})"
-        return f"{unit}/s" if self.summary == "rate" else unit
-
-    @property
-    def moves(self) -> bool:
-        """Whether it is measured in the world's frame where joint angles are known."""
-        return self.quantity in MOVING
 
     @property
     def wide(self) -> bool:

@@ -15,7 +15,7 @@ from edge.touch.features import FEATURES, feature_vector, widths
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import TRANSFORMS, feature
 from tests.edge.touch.pressed import followed, pressed
-from train.feature_sets import SETS, expand
+from train.feature_sets import SETS, expand, unit
 
 SKIN = SkinLayout(
     4,
@@ -54,6 +54,24 @@ def test_every_set_has_features_that_exist_and_none_is_in_two_sets():
     assert len(members) == len(set(members))
     assert [feature(name).name for name in members] == members
     assert SETS["paper"] == FEATURES
+
+
+def test_units_are_those_of_the_skin():
+    metric = SkinLayout(rows=6, cols=8, counts_per_newton=100.0, pitch_m=0.01)
+    units = {
+        "max_force": "newton",
+        "left_force_rate": "newton/s",
+        "skin_slant": "taxel^2",
+        "force_motion": "metre",
+        "skin_pressure": "newton/taxel",
+        "stiffness": "newton/metre",
+        "log_stiffness": "log(newton/metre)",
+        "sqrt_relative_taxel_force_rate": "sqrt(1)/s",
+        "log_skin_force_mean": "log(newton)",
+        "joint_change_rate@10": "radian/s",
+    }
+    assert {name: unit(feature(name), metric) for name in units} == units
+    assert unit(feature("skin_force"), SkinLayout(rows=6, cols=8)) == "count"
 
 
 def test_sets_and_features_expand_to_features_in_their_order_each_once():
@@ -189,7 +207,7 @@ def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
 def test_every_nth_frame_of_a_series_has_all_that_was_measured():
     wanted = [*SETS["moments"], "taxel_force", "joint_angle", "skin_force", "force_motion"]
     whole = series_of(touch(PEAKS, joints=np.arange(10.0).reshape(5, 2)), wanted, joints=2)
-    thin = whole.thinned(2)
+    thin = whole._frames(slice(None, None, 2))
     assert thin.integers.tolist() == whole.integers[::2].tolist()
     assert thin.joints.tolist() == [[0.0, 1.0], [4.0, 5.0], [8.0, 9.0]]
     assert thin.t.tolist() == [0.0, 0.5, 1.0]

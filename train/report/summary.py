@@ -15,6 +15,7 @@ from edge.touch import measures
 from train.choose import TRIAL, Chosen
 from train.dataset import DataSet
 from train.evaluate import Result
+from train.feature_sets import moves
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, squared_distances
@@ -49,7 +50,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     for name, unit in fitted.dataset.units.items():
         units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(name)
     lines += ["", *(f"{unit}: {', '.join(features)}" for unit, features in units.items())]
-    if any(measures.feature(name).moves for name in fitted.dataset.names):
+    if any(moves(measures.feature(name)) for name in fitted.dataset.names):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])

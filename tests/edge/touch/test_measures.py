@@ -245,24 +245,6 @@ def test_the_papers_three_are_the_default_and_come_first():
     assert [feature(name).name for name in ALL] == ALL
 
 
-def test_units_are_those_of_the_skin():
-    metric = replace(FLAT, pitch_m=0.01)
-    units = {
-        "max_force": "newton",
-        "left_force_rate": "newton/s",
-        "skin_slant": "taxel^2",
-        "force_motion": "metre",
-        "skin_pressure": "newton/taxel",
-        "stiffness": "newton/metre",
-        "log_stiffness": "log(newton/metre)",
-        "sqrt_relative_taxel_force_rate": "sqrt(1)/s",
-        "log_skin_force_mean": "log(newton)",
-        "joint_change_rate@10": "radian/s",
-    }
-    assert {name: feature(name).unit(metric) for name in units} == units
-    assert feature("skin_force").unit(replace(metric, counts_per_newton=None)) == "count"
-
-
 @pytest.mark.parametrize(
     ("wanted", "sentence"),
     [
