@@ -7,38 +7,29 @@ import numpy as np
 import pytest
 import scipy.ndimage
 
+from edge.demo import FOLDER
+from edge.recording import load
 from edge.touch.region import largest_region
 from tests.edge.touch.test_region import SHAPES
 
-
-def contact():
-    """The patch of the real contact frame (12 active taxels), in counts of 1000 a newton."""
-    frame = np.zeros((16, 24), dtype=np.uint16)
-    frame[6:10, 9:11] = [[1530, 1530], [1130, 560], [1360, 610], [1210, 1050]]
-    frame[14, 22:] = 80, 60
-    frame[15, 21:23] = 80, 100
-    return frame
+THRESHOLD = 50
+MOST = {"scipy + numpy": 0.6, "OpenCV": 1.5}
+TOUCHES = ("cardboard-box-fixed", "foam-block-fixed")
 
 
-def large():
-    """A soft contact of 30 taxels, highest in the middle."""
-    rows, cols = np.mgrid[:16, :24]
-    force = 1200 - 250 * np.hypot((rows - 6) / 0.9, cols - 12)
-    return np.where(force > 50, force, 0).astype(np.uint16)
-
-
-FRAMES = {"contact": contact(), "soft contact": large()} | {
-    name: SHAPES[name] for name in ("full", "checkerboard", "serpentine", "empty")
-}
+def widest(touch):
+    """The frame of a touch with the most taxels in contact."""
+    frames = load(FOLDER / f"{touch}.npz").frames
+    return frames[(frames > THRESHOLD).sum(axis=(1, 2)).argmax()]
 
 
 def ours(frame):
-    region = largest_region(frame, 50, wraps=True)
+    region = largest_region(frame, THRESHOLD, wraps=True)
     return None if region is None else (region.area, region.peak, region.centroid)
 
 
 def scipy_numpy(frame):
-    labels, n = scipy.ndimage.label(frame > 50)
+    labels, n = scipy.ndimage.label(frame > THRESHOLD)
     if n == 0:
         return None
     areas = np.bincount(labels.ravel())[1:]
@@ -49,7 +40,7 @@ def scipy_numpy(frame):
 
 def opencv(frame):
     _, labels, stats, centres = cv2.connectedComponentsWithStats(
-        (frame > 50).view(np.uint8), connectivity=4
+        (frame > THRESHOLD).view(np.uint8), connectivity=4
     )
     if len(stats) < 2:
         return None
@@ -58,13 +49,12 @@ def opencv(frame):
 
 
 RIVALS = {"scipy + numpy": scipy_numpy, "OpenCV": opencv}
-MOST = {"scipy + numpy": 0.6, "OpenCV": 1.5}
 
 
-@pytest.mark.parametrize("name", FRAMES)
+@pytest.mark.parametrize("name", [*TOUCHES, "full", "checkerboard", "serpentine", "empty"])
 def bench_region(name, against):
-    frame = FRAMES[name]
+    frame = widest(name) if name in TOUCHES else SHAPES[name]
     areas = {(method(frame) or [0])[0] for method in (ours, *RIVALS.values())}
     assert len(areas) == 1
     rivals = {rival: partial(method, frame) for rival, method in RIVALS.items()}
-    against(partial(ours, frame), rivals, most=MOST if "contact" in name else {}, calls=50)
+    against(partial(ours, frame), rivals, most=MOST if name in TOUCHES else {}, calls=50)

@@ -22,6 +22,7 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
 
+ARM = Chain.cody()
 START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
 RATE_DEG_S = 20.0
 LEAD_S, TOUCH_S, RATE_HZ, STEP_S = 0.3, 1.8, 100, 0.001
@@ -78,6 +79,11 @@ class Thing:
         """Whether it yields."""
         return self.kind not in RIGID_KINDS
 
+    @property
+    def layered(self) -> bool:
+        """Whether it has an elastic layer."""
+        return self.soft and self.kind != "plant"
+
 
 @dataclass(frozen=True)
 class Touch:
@@ -105,6 +111,24 @@ class Touch:
     stiffness: float = 1.0
     noise: tuple[float, np.random.Generator] | None = None
 
+    @property
+    def pad_n_m(self) -> float:
+        """Stiffness of a pad, in series with the layer beneath it where there is a layer."""
+        if not self.thing.layered:
+            return self.taxel_n_m
+        return 1.0 / (1.0 / self.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(self.thing.modulus_pa))
+
+    @property
+    def rate_rad_s(self) -> NDArray[np.float64]:
+        """(dof,) speed of the equilibrium point: the first joint swings."""
+        return np.eye(ARM.dof)[0] * math.radians(RATE_DEG_S * self.speed)
+
+    @property
+    def lag_rad(self) -> NDArray[np.float64]:
+        """(dof,) by which each joint trails its equilibrium point in free motion."""
+        seconds = np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) / math.sqrt(self.stiffness)
+        return seconds * self.rate_rad_s
+
 
 @dataclass
 class Touched:
@@ -120,25 +144,13 @@ class Touched:
     moved_m: NDArray[np.float64]
 
 
-def is_layer(touch: Touch) -> bool:
-    """Whether the thing has an elastic layer."""
-    return touch.thing.soft and touch.thing.kind != "plant"
-
-
-def pad_n_m(touch: Touch) -> float:
-    """Stiffness of a pad, in series with the layer beneath it where there is a layer."""
-    if not is_layer(touch):
-        return touch.taxel_n_m
-    return 1.0 / (1.0 / touch.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(touch.thing.modulus_pa))
-
-
-def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
+def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
     """The arm's bodies, and the (row, column) of each pad."""
-    masses = {1: (2.1, "0 0 -0.13"), 3: (1.5, "0 0 -0.12")}
+    links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
     pads, where = "", []
-    k, skin = pad_n_m(touch), touch.thing.skin
+    k, skin = touch.pad_n_m, touch.thing.skin
     contact, dimensions, loss = RIGID, 3, PAD_LOSS_S * k
-    if is_layer(touch):
+    if touch.thing.layered:
         contact, dimensions, loss = mujoco_layer.CONTACT, 1, 2.0 * math.sqrt(k * PAD_KG)
     for row in range(ROWS):
         for column, angle in enumerate(CODY_SKIN["column_angles_deg"]):
@@ -147,25 +159,23 @@ def arm_xml(chain: Chain, facing_deg: float, touch: Touch) -> tuple[str, list[tu
             out = f"{math.cos(math.radians(angle))} {math.sin(math.radians(angle))} 0"
             x, y = ((RADIUS_M - PAD_M) * float(v) for v in out.split()[:2])
             pads += (
-                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}">'
-                f'<joint name="p{len(where)}" '
-                f'type="slide" axis="{out}" stiffness="{k}" damping="{loss}" '
-                f'armature="{PAD_KG}"/>'
+                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}"><joint '
+                f'name="p{len(where)}" type="slide" axis="{out}" stiffness="{k}" '
+                f'damping="{loss}" armature="{PAD_KG}"/>'
                 f'<geom type="capsule" size="{PAD_M} {PAD_FLAT_M}" mass="0.0005" contype="1" '
                 f'conaffinity="2" solref="{contact}" solimp="{SOLIMP} {SOLIMP} 0.001" '
                 f'friction="{skin} 0.005 0.0001" condim="{dimensions}"/></body>'
             )
             where.append((row, column))
     xml, end, at = "", "", "0 0 0"
-    for i, joint in enumerate(chain.joints):
-        axis = " ".join(map(str, joint.axis))
-        xml += f'<body pos="{at}" gravcomp="1"><joint name="j{i}" axis="{axis}" '
-        damping = CODY_DAMPING[i] * math.sqrt(touch.stiffness)
-        xml += f'damping="{damping}" armature="0.004"/>'
-        mass, centre = masses.get(i, (0.05, "0 0 0"))
-        size = "0.03 0.09" if i in masses else "0.02 0.01"
-        xml += f'<geom type="capsule" size="{size}" pos="{centre}" mass="{mass}" '
-        xml += 'contype="0" conaffinity="0"/>'
+    for i, joint in enumerate(ARM.joints):
+        axis, damping = " ".join(map(str, joint.axis)), CODY_DAMPING[i] * math.sqrt(touch.stiffness)
+        size, mass, centre = links.get(i, ("0.02 0.01", 0.05, "0 0 0"))
+        xml += (
+            f'<body pos="{at}" gravcomp="1"><joint name="j{i}" axis="{axis}" damping="{damping}" '
+            f'armature="0.004"/><geom type="capsule" size="{size}" pos="{centre}" mass="{mass}" '
+            'contype="0" conaffinity="0"/>'
+        )
         end = "</body>" + end
         at = " ".join(map(str, joint.translate))
     return xml + pads + end, where
@@ -191,7 +201,7 @@ def stems_xml(thing: Thing, skin: str) -> str:
 
 def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str, str, str]:
     """The thing, its face at `face` and turned by `push` radians about the vertical; the
-    springs between its parts; and the face of a layer."""
+    springs of a layer; and its face."""
     thing = touch.thing
     x, y, z = face
     base, width = z - ABOVE_FLOOR_M, thing.breadth_m
@@ -199,30 +209,28 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     middle = ABOVE_FLOOR_M + thing.height_m / 2 - half
     skin = f'friction="{thing.skin} 0.005 0.0001"'
     floor = f'friction="{thing.floor} 0.005 0.0001"'
-    between, layer, back = "", "", FOOT_M / 2
-    if not thing.soft:
+    springs, layer, back = "", "", FOOT_M / 2
+    if thing.layered:
+        upper, springs, layer = mujoco_layer.layer_xml(
+            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m, thing.sideways
+        )
+        back = 0.2
+    elif thing.soft:
+        upper = stems_xml(thing, skin)
+    else:
         shape = (
             f'type="cylinder" size="{width / 2 + 0.08} {half}" pos="{width / 2 + 0.08} 0 {middle}"'
             if thing.kind == "drum"
             else f'type="box" size="{FOOT_M / 2} {width / 2} {half}" pos="{FOOT_M / 2} 0 {middle}"'
         )
-        parts = f'<geom {shape} mass="{thing.mass_kg * 0.2}" contype="2" conaffinity="1" {skin}/>'
-    elif thing.kind == "plant":
-        parts = stems_xml(thing, skin)
-    else:
-        parts, between, layer = mujoco_layer.layer_xml(
-            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m, thing.sideways
-        )
-        back = 0.2
-    foot = f'<geom type="box" size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" '
-    foot += f'pos="{back} 0 0.004" mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" '
-    foot += f"{floor}/>"
+        upper = f'<geom {shape} mass="{thing.mass_kg * 0.2}" contype="2" conaffinity="1" {skin}/>'
     free = "" if touch.fixed else thing.joint
     return (
-        f'<body name="thing" pos="{x} {y} {base}" axisangle="0 0 1 {push}">{free}{foot}{parts}'
-        f'</body><geom type="plane" size="4 4 0.1" pos="0 0 {base}" contype="8" conaffinity="4" '
-        f"{floor}/>",
-        between,
+        f'<body name="thing" pos="{x} {y} {base}" axisangle="0 0 1 {push}">{free}<geom type="box" '
+        f'size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" pos="{back} 0 0.004" '
+        f'mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" {floor}/>{upper}</body>'
+        f'<geom type="plane" size="4 4 0.1" pos="0 0 {base}" contype="8" conaffinity="4" {floor}/>',
+        springs,
         layer,
     )
 
@@ -231,67 +239,52 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
     # It warns, and writes a file, of each face that only a layer's knots hold.
     mujoco.set_mju_user_warning(lambda text: None)
-    chain = Chain.cody()
-    start = np.radians(START_DEG) + np.array(touch.start_rad)
-    rate = swing(chain, touch)
-    first = start - lag(rate, touch)
-    pose, later = chain.pose(first + rate * LEAD_S), chain.pose(first + rate * (LEAD_S + 0.01))
+    start, rate = np.radians(START_DEG) + np.array(touch.start_rad), touch.rate_rad_s
+    first = start - touch.lag_rad
+    pose, later = ARM.pose(first + rate * LEAD_S), ARM.pose(first + rate * (LEAD_S + 0.01))
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
     point = (pose @ on)[:3]
     speed = (later @ on)[:3] - point
     heading = math.atan2(speed[1], speed[0])
     ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
     across = pose[:3, :3].T @ ahead
-    arm, where = arm_xml(chain, math.degrees(math.atan2(across[1], across[0])), touch)
+    arm, where = arm_xml(math.degrees(math.atan2(across[1], across[0])), touch)
     aside = np.array([-ahead[1], ahead[0], 0.0]) * touch.aside_m
-    thing, between, layer = thing_xml(
+    thing, springs, layer = thing_xml(
         touch, point + ahead * (RADIUS_M + 0.001) + aside, heading + touch.yaw_rad
     )
     gains = "".join(
         f'<position joint="j{i}" kp="{k * touch.stiffness}"/>'
-        for i, k in enumerate(CODY_STIFFNESS[: chain.dof])
+        for i, k in enumerate(CODY_STIFFNESS[: ARM.dof])
     )
     slope, g = touch.slope_rad, 9.81
     fall = (*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope))
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{STEP_S}" integrator="implicitfast" cone="elliptic" '
         f'jacobian="dense" gravity="{" ".join(map(str, fall))}"/><worldbody>{arm}{thing}'
-        f"</worldbody>{layer}<tendon>{between}</tendon><actuator>{gains}</actuator></mujoco>"
+        f"</worldbody>{layer}<tendon>{springs}</tendon><actuator>{gains}</actuator></mujoco>"
     )
     return model, start, where
-
-
-def swing(chain: Chain, touch: Touch) -> NDArray[np.float64]:
-    """(dof,) rad/s of the equilibrium point."""
-    rate = np.zeros(chain.dof)
-    rate[0] = math.radians(RATE_DEG_S * touch.speed)
-    return rate
-
-
-def lag(rate: NDArray[np.float64], touch: Touch) -> NDArray[np.float64]:
-    """(dof,) radians by which each joint trails its equilibrium point in free motion."""
-    return np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) / math.sqrt(touch.stiffness) * rate
 
 
 def simulate(touch: Touch) -> Touched:
     """One touch, as the board would have recorded it."""
     model, start, where = model_of(touch)
-    chain, thing = Chain.cody(), touch.thing
-    rate, dof = swing(chain, touch), chain.dof
+    thing, rate, dof = touch.thing, touch.rate_rad_s, ARM.dof
     data = mujoco.MjData(model)
-    data.qpos[:dof] = start - lag(rate, touch)
+    data.qpos[:dof] = start - touch.lag_rad
     data.qvel[:dof] = rate
     springs = [model.joint(f"p{i}").qposadr[0] for i in range(len(where))]
     row, column = np.array(where).T
     body = model.body("thing").id
     mujoco.mj_forward(model, data)
-    rub = mujoco_layer.Rub(model, touch.thing.skin) if is_layer(touch) else None
+    rub = mujoco_layer.Rub(model, touch.thing.skin) if touch.thing.layered else None
     frames, joints, forces, places = [], [], [], []
     # A soft thing is felt later, the more so the slower the arm.
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     for _ in range(round(lasts_s * RATE_HZ) + 1):
         loads = np.zeros((ROWS, CODY_SKIN["cols"]))
-        loads[row, column] = np.maximum(-pad_n_m(touch) * data.qpos[springs], 0.0)
+        loads[row, column] = np.maximum(-touch.pad_n_m * data.qpos[springs], 0.0)
         counts = loads * COUNTS_PER_NEWTON
         if touch.noise is not None:
             size, generator = touch.noise
@@ -304,7 +297,7 @@ def simulate(touch: Touch) -> Touched:
         for _ in range(round(1.0 / (RATE_HZ * STEP_S))):
             data.ctrl[:] = start + rate * data.time
             if rub is not None:
-                rub.hold(data, np.maximum(-pad_n_m(touch) * data.qpos[springs], 0.0))
+                rub.hold(data, np.maximum(-touch.pad_n_m * data.qpos[springs], 0.0))
             mujoco.mj_step(model, data)
     condition = "fixed" if touch.fixed else "movable"
     soft = "soft" if thing.soft else "rigid"
@@ -313,7 +306,7 @@ def simulate(touch: Touch) -> Touched:
     skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
     skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
     source = "MuJoCo, bench/mujoco_touch.py"
-    meta = {"labels": labels, "skin": skin, "arm": chain.to_dict(), "source": source}
+    meta = {"labels": labels, "skin": skin, "arm": ARM.to_dict(), "source": source}
     t = np.arange(len(frames)) / RATE_HZ
     recording = Recording(t, np.array(frames), joints=np.array(joints), meta=meta)
     place = np.array(places) - places[0]

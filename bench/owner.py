@@ -22,7 +22,7 @@ from edge.recording import load, save
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import DRAWN_WITH_JOINTS, candidates
 from train.choose import LEAVE_OUT, Choosing
-from train.dataset import DataSet, load_trials
+from train.dataset import load_trials
 from train.feature_sets import expand
 from train.mix import ALONE, ONCE, SIMULATED, mix
 from train.pipeline import ContactClassifier
@@ -32,13 +32,25 @@ TASKS = ("category", "mobility")
 COLUMNS = ("simulated", "own", "both", "half", "chosen", "taught")
 
 
-def renamed(source: Path, target: Path) -> Path:
-    """The trials of a folder, with their kind and number as the object."""
-    for path in sorted(source.rglob("*.npz")):
-        trial = load(path)
-        labels = {**trial.labels, LEAVE_OUT: " ".join(path.stem.split("-")[:2])}
-        save(target / path.name, replace(trial, meta={**trial.meta, "labels": labels}))
-    return target
+def load_both(owners: Path, simulated: Path):
+    """The trials of both folders; an owner's have their kind and number as the object."""
+    names = expand([name for sets in DRAWN_WITH_JOINTS for name in sets])
+    with tempfile.TemporaryDirectory() as folder:
+        for path in sorted(owners.rglob("*.npz")):
+            trial = load(path)
+            labels = {**trial.labels, LEAVE_OUT: " ".join(path.stem.split("-")[:2])}
+            save(Path(folder, path.name), replace(trial, meta={**trial.meta, "labels": labels}))
+        data = [folder, str(simulated)]
+        return load_trials(data, features=names, horizon_s=WINDOW_S, partial=True)
+
+
+def teach(classifier: ContactClassifier, task: str, X, labels) -> None:
+    """Add trials to the neighbours of a fitted classifier of a single task."""
+    (space,) = classifier.spaces_.values()
+    indices = classifier.classes_[task].searchsorted(labels)
+    classifier.labels_[task] = np.append(classifier.labels_[task], indices)
+    rows = classifier.rows_[space], classifier.project(space, X)
+    classifier.rows_[space] = np.vstack(rows)
 
 
 def main() -> None:
@@ -48,60 +60,49 @@ def main() -> None:
     parser.add_argument("--own", type=Path, required=True)
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args()
-    names = expand([name for sets in DRAWN_WITH_JOINTS for name in sets])
-    with tempfile.TemporaryDirectory() as folder:
-        data = [str(renamed(options.own, Path(folder))), str(options.simulated)]
-        trials = load_trials(data, features=names, horizon_s=WINDOW_S, partial=True)
+    trials = load_both(options.own, options.simulated)
     own, objects = trials.own, trials.groups(LEAVE_OUT)
-    assert own is not None and objects is not None
     y = {task: trials.labels(task) for task in TASKS}
-    X = trials.features(WINDOW_S, SAMPLES)
+    X, form = trials.features(WINDOW_S, SAMPLES), (trials.names, trials.widths(SAMPLES))
+    simulated_y = {task: labels[~own] for task, labels in y.items()}
+    simulated = trials.part(~own)
+    tried = candidates(simulated_y, joints=simulated.joints > 0, drawn=True, quick=True)
+    choosing = Choosing(simulated, simulated_y, tried, SAMPLES, quick=True, jobs=cpu_count())
+    settings = choosing.choose(WINDOW_S)[0]
 
-    def settings(of: DataSet, labels):
-        tried = candidates(labels, joints=of.joints > 0, drawn=True, quick=True)
-        choosing = Choosing(of, labels, tried, SAMPLES, quick=True, jobs=cpu_count())
-        return choosing.choose(WINDOW_S)[0]
+    def shares(count: int, repeat: int):
+        """{task: [column] share of the left-out trials that are decided rightly}."""
+        rng = np.random.default_rng([repeat])
+        order = rng.permutation(np.unique(objects[own]))
+        known = own & np.isin(objects, order[: len(order) // 2])
+        known[np.flatnonzero(known)[rng.permutation(known.sum())[count:]]] = False
+        used, asked = known | ~own, own & np.isin(objects, order[len(order) // 2 :])
+        labels = {task: each[used] for task, each in y.items()}
+        mixed, *_ = mix(
+            trials.part(used), labels, own[used], lambda *_: dict(settings), X[used], SAMPLES,
+            LEAVE_OUT, quick=True, jobs=cpu_count(),
+        )  # fmt: skip
+        half = (1, round((~own).sum() / count))
+        right = {}
+        for task in TASKS:
+            best = mixed[task].choice
+            fits = [
+                ContactClassifier(
+                    {task: replace(best, weights=weights, k=min(best.k, count // 2))}, *form
+                ).fit(X[used], labels, own[used])
+                for weights in (SIMULATED, ALONE, ONCE, half, best.weights)
+            ]
+            taught = ContactClassifier({task: replace(best, weights=ONCE)}, *form)
+            teach(taught.fit(X[~own], simulated_y), task, X[known], y[task][known])
+            answers = [each.predict(X[asked])[task] for each in (*fits, taught)]
+            right[task] = [float((answer == y[task][asked]).mean()) for answer in answers]
+        return right
 
-    chosen = settings(trials.part(~own), {task: labels[~own] for task, labels in y.items()})
     print(f"{'':<16}" + "".join(f"{name:>10}" for name in COLUMNS))
     for count in COUNTS:
-        right: dict[str, list[list[float]]] = {task: [] for task in TASKS}
-        for repeat in range(options.repeats):
-            rng = np.random.default_rng([repeat])
-            order = rng.permutation(np.unique(objects[own]))
-            known = own & np.isin(objects, order[: len(order) // 2])
-            known[np.flatnonzero(known)[rng.permutation(known.sum())[count:]]] = False
-            used, asked = known | ~own, own & np.isin(objects, order[len(order) // 2 :])
-            labels = {task: each[used] for task, each in y.items()}
-            mixed, *_ = mix(
-                trials.part(used), labels, own[used], lambda *_: dict(chosen), X[used], SAMPLES,
-                LEAVE_OUT, quick=True, jobs=cpu_count(),
-            )  # fmt: skip
-            half = round((~own).sum() / count)
-            for task in TASKS:
-                best = mixed[task].choice
-                shares = []
-                for weights in (SIMULATED, ALONE, ONCE, (1, half), best.weights):
-                    k = min(best.k, count // 2)
-                    classifier = ContactClassifier(
-                        {task: replace(best, weights=weights, k=k)},
-                        trials.names,
-                        trials.widths(SAMPLES),
-                    ).fit(X[used], labels, own[used])
-                    told = classifier.predict(X[asked])[task]
-                    shares.append(float((told == y[task][asked]).mean()))
-                simulated = ContactClassifier(
-                    {task: replace(best, weights=ONCE)}, trials.names, trials.widths(SAMPLES)
-                ).fit(X[~own], {task: each[~own] for task, each in y.items()})
-                (space,) = simulated.spaces_.values()
-                classes = simulated.classes_[task].searchsorted(y[task][known])
-                simulated.labels_[task] = np.append(simulated.labels_[task], classes)
-                rows = simulated.rows_[space], simulated.project(space, X[known])
-                simulated.rows_[space] = np.vstack(rows)
-                told = simulated.predict(X[asked])[task]
-                right[task].append([*shares, float((told == y[task][asked]).mean())])
-        for task, rows in right.items():
-            means = 100.0 * np.mean(rows, axis=0)
+        draws = [shares(count, repeat) for repeat in range(options.repeats)]
+        for task in TASKS:
+            means = 100.0 * np.mean([draw[task] for draw in draws], axis=0)
             print(f"{task:<11}{count:>4} " + "".join(f"{mean:>10.1f}" for mean in means))
 
 

@@ -26,7 +26,7 @@ from edge.commands.summary import Summary
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.stopping import UNKNOWN
-from edge.recording import load, save
+from edge.recording import Recording, load, save
 from edge.statistics import wilson
 from train.progress import bar
 from train.simulate import streams
@@ -132,44 +132,39 @@ def moved(touched: Touched) -> float:
     return float(touched.moved_m[last])
 
 
-def make_trials(folder: Path, count: int, seed: int) -> tuple[dict[str, list[Path]], int]:
-    """{habit: recordings}, `count` in all, and how many objects had to be drawn again.
+def make_trials(folder: Path, count: int, seed: int) -> dict[str, list[Path]]:
+    """{habit: recordings}, `count` in all; those of an earlier run are used again.
 
     Each habit has a folder, and each object `EACH` recordings. An object is drawn again
-    where a trial that is called movable did not move. Recordings that an earlier run has made are
-    used again.
+    where a trial that is called movable did not move.
 
     Raises:
         InputError: an object did not move, however often it was drawn.
     """
-    objects = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
-    habits = [list(HABITS)[i % len(HABITS)] for i in range(len(objects))]
+    numbers = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
+    habits = [list(HABITS)[i % len(HABITS)] for i in range(len(numbers))]
     work = (
-        delayed(_touch_object)(folder / habit.replace(" ", "-"), i, numbers, seed, habit)
-        for i, (habit, numbers) in enumerate(zip(habits, objects, strict=True))
+        delayed(_touch_object)(folder / habit.replace(" ", "-"), i, numbers[i], seed, habit)
+        for i, habit in enumerate(habits)
     )
     done = Parallel(n_jobs=cpu_count(), return_as="generator")(work)
     paths: dict[str, list[Path]] = {habit: [] for habit in HABITS}
-    redrawn = 0
-    shown = bar(done, total=len(objects), unit=" objects", desc="MuJoCo")
-    for habit, (made, again) in zip(habits, shown, strict=True):
+    shown = bar(done, total=len(habits), unit=" objects", desc="MuJoCo")
+    for habit, made in zip(habits, shown, strict=True):
         paths[habit] += made
-        redrawn += again
-    return paths, redrawn
+    return paths
 
 
-def _touch_object(
-    folder: Path, index: int, numbers: range, seed: int, habit: str
-) -> tuple[list[Path], int]:
-    """The recordings of one object, and how often it was drawn again."""
+def _touch_object(folder: Path, index: int, numbers: range, seed: int, habit: str) -> list[Path]:
+    """The recordings of one object."""
     folder.mkdir(parents=True, exist_ok=True)
     earlier = sorted(folder.glob(f"*-{index:02d}-*.npz"))
     if len(earlier) == len(numbers):
-        return earlier, 0
+        return earlier
     for attempt in range(DRAWS):
         draw = draw_odd if habit == ODD else draw_object
         thing = draw(streams.stream(seed, f"object.{attempt}", "transfer", index))
-        touches: dict[Path, Touched] = {}
+        recordings: dict[Path, Recording] = {}
         for number in sorted(numbers, key=lambda n: n % 2 == 0):
             rng = streams.stream(seed, f"trial.{attempt}", "transfer", number)
             touched = simulate(draw_touch(thing, number % 2 == 0, rng, HABITS[habit]))
@@ -177,11 +172,11 @@ def _touch_object(
                 break
             condition = touched.recording.labels["mobility"]
             name = f"{thing.kind}-{index:02d}-{condition}-{number:03d}.npz"
-            touches[folder / name] = touched
+            recordings[folder / name] = touched.recording
         else:
-            for path, touched in touches.items():
-                save(path, touched.recording)
-            return list(touches), attempt
+            for path, recording in recordings.items():
+                save(path, recording)
+            return list(recordings)
     raise InputError(f"transfer: object {index} was drawn {DRAWS} times and never moved")
 
 
@@ -190,22 +185,21 @@ def score(model: Model, by_habit: Mapping[str, list[Path]]) -> str:
 
     A contact without a decision counts as wrong.
     """
-    scored = {task: kind for task, kind in model.info.tasks.items() if task in TASKS}
-    every, unknown = Summary(scored), 0
-    lines = [f"{'right':<20}" + "".join(f"{task:>26}" for task in scored)]
+    tasks = {name: task for name, task in model.info.tasks.items() if name in TASKS}
+    pooled, unknown, rows = Summary(tasks), 0, []
     for habit, paths in by_habit.items():
-        summary = Summary(scored)
+        summary = Summary(tasks)
         for path in paths:
             recording = load(path)
             events = decide(model, recording, str(path))
             unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
             summary.add(recording.labels, events)
-            every.add(recording.labels, events)
+            pooled.add(recording.labels, events)
         if paths:
-            lines.append(row(habit, summary))
-    lines.insert(1, row("all", every))
-    lines.append(f"{'unknown':<20}{share(unknown, every.recordings):>26}")
-    return "\n".join(lines) + "\n\n" + every.text()
+            rows.append(row(habit, summary))
+    lines = [f"{'right':<20}" + "".join(f"{task:>26}" for task in tasks), row("all", pooled), *rows]
+    lines.append(f"{'unknown':<20}{share(unknown, pooled.recordings):>26}")
+    return "\n".join([*lines, "", pooled.text()])
 
 
 def row(name: str, summary: Summary) -> str:
@@ -229,14 +223,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
     try:
-        paths, again = make_trials(
-            options.out / f"seed{options.seed}", options.trials, options.seed
-        )
-        text = score(Model(options.model), paths)
+        folder = options.out / f"seed{options.seed}"
+        text = score(Model(options.model), make_trials(folder, options.trials, options.seed))
     except InputError as error:
         print(f"transfer: {error}", file=sys.stderr)
         return 2
-    text += f"\n\n{again} objects drawn again, because a movable one did not move"
     print(text)
     (options.out / "transfer.txt").write_text(text + "\n")
     return 0

@@ -22,16 +22,17 @@ from train.dataset import load_trials
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 TOUCHES = ("cardboard-box-fixed", "cardboard-box-movable", "foam-block-fixed", "pillow-movable")
-META = ("arm", "labels", "skin", "source", "trial")
-COUNT_STEP = 8
-"""Counts are multiples of this, as of a coarser converter: their noise is most of the files."""
-ENCODER_STEPS = 2**17
-"""Steps of a radian: an encoder of 20 bits a turn is about as fine, and such angles pack well."""
+META = ("labels", "skin", "source", "trial")
+"""The model knows the arm."""
+EVERY, COUNT_STEP, ENCODER_STEPS = 4, 8, 2**13
+"""Every fourth frame takes a quarter of the bytes; features are sampled in time. Counts are
+multiples of 8, as of a coarser converter: their noise is most of the files. An encoder of 16 bits a
+turn has about so many steps a radian."""
 
 
 def main(folder: Path) -> None:
     """Write the files."""
-    demo = CHECKOUT / "edge" / "demo"
+    demo, golden_file = CHECKOUT / "edge" / "demo", CHECKOUT / "tests" / "golden" / "demo.npz"
     for old in (*demo.glob("*.npz"), *demo.glob("*.onnx")):
         old.unlink()
     (demo / "model.onnx").write_bytes((folder / "model.onnx").read_bytes())
@@ -41,21 +42,19 @@ def main(folder: Path) -> None:
         contact = first_series(recording, model)
         assert contact is not None, f"{touch} touches nothing"
         short = golden.trimmed(replace(recording, valid=None), contact[0], model)
-        # Every other frame takes half the bytes; features are sampled in time.
-        frames = short.frames[::2] // COUNT_STEP * COUNT_STEP
-        arrays = {"t": (short.t - short.t[0])[::2], "frames": frames}
-        if short.joints is not None:
-            arrays["joints"] = np.rint(short.joints[::2] * ENCODER_STEPS) / ENCODER_STEPS
-        meta = {key: short.meta[key] for key in META if key in short.meta}
+        kept = slice((len(short.t) - 1) % EVERY, None, EVERY)  # the last is past the window
+        arrays = {
+            "t": short.t[kept] - short.t[kept][0],
+            "frames": short.frames[kept] // COUNT_STEP * COUNT_STEP,
+            "joints": np.rint(short.joints[kept] * ENCODER_STEPS) / ENCODER_STEPS,
+        }
+        meta = {key: short.meta[key] for key in META}
         save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
-    info = model.info
-    known = load_trials([folder / "known"], features=info.features)
-    golden.write(
-        CHECKOUT / "tests" / "golden" / "demo.npz",
-        model,
-        load_trials([demo], features=info.features),
-        known.features(info.window_s, info.samples),
+    features = model.info.features
+    X = load_trials([folder / "known"], features=features).features(
+        model.info.window_s, model.info.samples
     )
+    golden.write(golden_file, model, load_trials([demo], features=features), X)
 
 
 if __name__ == "__main__":
