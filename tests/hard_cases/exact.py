@@ -77,22 +77,3 @@ def winner(labels: list[Any]) -> Any:
 def distance(square: int, unit: float) -> float:
     """The root of a whole number, correctly rounded, in units of a power of two."""
     return math.sqrt(square) * unit  # below 2^53 the number is a float64, whose root IEEE rounds
-
-
-def rank(rows: NDArray[np.int64]) -> int:
-    """Rank of a matrix of integers, by elimination in fractions."""
-    left = [[Fraction(int(v)) for v in row] for row in rows]
-    found = 0
-    for column in range(rows.shape[1]):
-        pivot = next((i for i in range(found, len(left)) if left[i][column] != 0), None)
-        if pivot is None:
-            continue
-        left[found], left[pivot] = left[pivot], left[found]
-        for i in range(found + 1, len(left)):
-            if left[i][column] != 0:
-                share = left[i][column] / left[found][column]
-                left[i] = [a - share * b for a, b in zip(left[i], left[found], strict=True)]
-        found += 1
-        if found == len(left):
-            break
-    return found

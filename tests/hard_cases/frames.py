@@ -77,39 +77,6 @@ def flicker_error(seed: int) -> float:
     return float(np.abs(contact_of(frames).series().motion).max())
 
 
-def flicker_usual() -> str:
-    places = []
-    for counts in flicker_frames(0):
-        labels, n = scipy.ndimage.label(counts > 50)
-        peaks = scipy.ndimage.maximum(counts, labels, range(1, n + 1))
-        mask = labels == 1 + int(np.argmax(peaks))
-        places.append(FOREARM.position(*(float(v.mean()) for v in np.nonzero(mask))))
-    jump = max(math.dist(place, places[0]) for place in places)
-    return f"each frame's highest region: jumps of {jump:.3f} m"
-
-
-def contact_error(lead: int, length: int, settings: int) -> float:
-    """Onset, end and length of a contact against what the frames say."""
-    peaks = [0] * lead + [100] * length + [0] * 40
-    tracker = ContactTracker(FOREARM, TrackSettings(debounce=settings))
-    found = []
-    for i, peak in enumerate(peaks):
-        (contact,) = tracker.push(Frame(0.01 * i, taxels((3, 3), value=peak))) or [None]
-        if contact is not None and contact not in found:
-            found.append(contact)
-    if length < settings:
-        return float(len(found))
-    (contact,) = found
-    series = contact.series()
-    area = [1] * length + [0] * 30
-    return float(
-        contact.onset_s != 0.01 * lead
-        or not contact.ended
-        or series.area.tolist() != area
-        or feature_vector(series, 1.2)[-41] != 0.0
-    )
-
-
 def times_error(seed: int, shortest: float) -> float:
     """Samples of a series with jitter, duplicates and gaps against exact interpolation,
     over the range of the counts and what the times themselves resolve."""
@@ -160,22 +127,6 @@ CASES = [
         flicker_error,
         [{"seed": 0}],
         {"seed": SEEDS},
-        usual=flicker_usual,
-    ),
-    Case(
-        "features",
-        "onset on the first frame, a contact that ends early, or never comes",
-        "the frames as written down",
-        "contacts that differ",
-        0,
-        contact_error,
-        [
-            {"lead": 0, "length": 20, "settings": 1},
-            {"lead": 0, "length": 3, "settings": 2},
-            {"lead": 3, "length": 0, "settings": 1},
-            {"lead": 3, "length": 1, "settings": 2},
-        ],
-        {"lead": st.integers(0, 9), "length": st.integers(0, 30), "settings": st.integers(1, 3)},
     ),
     Case(
         "features",

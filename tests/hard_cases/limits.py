@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
 
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
 
+from edge import demo
+from edge.classifier import Classifier
+from edge.events import Decided, Onset
+from edge.model.model import Model
+from edge.recording import Recording, load
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
+from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten, seeded
 from tests.hard_cases.frames import FOREARM, contact_of
-from train.projection import Projection
 
 
 def skin_error(side: int, across: bool, full: bool = False) -> float:
@@ -54,6 +61,53 @@ def clock_error(start: float) -> float:
     return float((np.abs(vectors[1] - vectors[0]) / scale).max())
 
 
+@cache
+def shipped() -> tuple[Model, tuple[Recording, ...]]:
+    """The model and the touches that come with the program."""
+    return Model(demo.MODEL), tuple(load(path) for path in sorted(demo.FOLDER.glob("*.npz")))
+
+
+def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Recording:
+    """The same with a pause so many frames after the touch, and with times in another unit."""
+    touched = recording.frames.max(axis=(1, 2)) > recording.layout.onset
+    t = recording.t.copy()
+    t[int(touched.argmax()) + frames :] += pause_s
+    return replace(recording, t=unit * t)
+
+
+def decisions(recording: Recording) -> tuple[float, list[Decided]]:
+    """When the contact began, and what is decided about it."""
+    events = list(Classifier(shipped()[0]).classify(recording))
+    (onset,) = (event.onset_s for event in events if isinstance(event, Onset))
+    return onset, [event for event in events if isinstance(event, Decided)]
+
+
+def gap_error(pause_s: float, frames: int, unit: float) -> float:
+    """Decisions whose flag `gap` is wrong: one step covers more than a quarter of the window."""
+    model, touches = shipped()
+    window, wrong = Fraction(model.info.window_s), 0
+    for touch in touches:
+        recording = paused(touch, pause_s, frames, unit)
+        onset, decided = decisions(recording)
+        ages = [Fraction(t) - Fraction(onset) for t in recording.t[recording.t >= onset].tolist()]
+        steps = [min(b, window) - min(a, window) for a, b in pairwise(ages)]
+        wrong += sum(("gap" in event.flags) != (max(steps) > window / 4) for event in decided)
+    return float(wrong)
+
+
+def gap_usual() -> str:
+    """What interpolation across the pause alone makes of the touches."""
+    changed, sure = [], []
+    for touch in shipped()[1]:
+        (_, right), (_, blind) = decisions(touch), decisions(paused(touch, 5.0, 3, 1.0))
+        changed += [a.label != b.label for a, b in zip(right, blind, strict=True)]
+        sure += [event.confidence for event in blind]
+    return (
+        f"interpolation alone, after a pause of 5 s: {sum(changed)} of {len(changed)} labels are "
+        f"others, with a mean confidence of {np.mean(sure):.2g}"
+    )
+
+
 COURSES = ("log_max_force", "sqrt_max_force", "log_right_force", "sqrt_right_force")
 """Of the contact, and of the untouched right half, whose logarithm is that of the floor."""
 
@@ -76,15 +130,6 @@ def transform_error(counts: int, scale: float) -> float:
             for value in row
         ]
         return float(max(errors))
-
-
-def column_error(columns: int, seed: int) -> float:
-    """Coordinates that change with the order in which products are added."""
-    X = np.random.default_rng(seed).normal(size=(12, int(columns)))
-    p = Projection("none", 6, ["max_force"]).fit(X)
-    z, d = p.transform(X), (X - p.mean_) * p.gain_
-    order = np.random.default_rng(seed + 1).permutation(int(columns))
-    return float((p.grid_.project(d[:, order], p.weights_[order]) != z).sum())
 
 
 CASES = [
@@ -127,6 +172,33 @@ CASES = [
     ),
     Case(
         "limits",
+        "times in milliseconds, pauses of 5 s",
+        "a step over a quarter of the window, in fractions",
+        "decisions with a wrong flag",
+        0,
+        gap_error,
+        [
+            {"pause_s": 0.0, "frames": 3, "unit": 1.0},
+            {"pause_s": 0.0, "frames": 3, "unit": 1e3},
+            {"pause_s": 5.0, "frames": 3, "unit": 1.0},
+        ],
+        {
+            "pause_s": st.floats(0.0, 10.0),
+            "frames": st.integers(1, 100),
+            "unit": st.sampled_from([1.0, 1e3, 1e6]),
+        },
+        Ladder(
+            "seconds between two frames",
+            [0.1, 0.28, 0.3, 1.0, 1e3, 1e6, 1e9],
+            seeded("pause_s", frames=3, unit=1.0),
+            "0.046 and 0.010 s",
+        ),
+        gap_usual,
+        guard="clock",
+        examples=5,
+    ),
+    Case(
+        "limits",
         "logarithms at their floor, square roots",
         "mpmath, 50 digits",
         "error over the larger of the value and 1",
@@ -136,23 +208,5 @@ CASES = [
         {"counts": st.integers(51, 65535), "scale": powers_of_ten(-12.0, 12.0)},
         Ladder("counts in a newton", decades(3, -300, 0.1), seeded("scale", counts=51)),
         guard="features",
-    ),
-    Case(
-        "limits",
-        "values a trial, to 4096 of them",
-        "the same sums in another order",
-        "coordinates with other bits",
-        0,
-        column_error,
-        [{"columns": columns, "seed": 0} for columns in (128, 129, 4096)],
-        {"columns": st.integers(6, 600), "seed": SEEDS},
-        Ladder(
-            "values",
-            [120, 512, 2048, 4096, 8192],
-            seeded("columns", seed=0),
-            "120 and 120 (the paper's features)",
-        ),
-        guard="neighbours",
-        examples=6,
     ),
 ]

@@ -6,7 +6,7 @@ from importlib import import_module
 
 from tests.hard_cases.cases import Case
 
-GROUPS = "neighbours scaling frames kinematics moments limits refusals everywhere simulator"
+GROUPS = "neighbours scaling frames kinematics limits refusals everywhere simulator"
 CASES: list[Case] = [
     case for name in GROUPS.split() for case in import_module(f"tests.hard_cases.{name}").CASES
 ]

@@ -14,6 +14,7 @@ class TestMargin:
     def test_is_how_much_farther_the_nearest_other_label_lies(self):
         assert margin([1.0, 16.0, 9.0], 0) == 2.0
         assert margin([1.0, 16.0, 9.0], 1) == -3.0
+        assert margin([2.0**-600, 2.0**602], 1) == 2.0**-300 - 2.0**301
 
     def test_without_another_label_there_is_nothing_to_weigh(self):
         assert margin([4.0], 0) == 0.0
