@@ -169,9 +169,10 @@ GLOSSARY = {
     "accuracy": "The share of held-out contacts whose label is right. A held-out contact took no "
     "part in fitting the model, nor in choosing its features, projection or number of neighbours "
     "(nested cross-validation).",
-    "from, to": "Wilson's 95 % binomial interval. For early decisions it counts the contacts of "
-    "those folds alone that certified the error rate. The exported model differs from the models "
-    "of the folds, so `FRONT=` promises a wider interval: that of half as many contacts.",
+    "from, to": "The 95 % interval of the exported model's accuracy on other contacts: Wilson's "
+    "binomial interval of half as many contacts, as that model differs from those of the folds. "
+    "`make risk` counts how often it holds. For early decisions it counts the contacts of those "
+    "folds alone that certified the error rate.",
     "points": "Percents of the decisions that become right, less those that become wrong, on the "
     "same held-out contacts. In brackets stands the 95 % interval of this paired difference.",
     "objects never met": "Accuracy where all trials of an object are held out together.",

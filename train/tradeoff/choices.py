@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.statistics import wilson
 from edge.touch.features import WINDOW_S
 from train.candidates import candidates
 from train.choose import TRIAL, Chosen, kinds_of
@@ -19,8 +20,21 @@ from train.fitting import fit
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Windows of the report, and the decision points of its early decisions."""
+VARIANCE = 2.0
+"""Of the nested accuracy's difference from the exported model's on other trials, in binomial
+variances: the folds' models differ from it, and the best windows are shown. `make risk` counts."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
+
+
+@dataclass(frozen=True)
+class Promise(Result):
+    """A nested accuracy, with an interval of the exported model's accuracy on other trials."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval: Wilson's of `VARIANCE` times fewer trials."""
+        return wilson(self.right / VARIANCE, self.total / VARIANCE)
 
 
 def followed(
@@ -43,7 +57,15 @@ def some(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
 def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:
     """Each task's choice, as `python -m export --quick --window` makes it; `given` is fixed."""
     form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1, **given}
-    return fit(dataset, **form).chosen
+    return promised(fit(dataset, **form).chosen)
+
+
+def promised(choices: Mapping[str, Chosen]) -> dict[str, Chosen]:
+    """The choices, with the intervals that the report shows and `make export FRONT=` promises."""
+    return {
+        task: replace(choice, by_trial=Promise(**vars(choice.by_trial)))
+        for task, choice in choices.items()
+    }
 
 
 def unseen(choice: Chosen) -> Result | None:

@@ -18,7 +18,7 @@ from train.report.score import paired
 from train.report.work import Workers
 from train.rules import NEVER, THRESHOLDS, Course, candidates
 from train.stopping import finest
-from train.tradeoff.choices import some
+from train.tradeoff.choices import Promise, some
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -51,7 +51,7 @@ class Certified:
     @property
     def result(self) -> Result:
         """The accuracy on the contacts of the folds that certified it."""
-        return Result(int(self.right.sum()), len(self.right))
+        return Promise(int(self.right.sum()), len(self.right))
 
     @property
     def wrong(self) -> float:

@@ -9,15 +9,11 @@ from typing import Any
 
 from edge.config import json_file
 from edge.errors import InputError
-from edge.statistics import wilson
 from train.tradeoff.choices import Points
 
 NAMES = ("fast", "balanced", "accurate")
 BALANCED_S = 0.9
 """The longest window that counts as balanced."""
-VARIANCE = 2.0
-"""Of the nested accuracy's difference from the exported model's on other trials, in binomial
-variances: the folds' models differ from it, and the best windows are shown. `make risk` counts."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class ParetoFront:
         """The windows that no other beats in both time and accuracy.
 
         Args:
-            points: the choices at each window, the shortest first.
+            points: the choices at each window, the shortest first, as `promised`.
             task: whose accuracy counts.
             after_s: seconds from the end of a window to the decision.
         """
@@ -63,9 +59,8 @@ class ParetoFront:
         for window_s, tasks in points.items():
             result = tasks[task].by_trial
             if not best or result.accuracy > best[-1].accuracy:
-                low, high = wilson(result.right / VARIANCE, result.total / VARIANCE)
                 after = round(1e3 * (window_s + after_s), 2)
-                best.append(OperatingPoint(window_s, after, result.accuracy, low, high))
+                best.append(OperatingPoint(window_s, after, result.accuracy, *result.interval))
         return cls(task, tuple(best))
 
     def to_dict(self, digest: str) -> dict[str, Any]:

@@ -8,6 +8,8 @@ from train.evaluate import Result
 from train.pipeline import Choice
 from train.report.page import write
 from train.report.section import Section
+from train.tradeoff.choices import promised
+from train.tradeoff.front import ParetoFront
 from train.tradeoff.slider import slider
 
 
@@ -16,15 +18,20 @@ def chosen(right, left_out="trial"):
 
 
 ANSWERS = {
-    0.4: {"mobility": chosen(60, "object"), "<b>": chosen(50)},
-    1.0: {"mobility": chosen(97, "object"), "<b>": chosen(80)},
-    1.2: {"mobility": chosen(99, "object"), "<b>": chosen(91)},
+    0.4: promised({"mobility": chosen(60, "object"), "<b>": chosen(50)}),
+    1.0: promised({"mobility": chosen(97, "object"), "<b>": chosen(80)}),
+    1.2: promised({"mobility": chosen(99, "object"), "<b>": chosen(91)}),
 }
+
+
+def test_the_interval_is_that_which_the_front_promises():
+    point = ParetoFront.of(ANSWERS, "mobility").pick("1000")
+    assert f"({100 * point.low:.0f} to {100 * point.high:.0f})" in slider(ANSWERS)
 
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
     text = slider(ANSWERS)
-    assert '<td class="share">97 %</td><td class="interval">(92 to 99)</td>' in text
+    assert '<td class="share">97 %</td><td class="interval">(88 to 99)</td>' in text
     assert text.count('<td class="unseen">73 %</td>') == 1
     assert "make export EXPORT='--quick --window" in text
     assert text.index("<label hidden>") < text.index("<script>")

@@ -29,7 +29,7 @@ from train.rules import Course
 from train.tradeoff import answer, board, costs, early
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
-from train.tradeoff.choices import followed, unseen
+from train.tradeoff.choices import followed, promised, unseen
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import count, spread, wires
@@ -71,7 +71,7 @@ def chosen(hits, left_out="trial"):
 
 def test_the_front_is_what_no_other_window_beats_in_both():
     shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
-    points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
+    points = {w: promised({"t": chosen(np.arange(100) < share)}) for w, share in shares.items()}
     best = ParetoFront.of(points, "t", 0.01).points
     assert [(p.window_s, p.milliseconds, p.accuracy) for p in best] == [
         (0.2, 210.0, 0.5),
