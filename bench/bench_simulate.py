@@ -14,7 +14,7 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from train.simulate.run import parts, simulate_trials
+from train.simulate.run import batches_of, simulate_trials
 from train.simulate.scene import CODY_SKIN, load
 
 SCENES = Path(__file__).parents[1] / "train" / "scenes"
@@ -73,7 +73,7 @@ def peer_of(trial):
 @pytest.mark.parametrize("name", LEAST)
 def bench_simulate(note, name):
     scene = load(SCENES / f"{name}.toml")
-    batches = parts(scene)
+    batches = batches_of(scene)
     trials = [trial for batch in batches for trial in batch]
     peers = {kind: mujoco_trial(*peer) for kind, peer in PEERS.items()}
 

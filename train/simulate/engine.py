@@ -254,17 +254,15 @@ def readings(
     every = np.arange(t.n) if which is None else which
     plan = t.plan if scene is t.scene else make_plan(scene, t.specs)
     for i in every.tolist():
-        window = physics.window[i].reshape(physics.window.shape[1], -1)
-        loaded = np.flatnonzero(window.any(axis=0))
-        row, column = np.divmod(loaded, len(t.columns))
+        counts = np.zeros((len(physics.t), *t.skin.shape), dtype=np.float32)
+        counts[:, :, t.columns[:, i]] = physics.window[i]
         seen = Readings(
             scene=scene,
             trial=t.specs[i],
             effects=plan.effects[i],
             which=i,
             t=physics.t,
-            counts=window[:, loaded],
-            taxels=row * t.skin.cols + t.columns[column, i],
+            counts=counts,
             joints=physics.joints[i].copy(),
         )
         for stage in SENSOR:

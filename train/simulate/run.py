@@ -91,7 +91,7 @@ def simulate_trials(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tupl
         yield from recordings(physics, true)
 
 
-def parts(
+def batches_of(
     scene: Scene,
     batch: int = BATCH,
     convergences: dict[Kind, Convergence] | None = None,
@@ -115,7 +115,7 @@ def parts(
 
 def simulate(scene: Scene, batch: int = BATCH) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a scene, simulated in this process."""
-    for specs in parts(scene, batch):
+    for specs in batches_of(scene, batch):
         yield from simulate_trials(scene, specs)
 
 
@@ -144,7 +144,7 @@ def write(
     target = Path(folder)
     check_writable(target)
     convergences = measured(scene)
-    work = parts(scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1)
+    work = batches_of(scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1)
     paths, redrawn, unfelt = [], 0, 0
     for name, trial in _simulated(scene, work, jobs, address):
         recording.save(target / name, trial, lasting=False)

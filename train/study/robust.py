@@ -17,7 +17,7 @@ from train.report.score import grid_search, score, transfer
 from train.report.section import Section, Table
 from train.report.skins import follow, vectors
 from train.simulate.engine import run_physics
-from train.simulate.run import file_name, parts, recordings
+from train.simulate.run import batches_of, file_name, recordings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS
 from train.study.context import Context
@@ -103,7 +103,7 @@ def anew(
     cases = []
     for group in groups:
         shown = next(iter(group.values()))
-        for trials in parts(shown, jobs=BATCHES):
+        for trials in batches_of(shown, jobs=BATCHES):
             drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
             cases.append((group, drawn, set(wanted), data.layout, data.tracking, data.chain))
     merged: dict[str, dict[str, FeatureSeries | None]] = {n: {} for group in groups for n in group}

@@ -47,8 +47,7 @@ def test_a_trial_s_draw_does_not_hang_on_the_trials_beside_it(kind):
 
 def noise(*shape: int) -> np.ndarray:
     values = np.zeros(shape, dtype=np.float32)
-    every = np.arange(shape[1])
-    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), values, every, len(every))
+    streams.add_normal(np.random.default_rng(0), 1.0, values)
     return values
 
 
@@ -61,16 +60,9 @@ def test_noise_is_normal_and_each_number_takes_two_bytes():
     again.bytes(2 * values.size)
     fresh = np.random.default_rng(0)
     numbers = np.full_like(values, 7.0)
-    streams.add_drawn(fresh, streams.quantiles(), numbers, np.arange(200), 200)
+    streams.add_normal(fresh, 1.0, numbers)
     assert fresh.random() == again.random()
     np.testing.assert_array_equal(numbers, np.float32(7.0) + values)
-
-
-@pytest.mark.parametrize("columns", [[0, 1, 2], [6, 2, 3], []])
-def test_a_place_draws_the_same_whichever_others_there_are(columns):
-    some, places = np.zeros((5, len(columns)), dtype=np.float32), np.array(columns, dtype=np.intp)
-    streams.add_drawn(np.random.default_rng(0), streams.quantiles(), some, places, 7)
-    np.testing.assert_array_equal(some, noise(5, 7)[:, places])
 
 
 def test_the_quantiles_are_in_order_and_as_wide_as_asked_for():

@@ -7,7 +7,7 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """Counts + part * (sum of the neighbours' counts)."""
-    counts = readings.everywhere()
+    counts = readings.counts
     leak = counts * np.float32(readings.scene.setting("crosstalk", "part"))
     counts[:, 1:] += leak[:, :-1]
     counts[:, :-1] += leak[:, 1:]

@@ -5,8 +5,9 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """Zero the counts of dead taxels."""
-    scene, drawn = readings.scene, readings.stream("dead_taxels").random(readings.shape)
+    scene = readings.scene
+    drawn = readings.stream("dead_taxels").random(scene.skin.shape)
     valid = drawn >= scene.setting("dead_taxels", "part")
-    readings.counts *= valid.reshape(-1)[readings.taxels]
+    readings.counts *= valid
     if scene.setting("dead_taxels", "known"):
         readings.valid = valid

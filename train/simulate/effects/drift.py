@@ -7,6 +7,6 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """Counts + slope * t."""
-    slope = readings.stream("drift").standard_normal(readings.shape, dtype=np.float32)
+    slope = readings.stream("drift").standard_normal(readings.scene.skin.shape, dtype=np.float32)
     slope *= np.float32(readings.scene.setting("drift", "counts_per_s"))
-    readings.everywhere()[:] += slope * readings.t.astype(np.float32)[:, None, None]
+    readings.counts += slope * readings.t.astype(np.float32)[:, None, None]

@@ -1,18 +1,22 @@
 """Frames come early or late; each shows the load at its own time, and reports that time."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from train.simulate.readings import Readings
 
 
 def clock(readings: Readings) -> None:
     """Shift the times, and interpolate load and joints between neighbouring frames."""
-    counts, joints, t = readings.counts, readings.joints, readings.t
+    t, counts = readings.t, readings.counts.reshape(len(readings.t), -1)
     frame, part = t[1] - t[0], np.zeros(len(t))
     drawn = readings.stream("jitter").standard_normal(len(t) - 2)
     part[1:-1] = np.clip(drawn * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45)
     readings.times = t + part * frame
-    for values in (joints, counts) if len(counts) else (joints,):
+    series: tuple[NDArray[Any], ...] = readings.joints, counts
+    for values in series:
         late = np.maximum(part, 0.0).astype(values.dtype)[:, None]
         early = np.maximum(-part, 0.0).astype(values.dtype)[:, None]
         mixed = values * (1 - late - early)
