@@ -15,6 +15,7 @@ from train.agreement import families
 from train.candidates import Candidate, costs, places_of
 from train.dataset import DataSet
 from train.evaluate import (
+    FOLDS,
     AnswerTable,
     Labels,
     Result,
@@ -36,8 +37,9 @@ KIND = "kind"
 """Left out in place of an object where `kinds_of` names the kinds."""
 TRIAL = "trial"
 QUICK_FOLDS = 5
-GROUP_FOLDS, FEW = 20, 300
-"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds."""
+GROUP_FOLDS, FEW, MANY = 20, 300, 2000
+"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds, and five
+with more than `MANY`: four fifths of so many trials teach nearly as much as all."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on differences
 that are small beside the features' spread, which do not carry over to new objects."""
@@ -66,6 +68,11 @@ def groupable(labels: NDArray[np.str_], groups: NDArray[np.str_]) -> bool:
     return len(classes) > 1 and all(
         len(set(groups[labels == label].tolist())) >= FEWEST_GROUPS for label in classes
     )
+
+
+def fold_count(trials: int, quick: bool = False) -> int:
+    """Folds for so many trials."""
+    return QUICK_FOLDS if quick or trials > MANY else FOLDS
 
 
 @dataclass(frozen=True)
@@ -127,7 +134,7 @@ class Choosing:
         self._jobs, self._progress, self._leave_out = jobs, progress, leave_out
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
         finest = max(y, key=lambda task: len(set(y[task].tolist())))
-        self._folds = stratified_folds(y[finest], QUICK_FOLDS if quick else 10)
+        self._folds = stratified_folds(y[finest], fold_count(len(y[finest]), quick))
         kinds = kinds_of([t.recording for t in dataset.trials]) if leave_out == LEAVE_OUT else None
         self._grouped: set[str] = set()
         for name, groups in ((KIND, kinds), (leave_out, dataset.groups(leave_out))):
@@ -135,7 +142,8 @@ class Choosing:
                 continue
             self._leave_out = name
             self._grouped = {t for t in y if t != leave_out and groupable(y[t], groups)}
-            count = QUICK_FOLDS if quick else GROUP_FOLDS if len(groups) <= FEW else 10
+            few = len(groups) <= FEW and not quick
+            count = GROUP_FOLDS if few else fold_count(len(groups), quick)
             self._group_folds = group_folds(groups, count)
 
     def _features(self, window_s: float) -> NDArray[np.float64]:

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from train.choose import FEWEST_GROUPS, QUICK_FOLDS, TRIAL, Chosen, decided_together
+from train.choose import FEWEST_GROUPS, TRIAL, Chosen, decided_together, fold_count
 from train.dataset import DataSet
 from train.evaluate import (
-    FOLDS,
     AnswerTable,
     Labels,
     evaluate,
@@ -105,7 +104,7 @@ def mix(
         )
 
     finest = max(y, key=lambda task: len(set(y[task][own].tolist())))
-    count = QUICK_FOLDS if quick else FOLDS
+    count = fold_count(int(own.sum()), quick)
     by_trial = by_group = answers(stratified_folds(y[finest][own], count))
     groups = None if leave_out == TRIAL else dataset.part(own).groups(leave_out)
     if groups is not None and len(set(groups.tolist())) >= FEWEST_GROUPS:

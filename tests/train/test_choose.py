@@ -8,7 +8,7 @@ import pytest
 
 import train
 from edge.recording import save
-from train.choose import Chosen, decided_together, groupable, kinds_of, without_folds
+from train.choose import Chosen, decided_together, fold_count, groupable, kinds_of, without_folds
 from train.evaluate import AnswerTable, Result
 from train.pipeline import Choice, ContactClassifier
 
@@ -20,6 +20,11 @@ def test_whole_objects_can_be_left_out_where_each_class_has_several():
     assert groupable(np.repeat(["x", "y"], 6), objects)
     assert not groupable(np.repeat(["x", "y"], [8, 4]), objects)
     assert not groupable(np.full(12, "x"), objects)
+
+
+def test_five_folds_are_enough_for_a_quick_choice_and_for_very_many_trials():
+    counts = [fold_count(2000), fold_count(2001), fold_count(2000, quick=True)]
+    assert counts == [10, 5, 5]
 
 
 def drawn_touches(make_touch, kinds=("box", "bin", "post"), numbered=True):
