@@ -21,15 +21,17 @@ from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
 from edge.cli import dispatch
+from edge.model.stopping import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
+from train.agreement import factors_of
 from train.dataset import read
 from train.evaluate import stratified_folds
 from train.feature_sets import expand
-from train.rules import THRESHOLDS
+from train.rules import NEVER, THRESHOLDS, Course
 from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed, some
-from train.tradeoff.early import FOLDS, compare_stopping
+from train.tradeoff.early import FOLDS, StoppingComparison, compare_stopping
 
 TREES = 300
 NAMES = ("paper", "contact")
@@ -90,6 +92,17 @@ def at(rows: Curve, seconds: float) -> float:
     return float(np.interp(seconds, times, wrong, left=np.nan))
 
 
+def when_sure(parts: Sequence[StoppingComparison]) -> Curve:
+    """Stopping at each threshold, of a task that is decided when each of these is sure."""
+    seconds = np.array(DECISION_POINTS_S)
+    course = Course([p.confidence for p in parts], [~p.right for p in parts], parts[0].unknown)
+    curve = []
+    for threshold in (NEVER, *THRESHOLDS.tolist()):
+        stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(seconds) - 1))
+        curve.append((float(seconds[stops].mean()), float(wrong.mean())))
+    return curve
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print the table."""
     dataset = followed(read(arguments.data), NAMES)
@@ -99,14 +112,16 @@ def run(arguments: argparse.Namespace) -> int:
     y = {task: dataset.labels(task) for task in dataset.tasks}
     X = np.stack([dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S])
     compared = compare_stopping(dataset, DECISION_POINTS_S, jobs=arguments.jobs)
+    factors = factors_of(y)
     folds = stratified_folds(y[finest(y)], FOLDS)
     paper = dataset.features(DECISION_POINTS_S[-1], SAMPLES, expand(["paper"]))
     series = paper.reshape(len(rows), len(FEATURES), SAMPLES)
     print("| task | mean time, s | fixed window, % wrong | when sure | gain | trees | TEASER |")
     print("|---|---|---|---|---|---|---|")
     for task, ours in compared.items():
-        fixed = list(zip(ours.decision_points_s, ours.fixed.tolist(), strict=True))
-        sure = [(seconds, wrong) for _, seconds, wrong in ours.when_sure()]
+        waiting = 1.0 - ours.right.mean(axis=1)
+        fixed = list(zip(ours.decision_points_s, waiting.tolist(), strict=True))
+        sure = when_sure([compared[factor] for factor in factors.get(task, [task])])
         trees = extra_trees(X, y[task], folds, arguments.jobs)
         theirs: dict[float, str] = {}
         if importlib.util.find_spec("aeon") is not None:
@@ -114,7 +129,7 @@ def run(arguments: argparse.Namespace) -> int:
             theirs = {seconds: f"{100 * wrong:.1f}"}
         for seconds in sorted({*DECISION_POINTS_S, *theirs}):
             waited, stopped, forest = (100 * at(way, seconds) for way in (fixed, sure, trees))
-            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / ours.trials)
+            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / len(rows))
             print(
                 f"| {task} | {seconds:.2f} | {waited:.1f} | {stopped:.1f} | "
                 f"{waited - stopped:.1f} ± {error:.1f} | {forest:.1f} | {theirs.get(seconds, '')} |"

@@ -77,14 +77,14 @@ class Candidate:
 
 def candidates(
     y: Labels,
-    *,
-    joints: bool = False,
-    drawn: bool = False,
     features: Sequence[str] | None = None,
     projection: str | None = None,
     scaling: str | None = None,
     components: int | None = None,
     k: int | None = None,
+    *,
+    joints: bool = False,
+    drawn: bool = False,
     quick: bool = False,
 ) -> list[Candidate]:
     """Every candidate; arguments you pass are held fixed.

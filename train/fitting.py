@@ -136,6 +136,13 @@ def fit(
         window_s = decision_points_s[-1]
     windows: tuple[float, ...] = (window_s or WINDOW_S,)
     notes: list[str] = []
+
+    def choosing(of: DataSet, y: Labels, quick: bool, mixed: bool, shown: bool) -> Choosing:
+        drawn = mixed or kinds_of([trial.recording for trial in of.trials]) is not None
+        fixed = (features, projection, scaling, components, k)
+        tried = candidates(y, *fixed, joints=of.joints > 0, drawn=drawn, quick=quick)
+        return Choosing(of, y, tried, samples, leave_out, quick, jobs, shown)
+
     if isinstance(data, DataSet):
         dataset = data
     else:
@@ -166,9 +173,8 @@ def fit(
 
             def accuracy(of: DataSet) -> float:
                 y = {task: of.labels(task) for task in _tasks(of, tasks)}
-                few = candidates(y, joints=of.joints > 0, features=features, quick=True)
-                choosing = Choosing(of, y, few, samples, leave_out, quick=True, jobs=jobs)
-                return choosing.accuracy(windows[0])
+                few = choosing(of, y, quick=True, mixed=False, shown=False)
+                return few.accuracy(windows[0])
 
             dataset, lower = thresholds.chosen(
                 dataset, lambda low, high: load(threshold=low, onset=high), accuracy
@@ -182,40 +188,26 @@ def fit(
     if k is not None and not 1 <= k <= n - 1:
         raise InputError(f"k must be 1 to {n - 1} with {n} trials, not {k}")
     own = dataset.own
-
-    def choosing(of: DataSet, y: Labels) -> Choosing:
-        tried = candidates(
-            y,
-            joints=of.joints > 0,
-            drawn=own is not None or kinds_of([t.recording for t in of.trials]) is not None,
-            features=features,
-            projection=projection,
-            scaling=scaling,
-            components=components,
-            k=k,
-            quick=quick,
-        )
-        return Choosing(of, y, tried, samples, leave_out, quick, jobs, progress)
-
     if own is None:
-        choice_of = choosing(dataset, y)
+        choice = choosing(dataset, y, quick, mixed=False, shown=progress)
         if len(windows) > 1:
             windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
-        window_s, why = choice_of.window(windows)
-        chosen, folds, without = choice_of.choose(window_s)
+        window_s, why = choice.window(windows)
+        chosen, folds, without = choice.choose(window_s)
+        tried = choice.tried
     else:
         window_s = windows[0]
         X = dataset.with_kernels(window_s).features(window_s, samples)
 
         def settings(of: DataSet, y: Labels) -> dict[str, Chosen]:
-            return choosing(of, y).choose(windows[0])[0]
+            return choosing(of, y, quick, mixed=True, shown=progress).choose(windows[0])[0]
 
         chosen, folds, without, why = mix(
             dataset, y, own, settings, X, samples, leave_out, quick=quick, jobs=jobs
         )
         y = {task: y[task] for task in chosen}
+        tried = choosing(dataset, y, quick, mixed=True, shown=False).tried
     notes += why
-    tried = choosing(dataset, y).tried
     dataset = dataset.with_kernels(window_s)
     choices = {task: settings.choice for task, settings in chosen.items()}
     measured = dataset
@@ -237,18 +229,8 @@ def fit(
     else:
         classifier = ContactClassifier(choices, dataset.names, dataset.widths(samples))
         classifier.fit(X, y, own)
-    return Fitted(
-        dataset=dataset,
-        measured=measured,
-        window_s=window_s,
-        samples=samples,
-        X=X,
-        chosen=chosen,
-        candidates=tuple(tried),
-        classifier=classifier,
-        sequential=sequential,
-        notes=tuple(notes),
-    )
+    settled = chosen, tuple(tried), classifier, sequential, tuple(notes)
+    return Fitted(dataset, measured, window_s, samples, X, *settled)
 
 
 def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from train.evaluate import Result, stratified_folds
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
-from train.rules import NEVER, THRESHOLDS, Course, candidates
+from train.rules import Course, candidates
 from train.stopping import finest
 from train.tradeoff.choices import Promise, some
 
@@ -74,7 +74,6 @@ class StoppingComparison:
         confidence: (decision points, n) calibrated.
         unknown: (decision points, n) whether the contact is unlike all trained ones.
         certified: one entry for each asked error.
-        factors: of a task that is decided when these are; see `edge.model.agreement`.
     """
 
     decision_points_s: tuple[float, ...]
@@ -82,29 +81,6 @@ class StoppingComparison:
     confidence: NDArray[np.float64]
     unknown: NDArray[np.bool_]
     certified: list[Certified]
-    factors: tuple[StoppingComparison, ...] = ()
-
-    @property
-    def trials(self) -> int:
-        """Number of trials held out in turn."""
-        return int(self.right.shape[1])
-
-    @property
-    def fixed(self) -> NDArray[np.float64]:
-        """(decision points,) share wrong at each fixed window."""
-        return 1.0 - np.asarray(self.right.mean(axis=1))
-
-    def when_sure(self) -> list[tuple[float, float, float]]:
-        """(confidence asked for, mean seconds, share wrong) of stopping at each threshold."""
-        seconds = np.array(self.decision_points_s)
-        parts = self.factors or (self,)
-        course = Course([p.confidence for p in parts], [~p.right for p in parts], self.unknown)
-        curve = []
-        for threshold in (NEVER, *THRESHOLDS.tolist()):
-            rule = StoppingRule(1.0, 0.0, threshold, len(seconds) - 1)
-            at, wrong = course.under(rule)
-            curve.append((threshold, float(seconds[at].mean()), float(wrong.mean())))
-        return curve
 
     @property
     def calibration_error(self) -> float:
@@ -145,9 +121,6 @@ def compare_stopping(
         comparisons[task] = StoppingComparison(
             tuple(decision_points_s), right, confidence, unknown, certified
         )
-    for task, factors in held_out[0][0].products_.items():
-        parts = tuple(comparisons[factor] for factor in factors)
-        comparisons[task] = replace(comparisons[task], factors=parts)
     return comparisons
 
 
