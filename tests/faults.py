@@ -1,4 +1,4 @@
-"""What the skin makes of all that can go wrong on its wires, judged by what its chips really felt.
+"""How the skin takes the faults of its wires, judged by the counts that its chips really felt.
 
 `python -m tests.faults` prints tables; the same seed gives the same tables. Scripts of faults, and
 the loss of all settings between two frames, are played onto fake skins in virtual time, which
@@ -156,7 +156,7 @@ class Watched:
 
 
 def touches(fault, bus, chip):
-    """Whether a fault may meet what is said to a chip or its mux."""
+    """Whether a fault may meet a transaction with a chip or its mux."""
     there = {"bus": bus.device, "mux": chip.mux, "channel": chip.channel}
     at_it = fault.address in (None, chip.address, chip.mux)
     return at_it and all(getattr(fault, key) in (None, there[key]) for key in there)
@@ -249,7 +249,7 @@ def models(buses):
 
 
 def scripts():
-    """Name, skin and faults for `run`; `*` marks what no protocol can tell."""
+    """Name, skin and faults for `run`; `*` marks faults that no protocol can tell."""
     cody, pad = SKINS["cody"], SKINS["mpr121"]
     first = cody.buses[0].device
     lasting = {"during": (BEGIN_S, END_S)}

@@ -21,7 +21,7 @@ UNNOTICED = ("survived", "no tests")
 
 
 def output(*arguments: str) -> str:
-    """What a mutmut command prints; its errors pass through."""
+    """The output of a mutmut command; its errors pass through."""
     done = subprocess.run([*MUTMUT, *arguments], check=True, stdout=subprocess.PIPE, text=True)
     return done.stdout
 

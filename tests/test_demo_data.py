@@ -30,8 +30,8 @@ def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(demo, "recordings", lambda: [tmp_path / "wrong.npz"])
     assert main(["demo"]) == 1
     tasks = len(Model(demo.MODEL).info.tasks)
-    said = f"edge-classify: {tasks - 1} of {tasks} decisions are right\n"
-    assert capsys.readouterr().err == said
+    sentence = f"edge-classify: {tasks - 1} of {tasks} decisions are right\n"
+    assert capsys.readouterr().err == sentence
 
 
 def test_the_committed_golden_outputs_are_met(capsys):

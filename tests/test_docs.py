@@ -39,8 +39,8 @@ def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
         ran.append(words[1])
     first = ["check", "fake", "calibrate", "record", "-m", "info"]
     assert ran == [*first, "fake", "verify", "run", "replay"]
-    said = [json.loads(x) for x in capsys.readouterr().out.splitlines() if x.startswith("{")]
-    assert {e["label"] for e in said if e.get("task") == "object"} >= {"pillow", "foam block"}
+    events = [json.loads(x) for x in capsys.readouterr().out.splitlines() if x.startswith("{")]
+    assert {e["label"] for e in events if e.get("task") == "object"} >= {"pillow", "foam block"}
 
 
 def test_the_notebook_runs(tmp_path):

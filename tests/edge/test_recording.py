@@ -1,4 +1,4 @@
-"""Recordings: what is written is read back, and what is wrong is one sentence."""
+"""Recordings are read back as they were written, and a wrong file gets one sentence."""
 
 import io
 import json

@@ -60,7 +60,7 @@ class Reader:
 
 
 def command(main: Callable[[list[str]], int], *words: object) -> None:
-    """Run a command line and check its exit status and what it prints.
+    """Run a command line and check its exit status and its output.
 
     Raises:
         InputError: the exit status is 2; all that it printed to stderr.

@@ -117,7 +117,7 @@ BROKE = {
     "rosbag-size.bag": "Declared field size is too large for header.; copy it again",
     "scene-digits.toml": DIGITS,
 }
-"""Files that once broke a reader, and what the sentence says by which each is refused."""
+"""Files that once broke a reader, and words of the sentence that refuses each."""
 
 
 @pytest.mark.parametrize(("name", "sentence"), BROKE.items(), ids=BROKE)

@@ -19,8 +19,8 @@ GUEST = """\
 import json, os, platform, sys
 import onnxruntime
 from edge.cli import main
-said = {"machine": platform.machine(), "onnxruntime": onnxruntime.__version__}
-print(json.dumps({"event": "machine", **said}))
+versions = {"machine": platform.machine(), "onnxruntime": onnxruntime.__version__}
+print(json.dumps({"event": "machine", **versions}))
 for folder in sys.argv[1:]:
     print(json.dumps({"event": "set", "name": os.path.basename(folder)}), flush=True)
     model, golden = (os.path.join(folder, name) for name in ("model.onnx", "golden.npz"))
@@ -50,10 +50,10 @@ def ask(
         subprocess.CalledProcessError: it ended with an error.
     """
     folders = [str(folder.resolve()) for folder in sets(golden)]
-    with tempfile.TemporaryDirectory() as away:
-        said = subprocess.run(
+    with tempfile.TemporaryDirectory() as folder:
+        printed = subprocess.run(
             [*python, "-c", GUEST, *folders],
-            cwd=away,
+            cwd=folder,
             env={**os.environ, "PYTHONPATH": path},
             stdout=subprocess.PIPE,
             text=True,
@@ -62,7 +62,7 @@ def ask(
     machine: dict[str, Any] = {}
     shares: dict[tuple[str, str], float] = {}
     name = ""
-    for line in map(json.loads, said.splitlines()):
+    for line in map(json.loads, printed.splitlines()):
         if line["event"] == "set":
             name = line["name"]
         elif line["event"] == "check":

@@ -79,7 +79,7 @@ def flicker_error(seed: int) -> float:
 
 def times_error(seed: int, shortest: float) -> float:
     """Samples of a series with jitter, duplicates and gaps against exact interpolation,
-    over the range of the counts and what the times themselves resolve."""
+    over the range of the counts and the resolution of the times."""
     rng = np.random.default_rng(seed)
     steps = 10.0 ** rng.uniform(math.log10(shortest), -0.5, 40)
     readings = np.cumsum(np.concatenate([[0.0], np.repeat(steps, rng.integers(1, 3, 40))]))

@@ -76,7 +76,7 @@ def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Re
 
 
 def decisions(recording: Recording) -> tuple[float, list[Decided]]:
-    """When the contact began, and what is decided about it."""
+    """When the contact began, and the decisions about it."""
     events = list(Classifier(shipped()[0]).classify(recording))
     (onset,) = (event.onset_s for event in events if isinstance(event, Onset))
     return onset, [event for event in events if isinstance(event, Decided)]
@@ -96,7 +96,7 @@ def gap_error(pause_s: float, frames: int, unit: float) -> float:
 
 
 def gap_usual() -> str:
-    """What interpolation across the pause alone makes of the touches."""
+    """The labels that interpolation across the pause alone gives the touches."""
     changed, sure = [], []
     for touch in shipped()[1]:
         (_, right), (_, blind) = decisions(touch), decisions(paused(touch, 5.0, 3, 1.0))

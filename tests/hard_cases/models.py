@@ -104,9 +104,9 @@ class Ours:
         for i, point in enumerate(self.whole(queries)):
             near, squares = exact.nearest(self.rows, point, self.k)
             label = exact.winner([self.labels[j] for j in near])
-            away = [exact.distance(squares[j], self.projection.grid_.unit) for j in near]
+            distances = [exact.distance(squares[j], self.projection.grid_.unit) for j in near]
             answer = (seen[key][i].tolist() for key in ("neighbours", "label", "distances"))
-            wrong += (near, label, away) != tuple(answer)
+            wrong += (near, label, distances) != tuple(answer)
         return wrong
 
 
@@ -159,8 +159,8 @@ def usual_neighbours(X: Array, queries: Array, components: int = 6) -> str:
     pca = pipe[0]
     both = exact.unrounded(np.concatenate([X, queries]), pca.mean_, pca.components_.T)
     truth = [exact.nearest(both[: len(X)], point, 1)[0][0] for point in both[len(X) :]]
-    said = answers_of_usual(pipe, X, queries)
+    answers = answers_of_usual(pipe, X, queries)
     ours = Ours(X, choice=Choice("none", components, 1))
-    said["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]
-    shares = ", ".join(f"{name} {np.mean(v != truth):.0%}" for name, v in said.items())
+    answers["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]
+    shares = ", ".join(f"{name} {np.mean(v != truth):.0%}" for name, v in answers.items())
     return f"wrong nearest: {shares}"

@@ -135,8 +135,8 @@ def grid_error(spread: float, seed: int) -> float:
     true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(float)
     z = ours.fitted.rows_[ours.fitted.spaces_["t"]]
     true *= np.linalg.norm(z) / np.linalg.norm(true[:80])  # proportional numbers, to 1e-7
-    away = np.linalg.norm(true[80:, None] - true[:80], axis=2)
-    errors = np.abs(seen["distances"] - np.take_along_axis(away, seen["neighbours"], axis=1))
+    distances = np.linalg.norm(true[80:, None] - true[:80], axis=2)
+    errors = np.abs(seen["distances"] - np.take_along_axis(distances, seen["neighbours"], axis=1))
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
 
 
@@ -148,9 +148,9 @@ def ties_usual() -> str:
     pipe = usual_pipeline(X, 6, 2, labels)
     tied = (np.sort(seen["scores"], axis=1)[:, -2:] == 0.5).all(axis=1).mean()
     shares = ", ".join(
-        f"{name} {np.mean(said != seen['label']):.0%} not the nearest's, "
-        f"last class {np.mean(said == 11):.1%} of answers"
-        for name, said in answers_of_usual(pipe, X, queries).items()
+        f"{name} {np.mean(answer != seen['label']):.0%} not the nearest's, "
+        f"last class {np.mean(answer == 11):.1%} of answers"
+        for name, answer in answers_of_usual(pipe, X, queries).items()
     )
     true = f"{np.mean(labels == 11):.1%} of rows, {np.mean(seen['label'] == 11):.1%} of ours"
     return f"{tied:.0%} of votes tie; {shares} ({true})"

@@ -128,13 +128,13 @@ def usual() -> str:
     pipe = usual_pipeline(X, 5, 1, np.arange(30))
     queries = np.repeat(features(1, 1), 3, axis=0)
     queries[:, 43] = BAD
-    said = converted(pipe, X)(queries).tolist()
+    rows = converted(pipe, X)(queries).tolist()
     try:
         pipe.predict(queries)
         raises = "answers"
     except ValueError:
         raises = "raises"
-    return f"skl2onnx answers NaN, inf and -inf with rows {said}; scikit-learn {raises}"
+    return f"skl2onnx answers NaN, inf and -inf with rows {rows}; scikit-learn {raises}"
 
 
 CASES = [

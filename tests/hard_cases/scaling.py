@@ -15,7 +15,7 @@ METHODS = st.sampled_from(SCALINGS)
 
 
 def constant_error(scaling: str, value: float, seed: int) -> float:
-    """What two constant columns weigh, and how far their move shifts a projection."""
+    """The larger of two constant columns' weight and of a projection's shift when they move."""
     X = features(60, seed)
     X[:, [7, 95]] = value
     moved = X.copy()

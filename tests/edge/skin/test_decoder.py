@@ -67,7 +67,7 @@ def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(sign
         slot.chip.read = spoiled
         frame = skin.read()
         skin.read()
-        # The chip and its mux are read twice; what is more is a check.
+        # Two frames read the chip and its mux once each; every further transaction is a check.
         checks = reader.bus.transactions - before - 2 * 2
     assert frame.valid[1, 1] == valid
     assert frame.valid.sum() == 11 + valid

@@ -1,4 +1,4 @@
-"""The automatic step: what it claims is what a much shorter step shows."""
+"""The automatic step: a much shorter step confirms the error that it claims."""
 
 from dataclasses import replace
 

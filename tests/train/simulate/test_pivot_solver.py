@@ -56,8 +56,8 @@ def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
     np.testing.assert_allclose(way, 0.5 * (low + high), rtol=0.0, atol=1e-12)
     want = np.array(bed_loads(beds, free[0] - way, free[1] - lean * way))
     soft = beds.stiffness[0] < 1e6
-    found = np.array([answer.force, answer.moment])
-    np.testing.assert_allclose(found[:, soft], want[:, soft], rtol=1e-6, atol=1e-6)
+    answered = np.array([answer.force, answer.moment])
+    np.testing.assert_allclose(answered[:, soft], want[:, soft], rtol=1e-6, atol=1e-6)
 
 
 def bed_loads(springs, y0, y1):
@@ -107,8 +107,8 @@ def tilt_error(springs, free, c, loads):
     inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
     held = (inside > 0.0) * springs.stiffness * springs.weight[:, None]
     force, k = (inside * held).sum(axis=1), held.sum(axis=1)
-    whole = k.sum(axis=0)
-    mean = (k * springs.lever).sum(axis=0) / np.where(whole > 0.0, whole, 1.0)
+    stiffness = k.sum(axis=0)
+    mean = (k * springs.lever).sum(axis=0) / np.where(stiffness > 0.0, stiffness, 1.0)
     spread = (k * (springs.lever - mean) ** 2).sum(axis=0)
     left = force.sum(axis=0) - loads.force
     turning = (force * springs.lever).sum(axis=0) - loads.moment
@@ -117,7 +117,7 @@ def tilt_error(springs, free, c, loads):
     c01 = c[1] + mean * c[2]
     c00 = c[0] + mean * (c[1] + c01)
     r0 = r0 + mean * r1
-    det = 1.0 + c00 * whole + c[2] * spread + (c00 * c[2] - c01 * c01) * whole * spread
+    det = 1.0 + c00 * stiffness + c[2] * spread + (c00 * c[2] - c01 * c01) * stiffness * spread
     p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r1) / det
-    p1 = ((1.0 + c00 * whole) * r1 - c01 * whole * r0) / det
+    p1 = ((1.0 + c00 * stiffness) * r1 - c01 * stiffness * r0) / det
     return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)

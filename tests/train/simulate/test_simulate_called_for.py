@@ -45,9 +45,9 @@ def everything():
     ]
 
 
-def batch_of(one, index=0):
-    effects, specs = list(kinds(one).items())[index]
-    return run_batch(one, tuple(specs)), effects
+def batch_of(trial_scene, index=0):
+    effects, specs = list(kinds(trial_scene).items())[index]
+    return run_batch(trial_scene, tuple(specs)), effects
 
 
 def test_1_an_effect_not_called_for_is_not_loaded():
@@ -68,15 +68,15 @@ def test_1_an_effect_not_called_for_is_not_loaded():
 
 @pytest.mark.parametrize("add", [(), ("noise", "tilt")])
 def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
-    one = scene(*add)
-    before = [batch_of(one, i)[0] for i in range(2)]
-    for i, effects in enumerate(kinds(one)):
+    trial_scene = scene(*add)
+    before = [batch_of(trial_scene, i)[0] for i in range(2)]
+    for i, effects in enumerate(kinds(trial_scene)):
         for name in EFFECTS:
             if name not in effects:
                 bomb = types.ModuleType(name)
                 bomb.__getattr__ = lambda attribute, name=name: pytest.fail(f"{name} was touched")
                 monkeypatch.setitem(sys.modules, f"train.simulate.effects.{name}", bomb)
-        after = batch_of(one, i)[0]
+        after = batch_of(trial_scene, i)[0]
         monkeypatch.undo()
         assert before[i].counts.tobytes() == after.counts.tobytes()
         assert before[i].joints.tobytes() == after.joints.tobytes()
@@ -88,9 +88,9 @@ STATE = set("pop stems tilt inertia friction sliding turning tipping viscous".sp
 
 def test_3_only_the_called_effects_state_exists():
     called = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
-    one = scene(*called, objects=everything())
-    for i in range(len(kinds(one))):
-        batch, effects = batch_of(one, i)
+    trial_scene = scene(*called, objects=everything())
+    for i in range(len(kinds(trial_scene))):
+        batch, effects = batch_of(trial_scene, i)
         expected = STATE & {*effects, "viscous"}
         assert set(batch.trials.own) == expected, effects
         traces = {"sliding": "slide_m", "turning": "turn_rad"}
@@ -104,25 +104,26 @@ def test_3_only_the_called_effects_state_exists():
 
 
 def test_4_adding_an_effect_leaves_the_others_draws():
-    one, two = scene("noise"), scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
-    trials = tuple(next(iter(kinds(one).values())))
-    a, b = values_of(one, trials), values_of(two, trials)
+    trial_scene = scene("noise")
+    other_scene = scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
+    trials = tuple(next(iter(kinds(trial_scene).values())))
+    a, b = values_of(trial_scene, trials), values_of(other_scene, trials)
     assert a.keys() == b.keys()
     assert all(a[key].tobytes() == b[key].tobytes() for key in a)
     # Before the contact nothing but the noise's own draws is to be seen.
     far = {"lead_s": 5.0, "after_s": 0.1}
-    one = scene("noise", **far)
-    two = scene("noise", "dropped_frames", "crosstalk", "tilt", "saturation", **far)
-    first, second = (batch_of(s)[0].counts[:, :499] for s in (one, two))
+    trial_scene = scene("noise", **far)
+    other_scene = scene("noise", "dropped_frames", "crosstalk", "tilt", "saturation", **far)
+    first, second = (batch_of(s)[0].counts[:, :499] for s in (trial_scene, other_scene))
     assert first.any()
     np.testing.assert_array_equal(first, second)
 
 
 def test_5_each_trial_runs_its_own_hooks_and_no_other():
     implied = ("foundation", "lateral", "bottoming", "relaxation", "pop", "stems")
-    one = scene(*[n for n in EFFECTS if n not in implied], objects=everything())
-    specs = tuple(specs[0] for specs in kinds(one).values())
-    plan, seen = make_plan(one, specs), set()
+    trial_scene = scene(*[n for n in EFFECTS if n not in implied], objects=everything())
+    specs = tuple(specs[0] for specs in kinds(trial_scene).values())
+    plan, seen = make_plan(trial_scene, specs), set()
     for i, effects in enumerate(plan.effects):
         shared = {"viscous"} if {"relaxation", "inertia"} & set(effects) else set()
         owners = ["base", *shared, *effects]
@@ -139,41 +140,41 @@ def test_6_results_do_not_depend_on_the_batch(sensor):
     add = ["tilt", "inertia"]
     if sensor:
         add += [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
-    one = scene(*add, objects=everything(), after_s=0.4, count=2)
-    every = tuple(spec for specs in kinds(one).values() for spec in specs)
-    together = run_batch(one, every)
+    trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
+    every = tuple(spec for specs in kinds(trial_scene).values() for spec in specs)
+    together = run_batch(trial_scene, every)
     alone = [(spec,) for spec in every[::2]]
-    for part in (*alone, every[::-1], every[3:10]):
-        some, where = run_batch(one, part), [every.index(spec) for spec in part]
+    for specs in (*alone, every[::-1], every[3:10]):
+        some, where = run_batch(trial_scene, specs), [every.index(spec) for spec in specs]
         for name in ("counts", "joints", "force"):
             bits = getattr(together, name)[where].tobytes()
-            assert getattr(some, name).tobytes() == bits, (name, part[0].key)
+            assert getattr(some, name).tobytes() == bits, (name, specs[0].key)
         for one_seen, k in zip(some.seen, where, strict=True) if sensor else ():
             for name in ("times", "kept", "valid"):
                 read, before = getattr(one_seen, name), getattr(together.seen[k], name)
-                assert read.tobytes() == before.tobytes(), (name, part[0].key)
+                assert read.tobytes() == before.tobytes(), (name, specs[0].key)
 
 
 def test_each_required_effect_has_its_reason():
-    one = scene("noise", "stribeck", objects=everything())
-    foam = next(o for o in one.objects if o.family == "foam")
-    called = required_effects(one, foam, "movable")
+    trial_scene = scene("noise", "stribeck", objects=everything())
+    foam = next(o for o in trial_scene.objects if o.family == "foam")
+    called = required_effects(trial_scene, foam, "movable")
     reasons = {"relaxation": "family foam", "sliding": "movable", "cover": "cover_n_m"}
     reasons |= {"tipping": "base_m and height_m", "noise": "effects.add"}
     assert called.items() >= reasons.items()
-    assert not {"sliding", "stribeck"} & set(required_effects(one, foam, "fixed"))
-    one = scene(leave_out=["relaxation"], objects=everything())
-    called = required_effects(one, foam, "fixed")
+    assert not {"sliding", "stribeck"} & set(required_effects(trial_scene, foam, "fixed"))
+    trial_scene = scene(leave_out=["relaxation"], objects=everything())
+    called = required_effects(trial_scene, foam, "fixed")
     assert ("foundation" in called, "relaxation" in called) == (True, False)
 
 
 def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():
     wall = {"name": "wall", "family": "rigid", "conditions": ["fixed"]}
     box = {**wall, "name": "box", "conditions": ["fixed", "movable"], "foot_m": 0.2, **MOVES}
-    one = from_dict({"object": [box, wall], "spread": {"slope_deg": 1.0, "aside_m": 0.01}})
-    pushed, still = one.objects
-    assert {"slope", "turning"} <= set(required_effects(one, pushed, "movable"))
-    assert not {"slope", "turning"} & set(required_effects(one, pushed, "fixed"))
+    trial_scene = from_dict({"object": [box, wall], "spread": {"slope_deg": 1.0, "aside_m": 0.01}})
+    pushed, still = trial_scene.objects
+    assert {"slope", "turning"} <= set(required_effects(trial_scene, pushed, "movable"))
+    assert not {"slope", "turning"} & set(required_effects(trial_scene, pushed, "fixed"))
     assert (pushed.values["slope_deg"].low, "slope_deg" in still.values) == (0.0, False)
     for key, needed in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
         with pytest.raises(InputError, match=f"spread.{key} .*: give a movable object {needed}"):
@@ -184,11 +185,11 @@ def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():
 def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
     seen = []
     for add in ((), ("crosstalk",)):  # which asks for all taxels, and leaks nothing
-        one = scene("noise", "dead_band", *add)
-        one.settings.update(
+        trial_scene = scene("noise", "dead_band", *add)
+        trial_scene.settings.update(
             noise={"counts": 5.0}, dead_band={"counts": band}, crosstalk={"part": 0.0}
         )
-        seen.append(batch_of(one)[0].counts)
+        seen.append(batch_of(trial_scene)[0].counts)
     assert seen[0].tobytes() == seen[1].tobytes()
     noisy = (seen[0][:, 0] > 0).any()
     assert noisy if band < 21.0 else not noisy

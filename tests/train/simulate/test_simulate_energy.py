@@ -1,9 +1,9 @@
 """No effect and no pair of effects makes energy: a ledger of every step.
 
 The equilibrium point's motion is all that puts energy in. In each step of a joint, backward Euler's
-I (v+ - v) / h + d v+ + k (q+ - q_eq) = -tau leaves what the contact takes, tau dq, whatever its
-effects are: in free motion nothing, and never less than nothing in all. Of what the contact takes,
-what is pushed has its speed and its lean.
+I (v+ - v) / h + d v+ + k (q+ - q_eq) = -tau leaves tau dq to the contact, whatever its effects
+are: nothing in free motion, and never less than nothing in sum. The speed and the lean of a pushed
+object take no more than the contact took.
 """
 
 from dataclasses import replace
@@ -39,7 +39,7 @@ ROUNDING = 1e-9
 
 
 class Ledger:
-    """Joules, step by step: what the contact took of the arm, and what is pushed of the contact."""
+    """Joules, step by step: those that the arm gave the contact, and the contact the object."""
 
     def __init__(self, scene, specs, meddle=None):
         """Of a scene's trials; `meddle` changes them after each step."""
@@ -56,7 +56,7 @@ class Ledger:
         return engine.run_physics(self.scene, self.specs, plan=self.plan).force
 
     def book(self, t, i):
-        """What this step moved, of the trials that took it."""
+        """Book the work of this step, for the trials that took it."""
         if self.q is None:
             self.q, self.slide = t.equilibrium(0.0) - t.lag, np.zeros(t.n)
             self.v, self.speed = np.broadcast_to(t.rate, t.q.shape), np.zeros(t.n)
@@ -123,35 +123,35 @@ def pair_scene(first, second):
     family, condition = common[0], "movable" if "sliding" in pair else "fixed"
     thing = {"name": "thing", "family": family, "conditions": [condition], **keys}
     own = set(FAMILIES[family].effects[1:])
-    one = scene(
+    trial_scene = scene(
         [{**thing, **OWN_RANGES.get(family, {})}],
         trials={"count": 6, "lead_s": 0.1, "after_s": 0.7},
         spread={"place_m": 0.02, "yaw_deg": 3.0},
         effects={"add": sorted(pair), "leave_out": sorted(own - pair)},
     )
-    assert pair <= set(next(iter(kinds(one)))), pair
-    return one
+    assert pair <= set(next(iter(kinds(trial_scene)))), pair
+    return trial_scene
 
 
 @pytest.mark.parametrize("step_s", [0.01, 0.0025])
 @pytest.mark.parametrize("first", CONTACT)
 def test_no_effect_and_no_pair_of_them_makes_energy(first, step_s):
     for second in CONTACT[CONTACT.index(first) :]:
-        if (one := pair_scene(first, second)) is None:
+        if (trial_scene := pair_scene(first, second)) is None:
             continue
-        ledger = Ledger(one, specs_of(one, step_s))
+        ledger = Ledger(trial_scene, specs_of(trial_scene, step_s))
         assert (ledger.run().max(axis=1) > 0.0).all(), (first, second)
         ledger.judge((first, second))
 
 
 def test_the_ledger_notices_a_contact_that_gives_back_more_than_it_took(monkeypatch):
-    one = pair_scene("inertia", "tilt")
+    trial_scene = pair_scene("inertia", "tilt")
 
     def push(t):
         t.q[:, t.loads[0] > 0.0] -= 1e-3
 
     monkeypatch.setattr(engine, "check_energy", lambda *_: None)
-    ledger = Ledger(one, specs_of(one), push)
+    ledger = Ledger(trial_scene, specs_of(trial_scene), push)
     ledger.run()
     with pytest.raises(AssertionError, match="gave back more"):
         ledger.judge("pushed")
@@ -189,8 +189,8 @@ def test_a_viscous_contact_gives_back_no_more_energy_than_it_took():
 
 
 def test_a_run_that_makes_energy_is_refused():
-    one = make(one_object(), lead_s=0.1)
-    batch = run(one)
+    trial_scene = make(one_object(), lead_s=0.1)
+    batch = run(trial_scene)
     engine.check_energy(batch.trials, batch.joints, batch.t)
     # Nor can it shake: its damping takes more than is put in.
     for every, turned, when in ((1, -1.0, ": at 1 s"), (2, 0.02, "")):

@@ -169,10 +169,10 @@ class TestInertia:
             return [y[1], torque / self.INERTIA]
 
         start = [-self.DAMPING / self.STIFFNESS * rate, rate]
-        found = solve_ivp(
+        solution = solve_ivp(
             rates, (0, batch.t[-1]), start, max_step=2e-4, rtol=1e-8, dense_output=True
         )
-        return np.array([contact_at(*found.sol(time))[0] for time in batch.t])
+        return np.array([contact_at(*solution.sol(time))[0] for time in batch.t])
 
     @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
     def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
@@ -183,20 +183,20 @@ class TestInertia:
         assert errors[1] < 0.75 * errors[0]
 
     def test_a_hit_has_short_steps_of_its_own(self, tmp_path):
-        one, h, loss_s = self.swing(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
-        plan = make_plan(one, specs_of(one))
+        trial_scene, h, loss_s = self.swing(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
+        plan = make_plan(trial_scene, specs_of(trial_scene))
         plans = plan, replace(plan, stages={**plan.stages, "pace": []})
-        paced, plain = (run(one, h, plan=plan) for plan in plans)
+        paced, plain = (run(trial_scene, h, plan=plan) for plan in plans)
         want = self.oracle(paced, loss_s)
         hit = slice(0, int(np.argmax(want)) + 4)
-        apart = [np.abs(b.force[0, hit] - want[hit]).max() / want.max() for b in (paced, plain)]
-        assert apart[0] < 0.1
-        assert apart[1] > 0.4
+        errors = [np.abs(b.force[0, hit] - want[hit]).max() / want.max() for b in (paced, plain)]
+        assert errors[0] < 0.1
+        assert errors[1] > 0.4
         # It bounces, as it does by the equations.
         assert (paced.force[0, hit.stop : hit.stop + 3] == 0.0).all()
 
     def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path, monkeypatch):
-        one = self.swing(tmp_path, 0.01, loss_s=0.02)
+        trial_scene = self.swing(tmp_path, 0.01, loss_s=0.02)
         steps, start_frames = [], engine.start_frames
 
         def watched(t, starts):
@@ -205,7 +205,7 @@ class TestInertia:
             assert t.h[0] == 0.01 / steps[-1]
 
         monkeypatch.setattr(engine, "start_frames", watched)
-        hit = int(np.argmax(run(one).force[0, 1:] > 0.0))
+        hit = int(np.argmax(run(trial_scene).force[0, 1:] > 0.0))
         assert set(steps) == {1, FINER}
         assert set(steps[: hit - 2]) == {1}
         assert set(steps[hit : hit + 3]) == {FINER}
@@ -309,8 +309,8 @@ class TestTilt:
         assert (lever[0] == 0.0).all()  # as near to it as a row is
 
     def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
-        one = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
-        t = run(one, 0.0025).trials
+        trial_scene = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
+        t = run(trial_scene, 0.0025).trials
         moved = (t.jacobian * (t.q - t.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()
         np.testing.assert_allclose(t.depth, t.y_frame + moved, rtol=0.0, atol=1e-13)

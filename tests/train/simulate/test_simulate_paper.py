@@ -56,18 +56,18 @@ def test_each_trial_is_felt_and_long_enough(dataset):
 @pytest.fixture(scope="module")
 def sets(cody18, dataset, tmp_path_factory):
     """The scene's data set and those of the next seeds."""
-    found = [dataset]
+    datasets = [dataset]
     for i in range(1, SEEDS):
         folder = tmp_path_factory.mktemp("again")
         write(replace(cody18, seed=cody18.seed + i), folder)
-        found.append(load_trials([folder]))
-    return found
+        datasets.append(load_trials([folder]))
+    return datasets
 
 
 @pytest.mark.parametrize("task", PAPER)
 def test_headline_accuracies_lie_within_the_two_samples_interval(sets, task):
-    found = [grid_search(one.features(), {task: one.labels(task)})[task] for one in sets]
-    ours = 100.0 * float(np.mean([result.accuracy for result in found]))
+    results = [grid_search(s.features(), {task: s.labels(task)})[task] for s in sets]
+    ours = 100.0 * float(np.mean([result.accuracy for result in results]))
     low, high = difference(PAPER[task], ours, 140 * SEEDS)
     assert low <= 0.0 <= high
 
@@ -87,6 +87,6 @@ def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     # out: how things bounce is another at each step.
     cody18 = replace(cody18, add=tuple(name for name in cody18.add if name != "inertia"))
     some = list(kinds(cody18).values())[2:10:3]
-    for specs, found in zip(some, measure(cody18, some), strict=True):
+    for specs, convergence in zip(some, measure(cody18, some), strict=True):
         # Of the window that labels are judged in; of the longer trials it is a quarter less.
-        assert found.errors[found.steps_s.index(specs[0].step_s)] < 0.02
+        assert convergence.errors[convergence.steps_s.index(specs[0].step_s)] < 0.02

@@ -79,36 +79,36 @@ def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(written
 
 def test_the_sensors_effects_reach_the_recording():
 
-    def one(**effects):
+    def recorded(**effects):
         trials = {"count": 1, "after_s": 0.6}
         return next(simulate(scene(one_object(width_m=0.03), trials=trials, effects=effects)))[1]
 
-    plain = one()
+    plain = recorded()
     peak = plain.frames.max()
-    assert one(saturation={"newton": 0.5}).frames.max() == 500
-    assert set(np.unique(one(quantisation={"counts": 64}).frames) % 64) == {0}
-    banded = one(dead_band={"counts": 300}).frames
+    assert recorded(saturation={"newton": 0.5}).frames.max() == 500
+    assert set(np.unique(recorded(quantisation={"counts": 64}).frames) % 64) == {0}
+    banded = recorded(dead_band={"counts": 300}).frames
     assert banded[banded > 0].min() >= 300
-    dead = one(dead_taxels={"part": 0.3, "known": 1})
+    dead = recorded(dead_taxels={"part": 0.3, "known": 1})
     assert dead.valid is not None
     assert 0.6 < dead.valid.mean() < 0.8
     assert not dead.frames[:, ~dead.valid].any()
-    assert one(dead_taxels={"part": 0.3, "known": 0}).valid is None
-    late = one(jitter={"s": 0.002})
+    assert recorded(dead_taxels={"part": 0.3, "known": 0}).valid is None
+    late = recorded(jitter={"s": 0.002})
     assert len(np.unique(np.diff(late.t).round(6))) > 10
     assert (np.diff(late.t) > 0.0).all()
-    fewer = one(dropped_frames={"part": 0.4})
+    fewer = recorded(dropped_frames={"part": 0.4})
     assert 0.45 < len(fewer.t) / len(plain.t) < 0.75
     where = np.searchsorted(plain.t, fewer.t)
     np.testing.assert_array_equal(fewer.frames, plain.frames[where])
-    leak = one(crosstalk={"part": 0.05})
+    leak = recorded(crosstalk={"part": 0.05})
     assert (leak.frames > 0).sum() > (plain.frames > 0).sum()
-    lag = one(hysteresis={"counts": 100}).frames.astype(int)
+    lag = recorded(hysteresis={"counts": 100}).frames.astype(int)
     assert lag.max() == pytest.approx(int(peak) - 100, abs=1)
-    noise = one(noise={"counts": 6})
+    noise = recorded(noise={"counts": 6})
     rest = noise.frames[:10].astype(float)
     assert 6 * 0.35 < rest.mean() < 6 * 0.45  # half of a normal law: 0.4 deviations
-    drift = one(drift={"counts_per_s": 50})
+    drift = recorded(drift={"counts_per_s": 50})
     assert drift.frames[-1].mean() > drift.frames[5].mean() > 0.0
 
 
@@ -182,8 +182,8 @@ def test_simulate_warns_of_what_makes_trials_useless(tmp_path, capsys, rest, sai
 
 def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
     """A contact begins above it (`edge.touch.track`)."""
-    one = make(one_object(), count=1)
-    ((_, trial),) = simulate(one)
+    trial_scene = make(one_object(), count=1)
+    ((_, trial),) = simulate(trial_scene)
     for onset, unfelt in ((int(trial.frames.max()) - 1, 0), (int(trial.frames.max()), 1)):
-        felt = replace(one, skin=replace(one.skin, onset_counts=onset))
+        felt = replace(trial_scene, skin=replace(trial_scene.skin, onset_counts=onset))
         assert write(felt, tmp_path).unfelt == unfelt

@@ -115,11 +115,11 @@ def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
     )
     other = tmp_path / "other.toml"
     other.write_text('like = "one.toml"\nname = "other"\n[trials]\ncount = 4\n')
-    one, two = scenes.load(tmp_path / "one.toml"), scenes.load(other)
-    assert (one.trials["count"], two.trials["count"]) == (3, 4)
-    assert two.name == "other"
-    assert two.trials["after_s"] == 1.5
-    assert (two.spread, two.objects) == (one.spread, one.objects)
+    first, second = scenes.load(tmp_path / "one.toml"), scenes.load(other)
+    assert (first.trials["count"], second.trials["count"]) == (3, 4)
+    assert second.name == "other"
+    assert second.trials["after_s"] == 1.5
+    assert (second.spread, second.objects) == (first.spread, first.objects)
     (tmp_path / "third.toml").write_text('like = "other.toml"\n')
     with pytest.raises(InputError, match="itself like another scene"):
         scenes.load(tmp_path / "third.toml")
@@ -129,11 +129,11 @@ def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
 
 
 def test_a_skin_of_other_columns_has_them_evenly_around():
-    one = from_dict({**GOOD, "skin": {"cols": 12, "release_s": 0.7}})
-    assert one.skin.column_angles_deg[:2] == (15.0, 45.0)
-    assert one.skin.column_angles_deg[-1] == -15.0
-    assert one.skin.pitch[1] == pytest.approx(2.0 * math.pi * 0.04604 / 12)
-    _, trial = next(simulate(replace(one, trials={**one.trials, "count": 1.0})))
+    scene = from_dict({**GOOD, "skin": {"cols": 12, "release_s": 0.7}})
+    assert scene.skin.column_angles_deg[:2] == (15.0, 45.0)
+    assert scene.skin.column_angles_deg[-1] == -15.0
+    assert scene.skin.pitch[1] == pytest.approx(2.0 * math.pi * 0.04604 / 12)
+    _, trial = next(simulate(replace(scene, trials={**scene.trials, "count": 1.0})))
     assert trial.frames.shape[1:] == (16, 12)
     assert trial.frames.max() > 0
     assert trial.meta["skin"]["release_s"] == 0.7
@@ -142,17 +142,17 @@ def test_a_skin_of_other_columns_has_them_evenly_around():
 @pytest.mark.parametrize("family", ["rigid", "foam", "bubbles", "foliage"])
 def test_a_skin_of_one_row_meets_things_there(family):
     thing = one_object(family=family)
-    one = from_dict({**GOOD, "skin": {"rows": 1}, "effects": {}, "object": thing})
-    assert one.place_m == one.skin.row0_z_m
-    _, trial = next(simulate(one))
+    scene = from_dict({**GOOD, "skin": {"rows": 1}, "effects": {}, "object": thing})
+    assert scene.place_m == scene.skin.row0_z_m
+    _, trial = next(simulate(scene))
     assert trial.frames.shape[1:] == (1, 24)
     assert trial.frames.max() > 0
 
 
 def test_a_motion_about_the_forearm_itself_is_refused():
-    one = from_dict({**GOOD, "motion": {"rate_deg_s": [0.0, 0.0, 0.0, 0.0, 20.0]}})
+    scene = from_dict({**GOOD, "motion": {"rate_deg_s": [0.0, 0.0, 0.0, 0.0, 20.0]}})
     with pytest.raises(InputError, match=r"motion\.rate_deg_s does not move the forearm"):
-        next(simulate(one))
+        next(simulate(scene))
 
 
 def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
@@ -167,9 +167,9 @@ def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
     arm |= {"stiffness_nm_rad": [12.0], "damping_nms_rad": [0.4]}
     table = {**GOOD, "arm": arm, "motion": {"start_deg": [0.0], "rate_deg_s": [30.0]}}
     urdf.write_text(robot.format("revolute"))
-    one = from_dict(table, here)
-    assert one.arm.to_dict() == Chain.from_urdf(urdf, "a", "c").to_dict()
-    assert next(simulate(one))[1].frames.max() > 0
+    scene = from_dict(table, here)
+    assert scene.arm.to_dict() == Chain.from_urdf(urdf, "a", "c").to_dict()
+    assert next(simulate(scene))[1].frames.max() > 0
     urdf.write_text(robot.format("prismatic"))
     with pytest.raises(InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"):
         from_dict(table, here)

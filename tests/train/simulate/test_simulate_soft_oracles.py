@@ -37,9 +37,9 @@ class TestBed:
         row_pitch = 0.173 / rows
         z = (np.arange(rows) - (rows - 1) / 2.0)[:, None] * row_pitch
         angles = (np.arange(columns) + 0.5) * (2.0 * math.pi / columns)
-        away = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
-        stiffness = np.where(away < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
-        gaps = RADIUS * (1.0 - np.cos(away))
+        angles_off = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
+        stiffness = np.where(angles_off < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
+        gaps = RADIUS * (1.0 - np.cos(angles_off))
         gap = contact.curve_gap(z, curve or 1e6)
         springs = gaps[:, None], stiffness[:, None]
         loads = contact.spring_loads(depth - gap, *springs, np.ones((rows, 1)))
@@ -174,15 +174,15 @@ class TestAskew:
         t.weight[:], t.line_depth[:] = np.pad(np.ones(14), 1)[:, None], depth[:, None]
         t.force[:] = force
         # Half a column from the nearest on either side, as in the block's sum over taxels.
-        away = (np.arange(len(t.columns)) - len(t.columns) // 2 + 0.5) * 0.26166
+        angles_off = (np.arange(len(t.columns)) - len(t.columns) // 2 + 0.5) * 0.26166
         radius = t.skin.radius_m
-        gaps = lateral.touched_at(radius * (1.0 - np.cos(away)), radius, 0.1)
+        gaps = lateral.touched_at(radius * (1.0 - np.cos(angles_off)), radius, 0.1)
         t.column_gaps[:] = gaps[:, None]
         lateral.image(t, ALL)
         image = t.image[..., 0]
-        found = image.sum(axis=1)[1:7]
-        assert found.sum() == pytest.approx(sum(rows), rel=0.06)
-        assert found == pytest.approx(rows, abs=0.16 * max(rows))
+        borne = image.sum(axis=1)[1:7]
+        assert borne.sum() == pytest.approx(sum(rows), rel=0.06)
+        assert borne == pytest.approx(rows, abs=0.16 * max(rows))
         assert image.max() == pytest.approx(peak, rel=0.1)
 
 
@@ -281,8 +281,8 @@ def test_the_stems_that_are_held_bear_by_their_own_bends():
     row = stems.taxel // len(batch.trials.columns) + stems.part
     middle = (row * stems.stiffness * bent).sum(axis=0) / want
     seen = batch.counts[:, -1].sum(axis=2, dtype=float)
-    found = (seen * np.arange(16)).sum(axis=1) / seen.sum(axis=1)
-    np.testing.assert_allclose(found, middle, atol=0.01)
+    measured = (seen * np.arange(16)).sum(axis=1) / seen.sum(axis=1)
+    np.testing.assert_allclose(measured, middle, atol=0.01)
 
 
 def test_stems_that_have_slipped_off_damp_no_more():

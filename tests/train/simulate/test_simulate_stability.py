@@ -11,7 +11,7 @@ MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
 
 
 def judge(trace, stiffness, mass, h, mu_s, mu_k):
-    """What must hold of any trace; returns the complaints."""
+    """The laws that a trace breaks, as complaints."""
     force, moved = trace.force, np.diff(trace.slide, axis=0, prepend=0.0)
     if not all(np.isfinite(v).all() for v in trace):
         return ["not finite"]
@@ -35,7 +35,7 @@ def judge(trace, stiffness, mass, h, mu_s, mu_k):
 
 
 def ledger(trace, bed, mass, mu_k):
-    """Energy lost in each step, all that took part in it, and what friction took of it.
+    """Energy lost in each step, the energy that took part in it, and friction's part of the loss.
 
     The bed's energy is given, (steps, n). The target's motion at fixed q puts energy in; after that
     nothing may add any.

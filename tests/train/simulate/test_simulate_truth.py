@@ -24,22 +24,22 @@ def scene(*objects, **rest):
 
 class TestLabels:
     def test_a_movable_object_slides_within_the_window(self, tmp_path):
-        one = scene(BOX, trials={"count": 12, "after_s": 1.4})
-        stuck = (run(one).traces["slide_m"][:, :142].max(axis=1) < 0.02).sum()
+        trial_scene = scene(BOX, trials={"count": 12, "after_s": 1.4})
+        stuck = (run(trial_scene).traces["slide_m"][:, :142].max(axis=1) < 0.02).sum()
         assert stuck > 0
-        told = [trial.meta["simulation"] for _, trial in simulate(one)]
-        assert sum(t["redrawn"] > 0 for t in told) == stuck
-        assert write(one, tmp_path).redrawn == stuck
+        simulations = [trial.meta["simulation"] for _, trial in simulate(trial_scene)]
+        assert sum(t["redrawn"] > 0 for t in simulations) == stuck
+        assert write(trial_scene, tmp_path).redrawn == stuck
         # Drawn again means drawn from the same range by a stream of the same name.
-        again = [t["values"]["mass_kg"] for t in told if t["redrawn"]]
+        again = [t["values"]["mass_kg"] for t in simulations if t["redrawn"]]
         assert all(0.5 <= mass <= 6.0 for mass in again)
         assert len(set(again)) == len(again)
 
     def test_redraws_do_not_depend_on_the_batch(self):
-        one = scene(BOX)
-        whole, single = dict(simulate(one)), dict(simulate(one, batch=1))
-        assert whole.keys() == single.keys()
-        for name, trial in whole.items():
+        trial_scene = scene(BOX)
+        together, single = dict(simulate(trial_scene)), dict(simulate(trial_scene, batch=1))
+        assert together.keys() == single.keys()
+        for name, trial in together.items():
             assert trial.frames.tobytes() == single[name].frames.tobytes()
 
     def test_a_movable_object_that_never_slides_is_refused(self):
@@ -52,9 +52,9 @@ class TestLabels:
             list(simulate(scene(stone)))
 
     def test_a_motion_that_never_touches_is_refused(self):
-        one = scene({**BOX, "conditions": ["fixed"]})
+        trial_scene = scene({**BOX, "conditions": ["fixed"]})
         with pytest.raises(InputError, match="was never touched, as the arm's stroke.*motion"):
-            list(simulate(replace(one, damping=(0.0,) * 5, travel_s=1e-6)))
+            list(simulate(replace(trial_scene, damping=(0.0,) * 5, travel_s=1e-6)))
 
     @pytest.mark.parametrize(
         ("change", "says"),
@@ -76,19 +76,19 @@ class TestLabels:
         )
         wide = {"name": "wall", "family": family, "conditions": ["fixed"], "width_m": 1.0}
         rest = {"spread": {"yaw_deg": 30.0}, "effects": {"add": ["tilt", "inertia"]}}
-        one = scene(wide, step_s=step_s, **rest)
+        trial_scene = scene(wide, step_s=step_s, **rest)
         says = r"'wall' touches the arm before it moves, in trial \d .* by \d\d degrees; .*yaw_deg"
         with pytest.raises(InputError, match=says):
-            list(simulate(one))
+            list(simulate(trial_scene))
 
 
 class TestFamilies:
     def test_objects_are_drawn_within_their_ranges(self):
-        one = scene(families=[FAMILY])
-        assert [o.name for o in one.objects] == [f"crate {i:02d}" for i in range(1, 7)]
-        masses = [o.values["mass_kg"].low for o in one.objects]
+        trial_scene = scene(families=[FAMILY])
+        assert [o.name for o in trial_scene.objects] == [f"crate {i:02d}" for i in range(1, 7)]
+        masses = [o.values["mass_kg"].low for o in trial_scene.objects]
         assert len(set(masses)) == 6
-        for o in one.objects:
+        for o in trial_scene.objects:
             mu, mass = o.values["friction_static"].low, o.values["mass_kg"].low
             assert mu * mass * 9.80665 <= 6.0
             assert 0.8 * mu <= o.values["friction_kinetic"].low <= 0.95 * mu
@@ -103,7 +103,7 @@ class TestFamilies:
         ],
     )
     def test_no_object_holds_more_than_can_be_pushed(self, keys):
-        """What the skin presses down is harder to move; stems push no more than they bear."""
+        """The skin's shear makes an object harder to move; stems push no more than they bear."""
         for o in scene(families=[{**FAMILY, **keys, "count": 40}]).objects:
             value = {name: number.low for name, number in o.values.items()}
             mu = value["friction_static"]
@@ -148,14 +148,14 @@ class TestFamilies:
 
 class TestLimits:
     def test_the_stroke_ends_at_the_joints_limits(self):
-        one = scene(
+        trial_scene = scene(
             {**BOX, "conditions": ["fixed"], "width_m": 0.02},
             trials={"count": 1, "after_s": 20.0},
             motion={"rate_deg_s": [60.0, 0.0, 0.0, 0.0, 0.0]},
         )
-        joints = run(one).joints[0]
+        joints = run(trial_scene).joints[0]
         assert math.degrees(joints[:, 0].max()) <= 120.0
-        force = run(one).force[0]
+        force = run(trial_scene).force[0]
         assert force[-1] == pytest.approx(force[-500], rel=1e-3)
 
     def test_leaving_out_what_makes_it_soft_is_refused(self):

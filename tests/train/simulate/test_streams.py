@@ -28,8 +28,8 @@ def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
               (1, "noise", "soft", 1), (1, "noise", "soft", None), (1, "soft", "noise", 0)]
 )  # fmt: skip
 def test_seed_name_condition_and_trial_each_give_another_stream(other):
-    one = streams.stream(1, "noise", "soft", 0).random(4)
-    assert not np.isin(streams.stream(*other).random(4), one).any()
+    numbers = streams.stream(1, "noise", "soft", 0).random(4)
+    assert not np.isin(streams.stream(*other).random(4), numbers).any()
 
 
 @pytest.mark.parametrize("kind", ["random", "standard_normal"])
