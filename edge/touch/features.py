@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from itertools import groupby
 from typing import Any
 
@@ -143,7 +142,7 @@ class _Course:
         self._series, self._window_s, self._tables = series, window_s, tables
         layout = series.layout
         self._scale = layout.counts_per_newton or 1.0
-        self._zones = {name: _Zone(sums, layout) for name, sums in series.zones.items()}
+        self._zones = {name: _quantities(sums, layout) for name, sums in series.zones.items()}
         self._force_floor = (layout.threshold_counts + 1) / self._scale
         self._length_floor = MOTION_FLOOR * layout.pitch[0]
 
@@ -228,9 +227,9 @@ class _Course:
         elif (name, quantity) == ("contact", "area"):
             values = series.area
         elif zone is not None and quantity != "stiffness":
-            values = getattr(zone, quantity)()
+            values = zone[quantity]
         elif zone is not None and series.force_motion is not None:
-            force = zone.force() + self._force_floor
+            force = zone["force"] + self._force_floor
             values = force / (series.force_motion + self._length_floor)
         if values is None:
             raise _not_measured(feature)
@@ -271,89 +270,53 @@ def _not_measured(feature: Feature) -> InputError:
     return InputError(f"{feature.name} was not measured; name it where contacts are followed")
 
 
-class _Zone:
-    """The quantities of one zone, from its whole numbers (n, 8)."""
+def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray[Any]]:
+    """{quantity: (n,)} of a zone, from its whole numbers (n, 8).
 
-    def __init__(self, sums: NDArray[np.int64], layout: SkinLayout) -> None:
-        self._sums, self._layout = sums, layout
-        self._scale = layout.counts_per_newton or 1.0
-        self._force = sums[:, FORCE]
-
-    def max_force(self) -> NDArray[np.float64]:
-        return np.asarray(self._sums[:, PEAK] / self._scale)
-
-    def force(self) -> NDArray[np.float64]:
-        return np.asarray(self._force / self._scale)
-
-    def area(self) -> NDArray[np.int64]:
-        return self._sums[:, AREA]
-
-    def pressure(self) -> NDArray[np.float64]:
-        """Force over area; 0 for an empty zone."""
-        area = self._sums[:, AREA]
-        return np.asarray(self._force / (np.maximum(area, 1) * self._scale))
-
-    def along(self) -> NDArray[np.float64]:
-        return self._centroid(ROWS)
-
-    def around(self) -> NDArray[np.float64]:
-        centroid, known = self._centroid(COLS), self._force > 0
-        if self._layout.wraps:
-            # A contact that crosses the seam goes on; it does not jump to the other end.
-            turn = self._layout.cols
-            centroid[known] = np.unwrap(centroid[known] % turn, period=turn)
-        return centroid
-
-    def spread_along(self) -> NDArray[np.float64]:
-        return np.sqrt(self._central[0])
-
-    def spread_around(self) -> NDArray[np.float64]:
-        return np.sqrt(self._central[1])
-
-    def slant(self) -> NDArray[np.float64]:
-        return self._central[2]
-
-    def length(self) -> NDArray[np.float64]:
-        return np.sqrt(self._larger)
-
-    def width(self) -> NDArray[np.float64]:
-        """Root of the smaller eigenvalue: the determinant over the larger one.
-
-        The difference of the eigenvalues' terms would cancel. For a perfect line, rounding leaves
-        less than 2^-25 of the skin's larger side.
-        """
-        along, around, slant = self._central
-        determinant = np.maximum(along * around - slant * slant, 0.0)
-        larger = self._larger
-        return np.sqrt(np.divide(determinant, larger, out=np.zeros_like(larger), where=larger > 0))
-
-    def _centroid(self, column: int) -> NDArray[np.float64]:
-        """NaN for an empty zone."""
-        centroid = np.full(len(self._sums), np.nan)
-        np.divide(self._sums[:, column], self._force, out=centroid, where=self._force > 0)
-        return centroid
-
-    @cached_property
-    def _central(self) -> tuple[NDArray[np.float64], ...]:
-        """Variances along and around and the covariance; 0 for an empty zone.
-
-        Times force squared they are whole numbers, so nothing cancels.
-        """
-        bound = int(self._sums.max(initial=0)) * int(self._force.max(initial=0))
-        # Products beyond 64 bits, of large skins, take Python's integers.
-        s = self._sums if bound < 1 << 62 else self._sums.astype(object)
-        scale = np.maximum(self._force, 1).astype(np.float64)
-        triples = (ROWS_ROWS, ROWS, ROWS), (COLS_COLS, COLS, COLS), (ROWS_COLS, ROWS, COLS)
-        return tuple(
-            (s[:, FORCE] * s[:, product] - s[:, a] * s[:, b]).astype(np.float64) / scale / scale
-            for product, a, b in triples
+    The centroid of an empty zone is NaN, everything else of it 0.
+    """
+    scale = layout.counts_per_newton or 1.0
+    force, area = sums[:, FORCE], sums[:, AREA]
+    along, around = np.full((2, len(sums)), np.nan)
+    touched = force > 0
+    np.divide(sums[:, ROWS], force, out=along, where=touched)
+    np.divide(sums[:, COLS], force, out=around, where=touched)
+    if layout.wraps:
+        # A contact that crosses the seam goes on; it does not jump to the other end.
+        turn = layout.cols
+        around[touched] = np.unwrap(around[touched] % turn, period=turn)
+    # Variances and the covariance are whole numbers times force squared, so nothing cancels.
+    # Products beyond 64 bits, of large skins, take Python's integers.
+    bound = int(sums.max(initial=0)) * int(force.max(initial=0))
+    s = sums if bound < 1 << 62 else sums.astype(object)
+    total = np.maximum(force, 1).astype(np.float64)
+    rows, cols, slant = (
+        (s[:, FORCE] * s[:, product] - s[:, a] * s[:, b]).astype(np.float64) / total / total
+        for product, a, b in (
+            (ROWS_ROWS, ROWS, ROWS),
+            (COLS_COLS, COLS, COLS),
+            (ROWS_COLS, ROWS, COLS),
         )
-
-    @cached_property
-    def _larger(self) -> NDArray[np.float64]:
-        along, around, slant = self._central
-        larger = 0.5 * (along + around + np.hypot(along - around, 2.0 * slant))
-        return np.asarray(larger)
+    )
+    larger = 0.5 * (rows + cols + np.hypot(rows - cols, 2.0 * slant))
+    # The smaller eigenvalue is the determinant over the larger one: the difference of the
+    # eigenvalues' terms would cancel. For a perfect line, rounding leaves less than 2^-25 of the
+    # skin's larger side.
+    determinant = np.maximum(rows * cols - slant * slant, 0.0)
+    smaller = np.divide(determinant, larger, out=np.zeros_like(larger), where=larger > 0)
+    return {
+        "max_force": sums[:, PEAK] / scale,
+        "force": force / scale,
+        "area": area,
+        "pressure": force / (np.maximum(area, 1) * scale),
+        "along": along,
+        "around": around,
+        "spread_along": np.sqrt(rows),
+        "spread_around": np.sqrt(cols),
+        "slant": slant,
+        "length": np.sqrt(larger),
+        "width": np.sqrt(smaller),
+    }
 
 
 def _resample(

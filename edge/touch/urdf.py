@@ -48,16 +48,6 @@ def _attribute(
     return value
 
 
-def _numbers(path: str | os.PathLike[str], text: str, what: str, count: int) -> list[float]:
-    try:
-        numbers = [float(part) for part in text.split()]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count:
-        raise InputError(f"{path}: {what} must be {count} numbers, not {text!r}")
-    return numbers
-
-
 def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:
     name = str(element.get("name"))
     kind = str(element.get("type", ""))
@@ -68,17 +58,16 @@ def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[s
             "has no angle of its own; choose another base or tip, or make it fixed"
         )
     joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}
-    for tag, attribute, key in (
-        ("axis", "xyz", "axis"),
-        ("origin", "xyz", "origin_xyz"),
-        ("origin", "rpy", "origin_rpy"),
-    ):
-        child = element.find(tag)
-        if child is not None and attribute in child.attrib:
-            text = child.attrib[attribute]
-            joint[key] = _numbers(path, text, f"{tag} of joint {name!r}", 3)
     limit = element.find("limit")
-    if limit is not None and kind in ("revolute", "prismatic"):
-        text = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"
-        joint["limits"] = _numbers(path, text, f"limit of joint {name!r}", 2)
+    with parsing(f"{path}: joint {name!r}", "numbers"):
+        for tag, attribute, key in (
+            ("axis", "xyz", "axis"),
+            ("origin", "xyz", "origin_xyz"),
+            ("origin", "rpy", "origin_rpy"),
+        ):
+            child = element.find(tag)
+            if child is not None and attribute in child.attrib:
+                joint[key] = [float(number) for number in child.attrib[attribute].split()]
+        if limit is not None and kind in ("revolute", "prismatic"):
+            joint["limits"] = [float(limit.get(end, "0")) for end in ("lower", "upper")]
     return joint

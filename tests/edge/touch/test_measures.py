@@ -164,7 +164,7 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
         assert value(FLAT, counts, f"skin_{quantity}") == pytest.approx(
             float(truth), rel=4e-15, abs=1e-14
         )
-    # The determinant of a thin contact cancels: see `edge.touch.features._Zone.width`.
+    # The determinant of a thin contact cancels: see `edge.touch.features`.
     assert value(FLAT, counts, "skin_width") == pytest.approx(float(shorter), abs=7 * 2.0**-25)
 
 

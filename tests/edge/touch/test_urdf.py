@@ -3,6 +3,7 @@
 import pytest
 
 from edge.errors import InputError
+from edge.touch.arm import Chain
 from edge.touch.urdf import joints_between
 
 ARM = """<robot name="r">
@@ -39,19 +40,26 @@ def test_the_chain_runs_from_base_to_tip_whatever_the_order_of_the_file(joints):
         ('<parent link="base"/>', '<parent link="lower"/>', "no chain of joints leads from"),
         ('<parent link="base"/>', '<parent link="upper"/>', "no chain of joints leads from"),
         ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
-        ("0.3 0 -1e-3", "0.3 0", "origin of joint 'elbow' must be 3 numbers, not '0.3 0'"),
+        ("0.3 0 -1e-3", "0.3 0 x", "joint 'elbow': not numbers: could not convert"),
         (
             '<axis xyz="0 1 0"/>',
             '<mimic joint="shoulder"/>',
             "joint 'elbow' follows joint 'shoulder' (<mimic>)",
         ),
-        ('lower="-2.5"', 'lower="low"', "limit of joint 'elbow' must be 2 numbers"),
+        ('lower="-2.5"', 'lower="low"', "joint 'elbow': not numbers: could not convert"),
     ],
 )
 def test_what_is_wrong_is_named(joints, old, new, said):
     with pytest.raises(InputError, match=r"arm\.urdf: .*") as caught:
         joints(ARM.replace(old, new))
     assert said in str(caught.value)
+
+
+def test_an_origin_of_two_numbers_is_named_by_the_chain(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace("0.3 0 -1e-3", "0.3 0"))
+    with pytest.raises(InputError, match="joint 'elbow': origin_xyz must be a list of 3 numbers"):
+        Chain.from_urdf(path, "base", "lower")
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
