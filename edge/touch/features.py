@@ -173,7 +173,9 @@ class _Course:
         elif first.summary == "mean":
             values = values.mean(axis=1)
         elif first.summary == "deviation":
-            values = values.std(axis=1)
+            # Powers of two change no digit, and keep the squares within the range of floats.
+            power = np.frexp(np.abs(values).max(axis=1, keepdims=True))[1]
+            values = np.ldexp(np.ldexp(values, -power).std(axis=1), power[:, 0])
         elif first.summary == "roughness":
             values = np.abs(np.diff(values, axis=1)).mean(axis=1)
         return values.reshape(-1)
@@ -322,15 +324,15 @@ def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArra
 def _resample(
     times: NDArray[np.float64], t: NDArray[np.float64], values: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """Values (..., n) at `t`, interpolated to `times`; they never overshoot their neighbours.
+    """Values (..., n) at the increasing times `t`, interpolated to `times`.
 
-    The fraction of a step is computed before it multiplies a difference of values, as a slope over
-    a very short step could overflow.
+    They never overshoot their neighbours. The fraction of a step is computed before it multiplies a
+    difference of values, as a slope over a very short step could overflow.
     """
     after = np.clip(t.searchsorted(times, side="right"), 1, t.size - 1)
     before = np.maximum(after - 1, 0)
     step = t[after] - t[before]
-    step[step == 0.0] = 1.0
+    step[step == 0.0] = 1.0  # of a single frame
     fraction = np.clip((times - t[before]) / step, 0.0, 1.0)
     low, high = values.take(before, axis=-1), values.take(after, axis=-1)
     return np.asarray(np.where(fraction == 1.0, high, low + fraction * (high - low)))

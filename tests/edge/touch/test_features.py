@@ -1,5 +1,8 @@
 """Sampling uniform in time, whatever the frames' times were."""
 
+import math
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,6 +12,7 @@ from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
+from tests.edge.touch.pressed import followed, pressed
 
 
 def series(t, peak, area=None, motion=None, scale=None, ended=False):
@@ -88,6 +92,35 @@ def test_dropped_frames_and_jitter_do_not_shift_the_samples():
     assert np.abs(full - fewer).max() < 1e-16
 
 
+@given(
+    steps=st.lists(st.integers(0, 2), min_size=3, max_size=12),
+    lags=st.lists(st.integers(0, 3), min_size=12, max_size=12),
+)
+def test_times_that_stand_still_or_go_back_never_reach_the_samples(steps, lags):
+    """Frames of equal times, and taxels read earlier than in the frame before, in sixteenths."""
+    layout = SkinLayout(1, 2, threshold_counts=10, onset_counts=10, release_s=60.0)
+    frames, kept = [], {}
+    for i, (t, lag) in enumerate(zip(np.cumsum([0, *steps]).tolist(), [0, *lags], strict=False)):
+        at, peak = (t - lag) / 16, 100 + 50 * (i % 3)
+        frames.append(pressed(layout, t / 16, {(0, 0): peak}, times=np.full((1, 2), at)))
+        kept[max(Fraction(at), *kept, Fraction(0))] = peak  # the later reading of an instant
+    contact = followed(layout, frames)
+    assert contact.series().t.tolist() == list(kept)
+    vector = feature_vector(contact.series(), 1.0, 9, ["max_force"])
+    exact = [between(kept, Fraction(k, 8)) for k in range(9)]
+    assert vector == pytest.approx(exact, rel=2.0**-51)  # three roundings
+
+
+def between(values, t):
+    """The exact value at a time, of {time: value}; the last one is held."""
+    times = list(values)
+    if t >= times[-1]:
+        return values[times[-1]]
+    right = next(i for i, time in enumerate(times) if time > t)
+    a, b = times[right - 1], times[right]
+    return float(values[a] + (t - a) / (b - a) * (values[b] - values[a]))
+
+
 def test_a_pose_that_is_known_again_after_the_window_tells_nothing_of_it():
     motion = [0.0, 0.1, np.nan, np.nan, 0.9]
     given = series([0.0, 0.4, 0.8, 1.2, 1.6], [1] * 5, motion=motion)
@@ -114,6 +147,15 @@ def test_too_few_samples_and_an_empty_series_are_refused():
         feature_vector(series([0.0], [1]), 1.2, samples=1)
     with pytest.raises(InputError, match="no frame"):
         feature_vector(series([], []), 1.2)
+
+
+@pytest.mark.parametrize("power", [-1000, -600, 0, 600, 1000])
+def test_a_deviation_loses_no_digit_where_its_squares_leave_the_range_of_floats(power):
+    peaks, scale = [100, 230, 410, 90, 0], 2.0**-power
+    course = series([0.0, 0.25, 0.5, 0.75, 1.0], peaks, [1] * 5, scale=scale)
+    (deviation,) = feature_vector(course, 1.0, 5, ["max_force_deviation"])
+    variance = Fraction(sum(p * p for p in peaks), 5) - Fraction(sum(peaks), 5) ** 2
+    assert math.ldexp(deviation, -power) == pytest.approx(math.sqrt(variance), rel=1e-15)
 
 
 def test_what_is_too_large_is_refused_and_not_taken_for_unknown():
