@@ -76,8 +76,8 @@ class PacedClock(VirtualClock):
         if math.isnan(self._ahead) and t > self.now():
             self._ahead = time.monotonic() - self.now()
         super().sleep_until(t)
-        left = self.start - self.real()
-        if left > 0.0:
-            time.sleep(left)
-        elif left < -LATE_S:
-            self.start -= left
+        ahead_s = self.start - self.real()
+        if ahead_s > 0.0:
+            time.sleep(ahead_s)
+        elif ahead_s < -LATE_S:
+            self.start -= ahead_s

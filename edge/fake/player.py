@@ -127,8 +127,8 @@ def fake_buses(
         seed: of the noise and what power-up leaves undefined.
         make: makes a bus.
     """
-    rest = calibrated(file).calibration
-    assert rest is not None
+    calibration = calibrated(file).calibration
+    assert calibration is not None
     buses = []
     for b, spec in enumerate(file.buses):
         bus = make(
@@ -140,12 +140,12 @@ def fake_buses(
             overhead_s=overhead_s,
             count=serial_bits if spec.serial else wire_bits,
         )
-        shape = NOISE_FRAMES if noise_counts else 1, rest.baseline.size
+        shape = NOISE_FRAMES if noise_counts else 1, calibration.baseline.size
         drawn = np.random.default_rng([seed, b]).standard_normal(shape)
         noise = np.rint(noise_counts * drawn).astype(np.int64)
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
-            sense = _sense(chip, scene, rest.baseline.ravel(), noise)
+            sense = _sense(chip, scene, calibration.baseline.ravel(), noise)
             model = chip.kind.fake(chip, sense, timed, power_up)
             if chip.mux is None or chip.channel is None:
                 bus.chips[chip.address] = model

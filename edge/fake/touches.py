@@ -80,11 +80,14 @@ def still(file: SkinFile, seconds: float) -> Recording:
 
 def reach(file: SkinFile) -> int:
     """The greatest count that a touch can give on every fake chip."""
-    rest = calibrated(file).calibration
-    assert rest is not None
-    at = rest.baseline.ravel().tolist()
+    calibration = calibrated(file).calibration
+    assert calibration is not None
+    at_rest = calibration.baseline.ravel().tolist()
     places = [(chip, taxel) for chip in file.chips for taxel in chip.taxels if taxel != UNUSED]
-    return min(at[t] - 1 if chip.sign < 0 else chip.highest - at[t] for chip, t in places)
+    return min(
+        at_rest[taxel] - 1 if chip.sign < 0 else chip.highest - at_rest[taxel]
+        for chip, taxel in places
+    )
 
 
 def pitch(layout: SkinLayout) -> tuple[float, float]:
@@ -105,15 +108,15 @@ def _mapped(
     t = np.arange(int((LEAD_S + lasts + TAIL_S) * rate_hz) + 1) / rate_hz
     at = (t - LEAD_S) * speed + source.t[0]
     frame = np.interp(at, source.t, np.arange(len(source.t)))
-    left = np.minimum(frame.astype(int), len(source.t) - 2)
-    share = (frame - left)[:, None, None]
-    felt = (1.0 - share) * forces[left] + share * forces[left + 1]
-    felt[at < source.t[0]] = 0.0
+    former = np.minimum(frame.astype(int), len(source.t) - 2)
+    share = (frame - former)[:, None, None]
+    played = (1.0 - share) * forces[former] + share * forces[former + 1]
+    played[at < source.t[0]] = 0.0
     along, around = (
         _spread(source.layout, onto, axis, middle, centre)
         for axis, (middle, centre) in enumerate(zip(_middle(forces), (row, col), strict=True))
     )
-    return t, along.T @ felt @ around
+    return t, along.T @ played @ around
 
 
 def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:

@@ -105,7 +105,7 @@ class UsbAdapter:
 
         Args:
             setup: the request's 8 bytes: kind, request, value, index, length.
-            data: what it brings.
+            data: the bytes that it brings.
 
         Raises:
             BusError: the request is unknown, or the bus failed to carry a message.
@@ -166,10 +166,10 @@ def plugged(adapter: UsbAdapter) -> Iterator[str]:
     if os.geteuid() != 0:
         raise InputError("--plug needs root; run it with sudo")
     port = free_port((HUB / "status").read_text())
-    ours, kernels = socket.socketpair()
-    with kernels:
-        (HUB / "attach").write_text(f"{port} {kernels.fileno()} {port + 1} {LOW_SPEED}\n")
-    threading.Thread(target=serve, args=(adapter, ours), daemon=True).start()
+    our_end, kernels_end = socket.socketpair()
+    with kernels_end:
+        (HUB / "attach").write_text(f"{port} {kernels_end.fileno()} {port + 1} {LOW_SPEED}\n")
+    threading.Thread(target=serve, args=(adapter, our_end), daemon=True).start()
     try:
         yield _device(port)
     finally:

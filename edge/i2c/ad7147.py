@@ -212,8 +212,8 @@ class FakeAD7147(FakeChip):
         connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
         power = int(self.registers[SYSTEM])
         last = power >> 4 & 15 if power & 3 == 0 else -1
-        own = (connections == CONNECTIONS).all(axis=1)
-        results = np.where(own, self._sense(t), connections[:, 0] | 1)
+        as_set = (connections == CONNECTIONS).all(axis=1)
+        results = np.where(as_set, self._sense(t), connections[:, 0] | 1)
         results[last + 1 :] = 0
         self.registers[RESULTS : RESULTS + STAGES] = results
         first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF

@@ -200,16 +200,16 @@ class SerialBus:
     def _packet(self, ends: float) -> bytes | None:
         """The data of the next packet; None if it is damaged, or none comes by the time `ends`."""
         while True:
-            packet, zero, rest = self._received.partition(b"\0")
+            packet, zero, following = self._received.partition(b"\0")
             if zero:
-                self._received = rest
+                self._received = following
                 return decode(bytes(packet))
             if len(packet) > LONGEST_PACKET:
                 self._received.clear()
-            left = ends - self.now()
-            if left <= 0.0:
+            seconds_left = ends - self.now()
+            if seconds_left <= 0.0:
                 return None
-            self._port.timeout = left
+            self._port.timeout = seconds_left
             data = self._port.read(max(1, self._port.in_waiting))
             self._heard |= bool(data)
             self._received += data

@@ -1,4 +1,4 @@
-"""The machine that the program runs on: what a board needs, and what is there."""
+"""The machine that the program runs on, beside the needs of a board."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEAST_FREE_MB = 200
 
 
 class Row(NamedTuple):
-    """One thing about the machine: its name, what it is, and a remedy where it will not do."""
+    """A fact about the machine: its name, its value, and a remedy where it will not do."""
 
     name: str
     value: str
@@ -53,8 +53,8 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
     yield Row("user", f"{pwd.getpwuid(os.geteuid()).pw_name}; groups {', '.join(groups)}")
     # A board without a battery for its clock starts in the past.
     behind = time.time() < Path(__file__).stat().st_mtime
-    said = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
-    yield Row("clock", said, "set the clock: `sudo timedatectl set-ntp true`" if behind else "")
+    utc = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+    yield Row("clock", utc, "set the clock: `sudo timedatectl set-ntp true`" if behind else "")
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     busy = "end other programs: they delay the frames" if load > cores else ""
     yield Row("load", f"{load:.1f} on {cores} cores", busy)

@@ -190,8 +190,8 @@ class Lines:
         if self._socket is not None:
             self._socket.close()
         for writer in self._writers:
-            enough = writer is self._out and writer.problem == os.strerror(errno.EPIPE)
-            if writer.lost and not enough:
+            left_early = writer is self._out and writer.problem == os.strerror(errno.EPIPE)
+            if writer.lost and not left_early:
                 lost = f"{writer.lost} lines could not be sent to {writer.name}: {writer.problem}"
                 print(f"edge-classify: {lost}", file=sys.stderr)
 

@@ -1,4 +1,4 @@
-"""The live page of a skin: what it shows, and what a person can do there."""
+"""The live page of a skin: its pictures, and the actions that a person can take there."""
 
 from __future__ import annotations
 

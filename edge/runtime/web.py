@@ -64,10 +64,10 @@ class WebServer:
         with refusing(f"--web {address}: cannot be listened at"):
             self._http = _Http((host, port), self)
         self.port = self._http.server_address[1]
-        shown = _own_address() if host in ("0.0.0.0", "::") else host
-        shown = f"[{shown}]" if ":" in shown else shown
+        name = _own_address() if host in ("0.0.0.0", "::") else host
+        name = f"[{name}]" if ":" in name else name
         self.token = secrets.token_urlsafe(16)
-        self.link = f"http://{shown}:{self.port}/?token={self.token}"
+        self.link = f"http://{name}:{self.port}/?token={self.token}"
         self.act, self.acting = act, threading.Lock()
         self._picture: Mapping[str, Any] | None = None
         self._asked_at = -WATCHED_S
@@ -170,8 +170,8 @@ class _Handler(BaseHTTPRequestHandler):
         self, status: HTTPStatus, contents: bytes = b"", kind: str = "text/plain; charset=utf-8"
     ) -> None:
         self.send_response(status)
-        own = {"Content-Type": kind, "Content-Length": str(len(contents))}
-        for name, value in {**HEADERS, **own}.items():
+        of_contents = {"Content-Type": kind, "Content-Length": str(len(contents))}
+        for name, value in {**HEADERS, **of_contents}.items():
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(contents)

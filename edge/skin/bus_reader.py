@@ -159,8 +159,8 @@ class BusReader:
             return
         mux.verify = False
         for _ in range(2):
-            kept = [self._read(slot, mux) for slot in slots]
-            if all(kept) and (not any(slot.good for slot in slots) or self._kept(mux)):
+            on_its_channel = [self._read(slot, mux) for slot in slots]
+            if all(on_its_channel) and (not any(slot.good for slot in slots) or self._kept(mux)):
                 break
             mux.forget()
             for slot in slots:
@@ -179,7 +179,7 @@ class BusReader:
         Returns:
             False if a chip did not answer because the mux no longer had its channel connected.
         """
-        kept, tries = True, 0
+        on_its_channel, tries = True, 0
         slot.good = False
         if slot.running and slot.damaged == 1 and not self._setting_up():
             self._check(slot)
@@ -193,11 +193,11 @@ class BusReader:
                 slot.good, slot.at = True, self.bus.now()
             except BusError as error:
                 if mux is not None and isinstance(error, BusNack):
-                    kept = kept and self._kept(mux)
+                    on_its_channel = on_its_channel and self._kept(mux)
                 if tries >= error.retries:
                     self._fail(slot, error)
                 tries += 1
-        return kept
+        return on_its_channel
 
     def _check(self, slot: Slot) -> None:
         """Set a running chip up again if it has lost its settings."""

@@ -34,17 +34,17 @@ def with_calibration(text: str, calibration: TaxelCalibration, where: str = "ski
     Raises:
         InputError: the calibration in the file has a form that cannot be replaced.
     """
-    before = parse(text, where)
+    former = parse(text, where)
     table = re.compile(
         r"^[ \t]*\[calibration\][ \t]*(#.*)?\n(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*", re.M
     )
-    rest = table.sub("", text if text.endswith("\n") else text + "\n").rstrip("\n")
-    out = f"{rest}\n\n{calibration_text(calibration)}"
-    after = parse(out, where)
-    kept = replace(before, calibration=None) == replace(after, calibration=None)
-    if not kept or after.calibration is None:
+    without_table = table.sub("", text if text.endswith("\n") else text + "\n").rstrip("\n")
+    new_text = f"{without_table}\n\n{calibration_text(calibration)}"
+    new = parse(new_text, where)
+    same = replace(former, calibration=None) == replace(new, calibration=None)
+    if not same or new.calibration is None:
         raise InputError(f"{where}: write [calibration] as a table of its own, at the end")
-    return out
+    return new_text
 
 
 def save_calibration(path: str | os.PathLike[str], calibration: TaxelCalibration) -> Path:

@@ -187,9 +187,9 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
             array = np.array(table.get(key), dtype=np.float64)
         except (TypeError, ValueError, OverflowError):  # no numbers, or rows of different lengths
             array = np.empty(0)
-        whole = key == "noise" or not (array % 1.0).any()
+        are_whole = key == "noise" or not (array % 1.0).any()
         in_range = ((array >= 0.0) & (array <= 65535.0)).all()
-        if array.shape != layout.shape or not (whole and in_range):
+        if array.shape != layout.shape or not (are_whole and in_range):
             numbers = "numbers" if key == "noise" else "whole numbers"
             raise InputError(
                 f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} from "

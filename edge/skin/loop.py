@@ -57,10 +57,10 @@ class Periods:
     def percentile(self, percent: float) -> float:
         """The period in seconds that so many percent do not exceed, rounded up to a bin; NaN
         without periods."""
-        wanted, seen = math.ceil(self.n * percent / 100.0), 0
+        rank, counted = math.ceil(self.n * percent / 100.0), 0
         for i, count in sorted(self._counts.items()):
-            seen += count
-            if seen >= wanted:
+            counted += count
+            if counted >= rank:
                 return round((i + 1) * self.BIN_S, 9)
         return math.nan
 
@@ -115,18 +115,18 @@ class Schedule:
 def stop_on(*signals: int) -> Iterator[Stop]:
     """Let a signal end the loop after the current frame; a second one terminates at once."""
     stop = Stop()
-    before: dict[int, Any] = {}
+    handlers: dict[int, Any] = {}
 
     def ask(number: int, _: FrameType | None) -> None:
         stop.asked = True
-        signal.signal(number, before[number])
+        signal.signal(number, handlers[number])
 
     for number in signals:
-        before[number] = signal.signal(number, ask)
+        handlers[number] = signal.signal(number, ask)
     try:
         yield stop
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 

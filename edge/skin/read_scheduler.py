@@ -41,11 +41,14 @@ class ReadScheduler:
         """Bits to connect a mux channel."""
         self._near = []
         for bus in file.buses:
-            own = np.zeros((len(bus.chips), *file.layout.shape), dtype=np.bool_)
+            taxels_of_chip = np.zeros((len(bus.chips), *file.layout.shape), dtype=np.bool_)
             for i, chip in enumerate(bus.chips):
-                own[i].reshape(-1)[[taxel for taxel in chip.taxels if taxel != UNUSED]] = True
+                taxels_of_chip[i].reshape(-1)[
+                    [taxel for taxel in chip.taxels if taxel != UNUSED]
+                ] = True
             # A chip is near a contact on its own taxels or on those next to them.
-            self._near.append(with_neighbours(own, file.layout.wraps).reshape(len(own), -1))
+            near = with_neighbours(taxels_of_chip, file.layout.wraps)
+            self._near.append(near.reshape(len(near), -1))
         self._read_at = [np.full(len(bus.chips), -1, dtype=np.int64) for bus in file.buses]
         self._tick = 0
 
@@ -58,22 +61,22 @@ class ReadScheduler:
         """
         self._tick += 1
         counts = np.zeros(1) if frame is None else frame.counts
-        felt = counts.reshape(-1) > touch_counts
-        return [self._plan(b, felt) for b in range(len(self._buses))]
+        touched = counts.reshape(-1) > touch_counts
+        return [self._plan(b, touched) for b in range(len(self._buses))]
 
-    def _plan(self, b: int, felt: NDArray[np.bool_]) -> list[int]:
+    def _plan(self, b: int, touched: NDArray[np.bool_]) -> list[int]:
         bus, read_at = self._buses[b], self._read_at[b]
-        left = MARGIN * bus.clock_hz / self._rate_hz
-        away = ~np.any(self._near[b] & felt, axis=1)
-        waiting = self._tick - read_at < OVERDUE_FRAMES
+        bits_left = MARGIN * bus.clock_hz / self._rate_hz
+        away_from_contact = ~np.any(self._near[b] & touched, axis=1)
+        not_overdue = self._tick - read_at < OVERDUE_FRAMES
         chosen: list[int] = []
         connected = set()
-        for i in np.lexsort((read_at, away, waiting)).tolist():
+        for i in np.lexsort((read_at, away_from_contact, not_overdue)).tolist():
             chip = bus.chips[i]
             channel = chip.mux, chip.channel
-            left -= chip.frame_bits + self.select_bits * (channel not in connected)
+            bits_left -= chip.frame_bits + self.select_bits * (channel not in connected)
             # Even a wire too slow for one chip reads one.
-            if left < 0 and chosen:
+            if bits_left < 0 and chosen:
                 break
             chosen.append(i)
             connected.add(channel)

@@ -173,8 +173,8 @@ class Skin:
 
         A bus is lost while every chip on it fails, as when its adapter is unplugged.
         """
-        before, self._lost = self._lost, [reader.lost for reader in self.readers]
-        readers = zip(self.readers, before, strict=True)
+        former, self._lost = self._lost, [reader.lost for reader in self.readers]
+        readers = zip(self.readers, former, strict=True)
         return [(reader.bus.name, reader.lost) for reader, lost in readers if reader.lost != lost]
 
     def changes(self) -> list[ChipStatus]:
@@ -182,10 +182,10 @@ class Skin:
 
         A chip that is down stays so until it runs, whatever is tried.
         """
-        before, self._states = self._states, [slot.state for slot in self._slots]
-        if before == self._states:
+        former, self._states = self._states, [slot.state for slot in self._slots]
+        if former == self._states:
             return []
-        return [s for s, state in zip(self.status(), before, strict=True) if s.state != state]
+        return [s for s, state in zip(self.status(), former, strict=True) if s.state != state]
 
     @property
     def invalid_for(self) -> NDArray[np.int64]:

@@ -135,9 +135,10 @@ def _chip(
     if not 1 <= len(taxels) <= MOST_TAXELS:
         limits = f"names {len(taxels)} taxels; a chip serves 1 to {MOST_TAXELS}"
         raise InputError(f"{table.called('taxels')} {limits}")
-    own = table.whole("sign", kind.defaults(options).sign if sign is None else sign, (1, -1))
+    default = kind.defaults(options).sign if sign is None else sign
+    own_sign = table.whole("sign", default, (1, -1))
     table.done()
-    return ChipSpec(kind, address, taxels, mux, channel, own, options)
+    return ChipSpec(kind, address, taxels, mux, channel, own_sign, options)
 
 
 def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:

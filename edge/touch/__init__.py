@@ -1,1 +1,1 @@
-"""From a frame to what was measured on a contact: regions, contacts over time, features."""
+"""From a frame to the features of a contact: regions, and contacts over time."""

@@ -116,10 +116,10 @@ class Chain:
         except (TypeError, ValueError):
             raise InputError(f"joint angles must be numbers, not {q!r}") from None
         if angles.ndim == 0 or angles.shape[-1] != self.dof:
-            given = angles.shape[-1] if angles.ndim else "a single number"
+            count = angles.shape[-1] if angles.ndim else "a single number"
             raise InputError(
                 f"the arm {self.base} to {self.tip} takes {self.dof} joint angles "
-                f"({', '.join(self.names)}), not {given}"
+                f"({', '.join(self.names)}), not {count}"
             )
         if not np.isfinite(angles).all():
             bad = np.argwhere(~np.isfinite(angles))[0][-1]
@@ -174,8 +174,8 @@ class Chain:
         """The chain as a JSON object, which keeps every number exactly."""
         joints = []
         for j in self.joints:
-            more = {key: getattr(j, key) for key in (*STEPS, "limits")}
-            given = {key: list(value) for key, value in more.items() if value not in (ZERO, None)}
+            optional = {key: getattr(j, key) for key in (*STEPS, "limits")}
+            given = {k: list(value) for k, value in optional.items() if value not in (ZERO, None)}
             joints.append({"name": j.name, "axis": list(j.axis), "type": j.kind, **given})
         return {"base": self.base, "tip": self.tip, "joint": joints}
 

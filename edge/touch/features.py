@@ -115,7 +115,7 @@ def feature_vector(
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
     if samples < 2:
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
-    wanted = measures.features(tuple(features))
+    types = measures.features(tuple(features))
     series = series.felt(window_s)
     if series.t.size == 0:
         raise InputError("the contact has no frame")
@@ -123,7 +123,7 @@ def feature_vector(
     # Overflow to infinity is refused by `_Course.sampled` and by the model.
     with np.errstate(over="ignore"):
         return np.concatenate(
-            [course.block(tuple(group), samples) for _, group in groupby(wanted, key=_kind)]
+            [course.block(tuple(group), samples) for _, group in groupby(types, key=_kind)]
         )
 
 
@@ -239,7 +239,7 @@ class _Course:
 
 
 def kernel_channels(series: FeatureSeries, window_s: float, name: str) -> NDArray[np.int64]:
-    """(channels, `edge.touch.kernels.SAMPLES`) what the kernels of a feature are applied to.
+    """(channels, `edge.touch.kernels.SAMPLES`) numbers to which a feature's kernels are applied.
 
     The last value before each time is held, and nothing is interpolated, so all are whole numbers.
 

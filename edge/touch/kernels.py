@@ -99,9 +99,9 @@ def _mixes(channels: int) -> NDArray[np.float32]:
     draw = random.Random(SEED).random
     mixes = np.zeros((CONVOLUTIONS, channels), dtype=np.float32)
     for row in mixes:
-        rest = list(range(channels))
+        left_over = list(range(channels))
         for _ in range(min(MIXED[int(draw() * len(MIXED))], channels)):
-            row[rest.pop(int(draw() * len(rest)))] = 1.0
+            row[left_over.pop(int(draw() * len(left_over)))] = 1.0
     return mixes
 
 
@@ -134,8 +134,9 @@ def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float6
         channels: (c, samples) whole numbers from 0.
         table: of training.
     """
-    own = convolution_of_bias(len(table.biases))
-    inside = _inside()[own]
-    above = convolved(shifted(channels, table.shifts))[own] > np.array([table.biases], np.int32).T
+    convolutions = convolution_of_bias(len(table.biases))
+    inside = _inside()[convolutions]
+    results = convolved(shifted(channels, table.shifts))[convolutions]
+    above = results > np.array([table.biases], np.int32).T
     counts = np.count_nonzero(above & inside, axis=1)
     return np.asarray(counts / np.count_nonzero(inside, axis=1))

@@ -128,11 +128,11 @@ class SkinLayout:
         """Angle in radians of a place between columns, which lies on the shorter arc."""
         if self.column_angles_deg is None:
             return 2.0 * math.pi * col / self.cols
-        left = math.floor(col)
-        a = self.column_angles_deg[left % self.cols]
-        b = self.column_angles_deg[(left + 1) % self.cols]
+        column = math.floor(col)
+        a = self.column_angles_deg[column % self.cols]
+        b = self.column_angles_deg[(column + 1) % self.cols]
         step = (b - a + 180.0) % 360.0 - 180.0
-        return math.radians(a + (col - left) * step)
+        return math.radians(a + (col - column) * step)
 
     def to_dict(self) -> dict[str, Any]:
         """The layout as the `skin` object of a recording's or a model's metadata."""
@@ -151,26 +151,26 @@ class SkinLayout:
             InputError: a value is missing or impossible; `where` names the file.
         """
         table = ConfigTable(skin, where, "skin.")
-        known: dict[str, Any] = {
+        values: dict[str, Any] = {
             name: table.whole(name, allowed=range(65536))
             for name in ("rows", "cols", "threshold_counts", "onset_counts")
             if name in ("rows", "cols") or table.has(name)
         }
-        known["wraps"] = table.flag("wraps", False)
+        values["wraps"] = table.flag("wraps", False)
         for name in ("radius_m", "counts_per_newton", "release_s"):
             if table.has(name):
-                known[name] = table.number(name, low=0.0, open_low=True)
+                values[name] = table.number(name, low=0.0, open_low=True)
         if table.has("row0_z_m"):
-            known["row0_z_m"] = table.number("row0_z_m")
+            values["row0_z_m"] = table.number("row0_z_m")
         if isinstance(table.get("pitch_m", None), list | tuple):
-            known["pitch_m"] = table.numbers("pitch_m", 2, low=0.0, open_low=True)
+            values["pitch_m"] = table.numbers("pitch_m", 2, low=0.0, open_low=True)
         elif table.has("pitch_m"):
-            known["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
+            values["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
         if table.has("column_angles_deg"):
-            known["column_angles_deg"] = table.numbers("column_angles_deg")
-        known["dead"] = table.wholes("dead", ())
+            values["column_angles_deg"] = table.numbers("column_angles_deg")
+        values["dead"] = table.wholes("dead", ())
         try:
-            return cls(**known)
+            return cls(**values)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
 
@@ -183,13 +183,13 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
     Raises:
         InputError: the device's skin has another shape or other units than the model's.
     """
-    ours, theirs = (
+    of_device, of_model = (
         f"{skin.rows} x {skin.cols} taxels, {'closed around' if skin.wraps else 'flat'}, with "
         f"forces in {skin.force_unit}s and lengths in {skin.length_unit}s"
         for skin in (device, model)
     )
-    if ours != theirs:
-        raise InputError(f"this skin has {ours}, but the model was made for {theirs}")
+    if of_device != of_model:
+        raise InputError(f"this skin has {of_device}, but the model was made for {of_model}")
     ratio = 1.0
     if device.counts_per_newton is not None and model.counts_per_newton is not None:
         ratio = device.counts_per_newton / model.counts_per_newton

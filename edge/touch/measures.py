@@ -138,8 +138,8 @@ class Feature:
 def names() -> list[str]:
     """All feature types without transforms and summaries, the paper's first."""
     zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in QUANTITIES]
-    more = [name for name in (*ALONE, *zones) if name not in PAPER]
-    return [*PAPER, *(name for name in more if name != "contact_max_force")]
+    others = [name for name in (*ALONE, *zones) if name not in PAPER]
+    return [*PAPER, *(name for name in others if name != "contact_max_force")]
 
 
 @lru_cache(maxsize=1024)
@@ -158,8 +158,8 @@ def feature(name: str) -> Feature:
     elif zone not in ZONES or quantity not in QUANTITIES or base == "contact_max_force":
         import difflib  # a slow board starts sooner without it
 
-        near = difflib.get_close_matches(base, names(), 3) or names()[:3]
-        raise InputError(f"there is no feature {name!r}; the nearest are {', '.join(near)}")
+        nearest = difflib.get_close_matches(base, names(), 3) or names()[:3]
+        raise InputError(f"there is no feature {name!r}; the nearest are {', '.join(nearest)}")
     if len(set(transforms)) < len(transforms):
         raise InputError(f"the feature {name!r} applies one transform twice; once is enough")
     if "log" in transforms and quantity in SIGNED:

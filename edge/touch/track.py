@@ -190,9 +190,9 @@ def _shared(tracks: list[RegionTrack], regions: list[Region]) -> dict[int, int]:
     pairs = []
     for i, track in enumerate(tracks):
         for j, region in enumerate(regions):
-            before = track.contact.region
-            if before is not None and before.touches(region):
-                pairs.append((-(before.bits & region.bits).bit_count(), i, j))
+            former = track.contact.region
+            if former is not None and former.touches(region):
+                pairs.append((-(former.bits & region.bits).bit_count(), i, j))
     shares: dict[int, int] = {}
     for _, i, j in sorted(pairs):
         if i not in shares and j not in shares.values():
