@@ -77,13 +77,6 @@ class TestJudges:
 
 
 class TestTraps:
-    def test_what_regularised_friction_lets_creep_sticks(self):
-        mass, load = 2.0, 0.5 * MU_S * 2.0 * GRAVITY
-        speed = load * (1 / ARM_K + 1e-4) / 0.3
-        trace = slider(0.01, mass, MU_S, MU_K, speed=speed, travel_s=0.3).run(150)
-        assert trace.force[-1, 0] == pytest.approx(load, rel=1e-9)
-        assert (trace.slide == 0.0).all()
-
     def test_taxel_forces_as_stiffness_times_depth_lose_digits(self):
         n, stiff = 200, 1e15
         rng = np.random.default_rng(2)
