@@ -1,7 +1,6 @@
 """The step holds where others blow up. "Finite" proves nothing: forces and energy are judged."""
 
 import numpy as np
-import pytest
 
 from tests.train.simulate.scenes import Rig, slider
 from train.simulate import contact
