@@ -187,7 +187,7 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
             array = np.array(table.get(key), dtype=np.float64)
         except (TypeError, ValueError, OverflowError):  # no numbers, or rows of different lengths
             array = np.empty(0)
-        are_whole = key == "noise" or not (array % 1.0).any()
+        are_whole = key == "noise" or bool((array == np.floor(array)).all())
         in_range = ((array >= 0.0) & (array <= 65535.0)).all()
         if array.shape != layout.shape or not (are_whole and in_range):
             numbers = "numbers" if key == "noise" else "whole numbers"

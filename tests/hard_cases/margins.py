@@ -69,15 +69,16 @@ def prices() -> Mapping[str, str]:
     counts[4:12, 20:24] = counts[4:12, 0:4] = 65535
     series = contact_of(Frame(0.01 * i, counts) for i in range(4)).series()
     chain = Chain.cody()
+    angles = np.full(chain.dof, 0.5)
     t = 0.01 * np.arange(120.0)
-    graph, usual, region, vector, finite, pose, clock = microseconds(
+    graph, usual, region, vector, finite, point, clock = microseconds(
         [
             lambda: exported.run(["t_label", "t_neighbours"], {"features": x}),
             lambda: theirs(x),
             lambda: largest_region(counts, 50),
             lambda: feature_vector(series, 0.03),
             lambda: np.isfinite(x).all(),
-            lambda: chain.pose(np.full(chain.dof, 0.5)),
+            lambda: chain.point(angles, (0.04, 0.0, 0.1)),
             lambda: np.diff(np.minimum(t, 1.2)).max(initial=0.0) > 0.3,
         ],
         500,
@@ -97,7 +98,7 @@ def prices() -> Mapping[str, str]:
         "features": f"{touch}; {vector:.0f} us a feature vector",
         "limits": touch,
         "clock": f"{clock:.0f} us a decision, 0 bytes",
-        "kinematics": f"within {pose:.0f} us a pose of five joints, 0 bytes",
+        "kinematics": f"within {point:.0f} us a point on an arm of five joints, 0 bytes",
         "refusals": f"{finite:.1f} us a vector, and the graph's own guard within a decision",
     }
 
