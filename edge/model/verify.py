@@ -25,19 +25,22 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
+from edge.files import parsing
 from edge.model.model import Model, require_joints
 from edge.recording import Recording, load_arrays, load_meta, save_arrays
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact
 
-PARTS = ("label", "neighbours", "scores", "distances")
+OUTPUTS = ("label", "neighbours", "scores", "distances")
+"""Ends of the names of a task's outputs."""
 
 Line = tuple[str, NDArray[Any], NDArray[Any], float]
 """A quantity to compare: name, seen, expected, bound."""
@@ -83,115 +86,79 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
     name = os.fspath(path)
     arrays = load_arrays(name)
     meta = load_meta(name, arrays)
-    try:
+    with parsing(name, "a golden file of this model", "; export it again with the model"):
+        SkinLayout.from_dict(meta["skin"], where=name)
         bounds = {str(key): float(bound) for key, bound in meta["bounds"].items()}
-        trials = _trials(name, arrays, meta)
-        lines = [*_path(model, trials, arrays, bounds), *_graph(model, name, arrays, bounds)]
+        lines = [*_path(model, arrays, meta, bounds), *_graph(model, name, arrays, bounds)]
         return [compared(*line) for line in lines]
-    except KeyError as error:
-        raise InputError(f"{name}: lacks {error}; export it again with the model") from None
-    except (AttributeError, IndexError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{name}: not a golden file ({error}); export it again") from None
 
 
-def _trials(name: str, arrays: dict[str, NDArray[Any]], meta: dict[str, Any]) -> list[Recording]:
-    start = arrays["start"].astype(np.int64)
-    trials: list[Recording] = []
-    for i, (a, b) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
-        if not 0 <= a < b <= len(arrays["t"]):
-            raise InputError(f"{name}: trial {i} has no frames; export it again")
-        parts = {key: arrays[key][a:b] for key in ("joints", "valid") if key in arrays}
-        trials.append(
-            Recording(arrays["t"][a:b], arrays["frames"][a:b], meta={"skin": meta["skin"]}, **parts)
-        )
-    SkinLayout.from_dict(meta["skin"], where=name)
-    return trials
+def _trials(arrays: dict[str, NDArray[Any]], meta: dict[str, Any]) -> Iterator[Recording]:
+    for first, end in pairwise(arrays["start"].tolist()):
+        if not 0 <= first < end <= len(arrays["t"]):
+            raise ValueError("a trial has no frames")
+        columns = {
+            key: arrays[key][first:end]
+            for key in ("t", "frames", "joints", "valid")
+            if key in arrays
+        }
+        yield Recording(**columns, meta={"skin": meta["skin"]})
 
 
 def _path(
-    model: Model,
-    trials: list[Recording],
-    arrays: dict[str, NDArray[Any]],
-    bounds: dict[str, float],
+    model: Model, arrays: dict[str, NDArray[Any]], meta: dict[str, Any], bounds: dict[str, float]
 ) -> Iterator[Line]:
     """Onsets, series and feature vectors of the trials."""
     info = model.info
     windows = (info.window_s, *info.decision_points_s)
-    onsets = np.full(len(trials), np.nan)
-    vectors = np.full((len(windows), len(trials), info.width), np.nan)
-    starts, expected = arrays["series_start"], arrays["series_counts"]
-    if expected.ndim != 2 or len(expected) != starts[-1]:
-        raise ValueError(f"series_counts is {expected.shape}")
-    lengths, counts = np.zeros(len(trials), dtype=np.int64), np.zeros_like(expected)
-    for i, trial in enumerate(trials):
+    onsets, integers, vectors = [], [], []
+    for i, trial in enumerate(_trials(arrays, meta)):
         require_joints(model, None if trial.joints is None else trial.joints.shape[1], f"trial {i}")
         contact = first_series(trial, model)
         if contact is None:
             continue
-        onsets[i], series = contact
-        for j, window_s in enumerate(windows):
-            vectors[j, i] = info.vector(series, window_s)
-        lengths[i] = len(series.integers)
-        if series.integers.shape[1] != expected.shape[1]:
-            raise ValueError(f"series_counts has {expected.shape[1]} columns")
-        rows = counts[starts[i] : starts[i + 1]]
-        rows[: lengths[i]] = series.integers[: len(rows)]
-    yield "series length", lengths, np.diff(starts), 0.0
-    yield "series counts", counts, expected, 0.0
-    yield "onset", onsets, arrays["onset_s"], bounds["time_s"]
-    yield "features", vectors[0], arrays["vectors"][: len(trials)], bounds["features"]
+        onsets.append(contact[0])
+        integers.append(contact[1].integers)
+        vectors.append([info.vector(contact[1], window_s) for window_s in windows])
+    trials, at_windows = len(onsets), np.array(vectors).swapaxes(0, 1)
+    lengths = np.array([len(series) for series in integers])
+    yield "series length", lengths, np.diff(arrays["series_start"]), 0.0
+    yield "series counts", np.concatenate(integers), arrays["series_counts"], 0.0
+    yield "onset", np.array(onsets), arrays["onset_s"], bounds["time_s"]
+    yield "features", at_windows[0], arrays["vectors"][:trials], bounds["features"]
     if info.decision_points_s:
-        stored = arrays["decision_point_vectors"][:, : len(trials)]
-        yield "features at decision points", vectors[1:], stored, bounds["features"]
+        stored = arrays["decision_point_vectors"][:, :trials]
+        yield "features at decision points", at_windows[1:], stored, bounds["features"]
 
 
 def _graph(
     model: Model, name: str, arrays: dict[str, NDArray[Any]], bounds: dict[str, float]
 ) -> Iterator[Line]:
     """The graph's outputs for the stored vectors."""
-    info = model.info
-    vectors = arrays["vectors"]
-    if vectors.ndim != 2 or vectors.shape[1] != info.width:
-        raise InputError(
-            f"{name}: its vectors are {vectors.shape[1:]} long, "
-            f"{model.path} takes {info.width}; export both together"
-        )
-    tasks = sorted(
-        key.removesuffix("_label")
-        for key in arrays
-        if key.endswith("_label") and not key.endswith("_decision_point_label")
-    )
-    if tasks != sorted(info.tasks):
-        raise InputError(
-            f"{name}: is for the tasks {', '.join(tasks) or 'none'}, {model.path} answers "
-            f"{', '.join(sorted(info.tasks))}; export both together"
-        )
-    if info.decision_points_s:
-        shape = len(info.decision_points_s), info.width
-        if arrays["decision_point_vectors"].shape[::2] != shape:
+    for key in ("vectors", "decision_point_vectors"):
+        if key in arrays and arrays[key].shape[-1:] != (model.info.width,):
             raise InputError(
-                f"{name}: has no vectors for the model's decision points; export both together"
+                f"{name}: {key} has the shape {arrays[key].shape}, but {model.path} takes "
+                f"{model.info.width} features; export both together"
             )
     for key, seen in answers(model, arrays).items():
-        bound = next((bounds[part] for part in bounds if key.endswith(f"_{part}")), 0.0)
+        bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
         yield key, seen, arrays[key], bound
 
 
 def answers(model: Model, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """{key: the graph's output} for the vectors of a golden file, each at its decision point."""
-    parts = (*PARTS, "label_distances") if model.info.has_label_distances else PARTS
+    ends = (*OUTPUTS, "label_distances") if model.info.has_label_distances else OUTPUTS
     seen = {"": _outputs(model, arrays["vectors"])}
     if model.info.decision_points_s:
         rows = enumerate(arrays["decision_point_vectors"])
         points = [_outputs(model, vectors, point) for point, vectors in rows]
         seen["decision_point_"] = {key: np.stack([p[key] for p in points]) for key in points[0]}
     return {
-        f"{task}_{prefix}{part}": outputs[f"{task}_{part}"]
+        f"{task}_{prefix}{end}": outputs[f"{task}_{end}"]
         for prefix, outputs in seen.items()
         for task in model.info.tasks
-        for part in parts
+        for end in ends
     }
 
 
@@ -245,5 +212,5 @@ def compared(name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float
     if worst == 0.0:
         return Check(name, len(seen), 0.0, None)
     at_row = (values.reshape(share.shape)[row] for values in (seen, expected))
-    said = [str(values) if bound == 0.0 else repr(float(values[column])) for values in at_row]
-    return Check(name, len(seen), worst, row, *said)
+    texts = [str(values) if bound == 0.0 else repr(float(values[column])) for values in at_row]
+    return Check(name, len(seen), worst, row, *texts)
