@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -180,14 +180,13 @@ class Classifier:
     def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
         """Decisions on a stream without contact, for the tasks that have a label for it."""
         near = self._strongest > self.layout.threshold_counts
-        raised = {"no_contact": True, "missing_taxels": self._missing_taxels, "near_contact": near}
-        flags = tuple(flag for flag in raised if raised[flag])
+        doubts = {"no_contact": True, "missing_taxels": self._missing_taxels, "near_contact": near}
         strongest = round(self._strongest / max(self.layout.onset, 1), 3)
         for name, task in self.model.info.tasks.items():
             if task.no_contact is not None:
                 latency_ms = round((time.perf_counter() - began) * 1e3, 3)
                 yield Decided(
-                    name, task.no_contact, 1.0, 0.0, end_s, latency_ms, flags,
+                    name, task.no_contact, 1.0, 0.0, end_s, latency_ms, _flags(doubts),
                     strongest=strongest, model=self.model.named,
                 )  # fmt: skip
 
@@ -201,8 +200,7 @@ class Classifier:
             InputError: the recording does not suit the model.
         """
         if not (self._motion_on_skin and recording.joints is None):
-            joints = recording.joints
-            require_joints(self.model, None if joints is None else joints.shape[1], "the recording")
+            require_joints(self.model, recording.dof, "the recording")
         yield from self._afresh(recording.layout, recording)
 
     def watch(
@@ -246,21 +244,20 @@ class Classifier:
     def _decide(self, waiting: _Waiting, began: float, *, short: bool = False) -> list[Decided]:
         """Ask the model about a contact; returns the answers of the tasks that are now decided."""
         info = self.model.info
-        last = len(self.model.decision_points_s) - 1
-        decision_point = last if short else waiting.decision_point
-        waiting.decision_point = decision_point
+        if short:
+            waiting.decision_point = len(self.model.decision_points_s) - 1
+        decision_point = waiting.decision_point
         window_s = self.model.decision_points_s[decision_point]
         contact, series = waiting.contact, waiting.contact.series()
         longest_s = np.diff(np.minimum(series.t, window_s)).max(initial=0.0)
-        raised = {
+        doubts = {
             "short": short,
             "gap": longest_s > max(GAP_SHARE * window_s, GAP_S),
             "missing_taxels": contact.missing_taxels,
             "missing_pose": contact.missing_pose,
             "skin_motion": contact.chain is None and info.chain is not None,
         }
-        flags = tuple(flag for flag in raised if raised[flag])
-        position = None
+        flags, position = _flags(doubts), None
         if self._max_contacts > 1 and (at := contact.position()) is not None:
             x, y, z = (round(value, 6) for value in at)
             position = x, y, z
@@ -302,31 +299,21 @@ class Classifier:
             decision: of the model.
             novel: the smallest novelty rate at which the contact counts as unknown.
         """
-        if self.model.info.trials:
-            names = tuple(map(self.model.info.trial, decision.neighbours.tolist()))
-            blank = replace(blank, nearest=names)
-        flags = (*blank.flags, AS_TRAINED) if decision.distances[0] == 0.0 else blank.flags
-        flags = (*flags, OUT_OF_RANGE) if decision.out_of_range else flags
+        info, at, error = self.model.info, waiting.decision_point, self.error
+        task, rule = info.tasks[blank.task], self._rules.get(blank.task)
         label, confidence = decision.label, decision.confidence
         unknown = novel <= self.novelty_rate
-        flags = (*flags, "unknown") if unknown else flags
-        if self.error is None:
-            flags = (*flags, "tie") if decision.tie else flags
-            return replace(
-                blank, label=label, confidence=confidence, flags=flags, decision=decision
-            )
-        info, at, rule = self.model.info, waiting.decision_point, self._rules[blank.task]
-        task = info.tasks[blank.task]
-        if task.factors:
+        nameless = sure = False
+        if error is not None and task.factors:
             if not waiting.decided.keys() >= task.factors.keys():
                 return None
-            parts = {factor: waiting.decided[factor] for factor in task.factors}
-            indices = {f: info.tasks[f].labels.index(str(p.label)) for f, p in parts.items()}
+            factors = {factor: waiting.decided[factor] for factor in task.factors}
+            indices = {f: info.tasks[f].labels.index(str(d.label)) for f, d in factors.items()}
             label = task.labels[product_label(task.factors, indices)]
-            confidence = math.prod(part.confidence for part in parts.values())
-            sure = all(part.stopped_by == "confidence" for part in parts.values())
+            confidence = math.prod(decided.confidence for decided in factors.values())
+            sure = all(decided.stopped_by == "confidence" for decided in factors.values())
             decision = decision._replace(label=label)
-        else:
+        elif error is not None:
             assert decision.label_distances is not None
             confidence = info.stopping[blank.task].confidence(
                 at, decision.label_distances.tolist(), task.labels.index(label)
@@ -336,21 +323,33 @@ class Classifier:
             last = full if rule is None or unknown else rule.last
             if at < last and (unknown or not sure):
                 return None
-        if unknown and info.novelty is not None and blank.task == info.novelty.task:
+        if error is not None and unknown and info.novelty is not None:
+            nameless = blank.task == info.novelty.task
+        if nameless:
             label, confidence = UNKNOWN, 1.0 - novel
-        elif rule is not None and not sure and not rule.fixed:
-            flags = (*flags, "unsure")
-        if rule is None:
-            flags = (*flags, "uncertified")
+        doubts = {
+            AS_TRAINED: decision.distances[0] == 0.0,
+            OUT_OF_RANGE: decision.out_of_range,
+            "unknown": unknown,
+            "tie": error is None and decision.tie,
+            "unsure": not (rule is None or rule.fixed or sure or nameless),
+            "uncertified": error is not None and rule is None,
+        }
         return replace(
             blank,
             label=label,
-            confidence=round(confidence, 6),
-            flags=flags,
-            error=None if rule is None else self.error,
+            confidence=confidence if error is None else round(confidence, 6),
+            flags=(*blank.flags, *_flags(doubts)),
+            error=None if rule is None else error,
             stopped_by=None if rule is None else "confidence" if sure else "window",
+            nearest=tuple(map(info.trial, decision.neighbours.tolist())) if info.trials else (),
             decision=decision,
         )
+
+
+def _flags(doubts: Mapping[str, bool]) -> tuple[str, ...]:
+    """The names of the doubts that hold."""
+    return tuple(flag for flag, holds in doubts.items() if holds)
 
 
 def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:

@@ -75,6 +75,11 @@ class Recording:
         names = self.meta.get("joint_names")
         return None if names is None else tuple(names)
 
+    @property
+    def dof(self) -> int | None:
+        """Number of joint angles in a frame, or None without any."""
+        return None if self.joints is None else self.joints.shape[1]
+
     def for_joints(self, names: Sequence[str], where: str = "recording") -> Recording:
         """The recording with the angles of these joints, in this order.
 

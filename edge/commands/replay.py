@@ -41,8 +41,7 @@ def suited(model: Model, recording: Recording, name: str) -> Recording:
     """
     if model.info.chain is not None:
         recording = recording.for_joints(model.info.chain.names, name)
-    joints = recording.joints
-    require_joints(model, None if joints is None else joints.shape[1], name)
+    require_joints(model, recording.dof, name)
     return recording
 
 

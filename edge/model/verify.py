@@ -113,7 +113,7 @@ def _path(
     windows = (info.window_s, *info.decision_points_s)
     onsets, integers, vectors = [], [], []
     for i, trial in enumerate(_trials(arrays, meta)):
-        require_joints(model, None if trial.joints is None else trial.joints.shape[1], f"trial {i}")
+        require_joints(model, trial.dof, f"trial {i}")
         contact = first_series(trial, model)
         if contact is None:
             continue
