@@ -1,4 +1,4 @@
-"""Scaling of feature vectors: an offset and a gain for each feature type."""
+"""Scaling of feature vectors: a gain for each feature type."""
 
 from __future__ import annotations
 
@@ -69,8 +69,8 @@ def scale_of(
     method: str,
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Offset and gain of each feature type: scaled = (x - offset) * gain.
+) -> NDArray[np.float64]:
+    """Gain of each feature type. The methods' offsets are left out, as centring takes them away.
 
     The statistics are over all samples of a feature type in all trials (paper, section IV-D),
     not over columns. Where a maximum or a standard deviation is 0 the type is dropped (gain 0):
@@ -84,33 +84,28 @@ def scale_of(
         widths: columns of each; equal where None.
 
     Returns:
-        (features,) and (features,).
+        (features,).
 
     Raises:
         InputError: the method is unknown, or the columns are not those of the features.
     """
     types = len(features)
     ends = np.cumsum(widths_of(X.shape[1], features, widths))
-    if method == "none":
-        return np.zeros(types), np.ones(types)
+    if method in ("none", "III"):
+        return np.ones(types)
     blocks = np.split(X, ends[:-1], axis=1)
     powers = np.array([_exponents(block, (0, 1)) for block in blocks], dtype=np.int32)
     small = [np.ldexp(block, -power) for block, power in zip(blocks, powers, strict=True)]
     mean = np.array([block.mean() for block in small])
     largest = np.array([np.abs(block).max(initial=0.0) for block in small])
-    ones, zeros = np.ones(types), np.zeros(types)
 
     def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
         gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
         with np.errstate(over="ignore"):  # what is then infinite is refused
             return np.asarray(np.ldexp(gain, -powers))
 
-    if method == "I":
-        return np.ldexp(mean, powers), inverse(largest)
-    if method == "II":
-        return zeros, inverse(largest)
-    if method == "III":
-        return np.ldexp(mean, powers), ones
+    if method in ("I", "II"):
+        return inverse(largest)
     if method == "IV":
         squares = []
         for name, block, middle in zip(features, small, mean, strict=True):
@@ -121,15 +116,15 @@ def scale_of(
         deviation = np.sqrt(squares)
         # A spread below the rounding of its own mean is no spread.
         deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
-        return np.ldexp(mean, powers), inverse(deviation)
+        return inverse(deviation)
     if method == "V":
-        gain = ones.copy()
+        gain = np.ones(types)
         magnitudes = np.ldexp(largest, powers)
         ranges = [magnitudes[i] for i, name in enumerate(features) if name in FEATURES[:2]]
         if ranges and FEATURES[2] in features:
             motion = list(features).index(FEATURES[2])
             gain[motion] = max(ranges) * inverse(largest)[motion]
-        return zeros, gain
+        return gain
     raise InputError(f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}")
 
 
@@ -151,7 +146,7 @@ def centred_and_scaled(
     X = np.ascontiguousarray(X, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         mean = column_means(X)
-        _, gains = scale_of(X, method, features, widths)
+        gains = scale_of(X, method, features, widths)
         gain = np.repeat(gains, widths_of(X.shape[1], features, widths))
         d = (X - mean) * gain
     largest = float(np.abs(d).max(initial=0.0))

@@ -143,3 +143,9 @@ def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_p
     subprocess.run(["sh", "-c", redirected], cwd=ROOT, timeout=60)
     assert Path(f"{log}.status").read_text() == "0\n"
     assert "Traceback" not in Path(f"{log}.err").read_text()
+
+
+def test_the_module_of_the_command_line_runs_it():
+    command = [sys.executable, "-m", "edge.cli", "--version"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == f"edge-classify {__version__}\n"
