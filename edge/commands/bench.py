@@ -20,7 +20,6 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -190,14 +189,12 @@ def cold_start_ms(path: str) -> float:
 
 def machine() -> dict[str, Any]:
     """A description of this machine."""
-    versions = {"edge-classify": __version__, "python": platform.python_version()}
-    versions |= {"numpy": np.__version__, "onnxruntime": version("onnxruntime")}
     return {
         "name": platform.node(),
         "kind": kind(),
         "cores": os.cpu_count(),
         "system": platform.platform(),
-        "versions": versions,
+        "edge-classify": __version__,
     }
 
 

@@ -1,27 +1,21 @@
 """Describe a model, or compare two: tasks, labels, accuracy, features, data, skin and arm.
 
 Prints a model's tasks with their labels and accuracy, its features and training data, and the skin
-and arm that it needs; also its size, and the time of a decision on this machine. Of two models it
-prints what differs.
+and arm that it needs, and its size. Of two models it prints what differs.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import statistics
 from typing import Any
 
-import numpy as np
-
-from edge.commands.bench import timed
 from edge.commands.output import Output, wrapped
 from edge.model.info import ModelInfo
 from edge.model.model import Model
 
-ROUNDS = 200
 COARSE = ("kernels", "novelty", "stopping", "units")
-"""Tables whose parts are not compared one by one."""
+"""Tables that are compared as a whole."""
 NAMED = 6
 """Names that a line has at most."""
 
@@ -32,28 +26,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("other", nargs="?", metavar="other.onnx", help="compare with this model")
 
 
-def decision_us(model: Model) -> float:
-    """Median microseconds of a decision on this machine."""
-    vector = np.zeros(model.info.width)
-    return statistics.median(timed(lambda _: model.decide(vector), range(ROUNDS)))
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Print the description, or what differs."""
     output, model = Output.of(arguments), Model(arguments.model)
     if arguments.other is None:
-        about = {**described(model), "decision_us": round(decision_us(model), 1)}
-        output.event(about, text(model.info, about))
+        about = described(model)
+        output.event(about, description(model.info, about))
         return 0
     changes = differences(described(model), described(Model(arguments.other)))
     lines = [line for key, pair in changes.items() for line in wrapped(change_text(key, *pair))]
-    said = "\n".join(lines) or "the models do not differ"
-    output.event({"event": "comparison", "changes": changes}, said)
+    text = "\n".join(lines) or "the models do not differ"
+    output.event({"event": "comparison", "changes": changes}, text)
     return 0
 
 
 def described(model: Model) -> dict[str, Any]:
-    """What a program is told of a model."""
+    """A model's event: file, version, size and metadata."""
     return {
         "event": "model",
         "file": model.path,
@@ -67,8 +55,10 @@ def differences(a: Any, b: Any, key: str = "") -> dict[str, list[Any]]:
     """{key, such as `tasks.object.k`: its values in a and b} where they differ; None for none."""
     if not (isinstance(a, dict) and isinstance(b, dict)) or key in COARSE:
         return {} if a == b else {key: [a, b]}
-    parts = (differences(a.get(k), b.get(k), f"{key}.{k}".strip(".")) for k in {**a, **b})
-    return {name: pair for part in parts for name, pair in part.items()}
+    changes: dict[str, list[Any]] = {}
+    for name in {**a, **b}:
+        changes |= differences(a.get(name), b.get(name), f"{key}.{name}".strip("."))
+    return changes
 
 
 def change_text(key: str, a: Any, b: Any) -> str:
@@ -91,7 +81,7 @@ def _some(values: list[Any]) -> str:
     return ", ".join(map(str, values[:NAMED])) + (f" and {rest} more" if rest > 0 else "")
 
 
-def text(info: ModelInfo, about: dict[str, Any]) -> str:
+def description(info: ModelInfo, about: dict[str, Any]) -> str:
     """The description for a person."""
     skin, chain = info.layout, info.chain
     named = f"{info.name} " if info.name else ""
@@ -123,7 +113,6 @@ def text(info: ModelInfo, about: dict[str, Any]) -> str:
         "rate is certified."
         if info.taught
         else "",
-        f"A decision takes {about['decision_us']:g} us on this machine (median).",
     ):
         lines += wrapped(sentence)
     return "\n".join(lines)

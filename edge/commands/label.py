@@ -60,24 +60,15 @@ def changed(
     """A recording's metadata with tasks renamed (`names`), and with new labels.
 
     Raises:
-        InputError: a recording has a task of the new name, or its contacts have labels of the task.
+        InputError: the recording has a task of the new name, or its contacts have their own labels.
     """
-
-    def renamed(own: Mapping[str, str]) -> dict[str, str]:
-        for old, new in names.items():
-            if old in own and new in own:
-                raise InputError(
-                    f"{name}: has a label for {new} already; {old} cannot take its name"
-                )
-        return {names.get(task, task): label for task, label in own.items()}
-
-    each = meta.get("contacts")
-    contacts = [own for own in each if isinstance(own, dict)] if isinstance(each, list) else []
-    for task in labels:
-        if any(task in own for own in contacts):
-            raise InputError(
-                f"{name}: its contacts have labels of their own for {task}; "
-                "`python -m train split` makes a recording of each"
-            )
-    out = {**meta, "labels": {**renamed(meta.get("labels", {})), **labels}}
-    return {**out, "contacts": [renamed(own) for own in contacts]} if contacts else out
+    own = meta.get("labels", {})
+    for old, new in names.items():
+        if old in own and new in own:
+            raise InputError(f"{name}: has a label for {new} already; {old} cannot take its name")
+    if meta.get("contacts") and (names or labels):
+        raise InputError(
+            f"{name}: its contacts have labels of their own; `python -m train split` makes a "
+            "recording of each"
+        )
+    return {**meta, "labels": {**{names.get(task, task): own[task] for task in own}, **labels}}
