@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from edge.fake.clock import VirtualClock
-from edge.i2c.bus import LARGEST_BYTES, LARGEST_MESSAGES, Message, Transfer, bus_error, wire_bits
+from edge.i2c.bus import Message, Transfer, bus_error, wire_bits
 from edge.i2c.chip import FakeChip
 from edge.i2c.tca9548a import FakeTCA9548A
 
@@ -20,8 +20,7 @@ class FakeBus:
     """A bus with chips and muxes.
 
     It refuses the shapes that some real adapter refuses: a read anywhere but last (EOPNOTSUPP,
-    Raspberry Pi up to 4), a second address in one call (EINVAL, Pi 5), more than 42 messages
-    or 8192 bytes (linux/i2c-dev.h).
+    Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
 
     >>> from edge.i2c.bus import fetch, send
     >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
@@ -99,8 +98,8 @@ class FakeBus:
             raise bus_error(errno.EREMOTEIO, self.name, address)
 
     def _refuse(self, messages: Sequence[Message]) -> None:
-        address, long = messages[0].address, len(messages) > LARGEST_MESSAGES
-        if long or any(m.address != address or len(m.buffer) > LARGEST_BYTES for m in messages):
+        address = messages[0].address
+        if any(message.address != address for message in messages):
             raise bus_error(errno.EINVAL, self.name, address)
         if any(message.read for message in messages[:-1]):
             raise bus_error(errno.EOPNOTSUPP, self.name, address)
@@ -126,7 +125,8 @@ class FakeBus:
     def stop(self) -> None:
         """End a transaction."""
         for chip in self.chips.values():
-            chip.stop()
+            if isinstance(chip, FakeTCA9548A):
+                chip.stop()
 
     def spend(self, bits: int) -> None:
         """Count bits on the wire, and let their time pass where timed."""

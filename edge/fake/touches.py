@@ -44,20 +44,20 @@ def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str
         seed: of place, strength and speed.
     """
     sources = [(path, load(path)) for path in demo.recordings()]
+
+    def trial(kind: int, *number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        rng = np.random.default_rng([seed, kind, *number])
+        return _mapped(sources[kind][1], file.layout, file.reading.rate_hz, rng)
+
     counts_per_newton = file.layout.counts_per_newton
     if counts_per_newton is None:
-        rate = file.reading.rate_hz
-        weakest = min(
-            _mapped(source, file.layout, rate, np.random.default_rng([seed, kind]))[1].max()
-            for kind, (_, source) in enumerate(sources)
-        )
+        weakest = min(trial(kind)[1].max() for kind in range(len(sources)))
         counts_per_newton = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
     most = reach(file)
     covered = Decoder(file).served.reshape(file.layout.shape)
     for number in range(trials):
         for kind, (path, source) in enumerate(sources):
-            rng = np.random.default_rng([seed, kind, number])
-            t, forces = _mapped(source, file.layout, file.reading.rate_hz, rng)
+            t, forces = trial(kind, number)
             counts = np.minimum(np.rint(forces * counts_per_newton), most)
             name = f"{path.stem}-{number:03}"
             meta = {

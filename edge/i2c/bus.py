@@ -30,9 +30,6 @@ I2C_SLAVE = 0x0703
 I2C_RDWR = 0x0707
 ADAPTERS = Path("/sys/class/i2c-dev")
 """A folder for each adapter, named as its device and with the adapter's name in the file `name`."""
-LARGEST_MESSAGES = 42
-LARGEST_BYTES = 8192
-"""Limits of one I2C_RDWR call (linux/i2c-dev.h)."""
 
 
 class BusError(EdgeError):

@@ -100,9 +100,6 @@ class FakeChip(ABC):
     def reset(self) -> None:
         """Lose all settings, as in a brown-out."""
 
-    def stop(self) -> None:  # noqa: B027 - most chips do nothing at STOP
-        """End the transaction."""
-
 
 @dataclass(frozen=True)
 class Defaults:

@@ -62,7 +62,7 @@ class Chain:
         """Make a chain of joints; a joint of the kind "fixed" takes no angle.
 
         Raises:
-            InputError: a joint's axis is zero, or a number is not finite.
+            InputError: a joint's axis has no direction, or its limits are swapped.
         """
         self.joints = tuple(joints)
         self.base, self.tip = base, tip
@@ -265,11 +265,8 @@ def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
 
 
 def _check_joint(joint: Joint) -> None:
-    numbers = (math.hypot(*joint.axis), *joint.origin_xyz, *joint.origin_rpy, *joint.translate)
-    if not all(math.isfinite(x) for x in numbers):
-        raise InputError(f"joint {joint.name}: a number is not finite")
-    if joint.kind != "fixed" and math.hypot(*joint.axis) < 1e-9:
-        raise InputError(f"joint {joint.name}: its axis is zero; give a direction")
+    if joint.kind != "fixed" and not 1e-9 <= math.hypot(*joint.axis) < math.inf:
+        raise InputError(f"joint {joint.name}: its axis is zero or too long; give a direction")
     if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
         raise InputError(
             f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its upper limit "

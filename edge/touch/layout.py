@@ -17,6 +17,8 @@ from edge.errors import InputError
 RELEASE_S = 0.3
 """Longer than an arm bounces off a rigid object, and shorter than the time to a second tap."""
 LONGEST_RELEASE_S = 60.0
+MOST_LINES = 1024
+"""Most rows, and most columns."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +52,6 @@ class SkinLayout:
     """A contact ends after so many seconds with no taxel above the threshold."""
 
     def __post_init__(self) -> None:
-        if not (1 <= self.rows <= 1024 and 1 <= self.cols <= 1024):
-            raise InputError(f"skin: {self.rows} x {self.cols} taxels; each must be 1 to 1024")
-        if not 0.0 < self.release_s <= LONGEST_RELEASE_S:
-            raise InputError(
-                f"skin: release_s must be above 0 and at most {LONGEST_RELEASE_S:g} seconds, "
-                f"not {self.release_s!r}"
-            )
-        if self.column_angles_deg is not None and len(self.column_angles_deg) != self.cols:
-            raise InputError(
-                f"skin: column_angles_deg has {len(self.column_angles_deg)} values "
-                f"for {self.cols} columns"
-            )
         if any(not 0 <= i < self.rows * self.cols for i in self.dead):
             raise InputError(f"skin: dead has a taxel that is not 0 to {self.rows * self.cols - 1}")
         if self.radius_m is not None and self.pitch_m is None:
@@ -152,14 +142,16 @@ class SkinLayout:
         """
         table = ConfigTable(skin, where, "skin.")
         values: dict[str, Any] = {
-            name: table.whole(name, allowed=range(65536))
-            for name in ("rows", "cols", "threshold_counts", "onset_counts")
-            if name in ("rows", "cols") or table.has(name)
+            name: table.whole(name, allowed=range(1, MOST_LINES + 1)) for name in ("rows", "cols")
         }
+        for name in ("threshold_counts", "onset_counts"):
+            if table.has(name):
+                values[name] = table.whole(name, allowed=range(65536))
         values["wraps"] = table.flag("wraps", False)
         for name in ("radius_m", "counts_per_newton", "release_s"):
+            high = LONGEST_RELEASE_S if name == "release_s" else math.inf
             if table.has(name):
-                values[name] = table.number(name, low=0.0, open_low=True)
+                values[name] = table.number(name, low=0.0, high=high, open_low=True)
         if table.has("row0_z_m"):
             values["row0_z_m"] = table.number("row0_z_m")
         if isinstance(table.get("pitch_m", None), list | tuple):
@@ -167,7 +159,7 @@ class SkinLayout:
         elif table.has("pitch_m"):
             values["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
         if table.has("column_angles_deg"):
-            values["column_angles_deg"] = table.numbers("column_angles_deg")
+            values["column_angles_deg"] = table.numbers("column_angles_deg", values["cols"])
         values["dead"] = table.wholes("dead", ())
         try:
             return cls(**values)
