@@ -237,7 +237,7 @@ demo-data: $(READY)
 
 HARD := $(OUT)/hard-cases
 
-# Includes the answers of another ONNX Runtime, and of an aarch64 after `make board-test`.
+# Includes the answers of another ONNX Runtime.
 hard-cases: hard-cases-versions
 	$(BIN)/python -m tests.hard_cases --out $(HARD)
 

@@ -9,21 +9,17 @@ from edge.touch.features import WINDOW_S, feature_vector
 from edge.touch.track import ContactTracker, first_contact
 from train.feature_sets import SETS
 
-FRAMES = 120
-
 
 @pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
 def bench_features(against, note, name):
     features, recording = SETS[name], load(FOLDER / "pillow-movable.npz")
+    arm = {"chain": Chain.cody(), "joints": recording.joints.shape[1]}
 
     def tracker():
-        joints = recording.joints.shape[1]
-        return ContactTracker(
-            recording.layout, chain=Chain.cody(), features=features, joints=joints
-        )
+        return ContactTracker(recording.layout, features=features, **arm)
 
     onset_s, series = first_contact(recording, tracker())
-    frames = [frame for frame in recording if frame.t >= onset_s][:FRAMES]
+    frames = [frame for frame in recording if frame.t >= onset_s]
 
     def follow():
         tracked = tracker()

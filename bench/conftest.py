@@ -1,12 +1,14 @@
 """Speed as a ratio: each round times the rivals and then ours.
 
-A benchmark calls `against(ours, {"rival": callable}, ...)`. Alternating rounds keep the ratio fair
-on a machine whose speed drifts; the ratio is the median over the rounds, printed beside its target.
+A benchmark calls `against(ours, {"rival": callable}, ...)`. Alternating rounds and processor time
+keep the ratio fair on a machine whose speed drifts and that other programs share; the ratio is the
+median over the rounds, printed beside its target.
 """
 
 from __future__ import annotations
 
 import statistics
+import time
 import timeit
 
 import pytest
@@ -29,15 +31,16 @@ def note(request, capsys):
 def against(note):
     """Times ours beside its rivals; returns seconds of ours.
 
-    Each of the rounds has so many calls. `most` is {rival: largest allowed ours / rival}.
+    Each of the rounds has so many calls. `most` is {rival: largest allowed ours / rival}; `timer`
+    counts processor time of all threads, unless other processes are timed.
     """
 
-    def run(ours, rivals, *, most=None, calls=20, rounds=25):
+    def run(ours, rivals, *, most=None, calls=20, rounds=25, timer=time.process_time):
         functions = [*rivals.values(), ours]
         for function in functions:
             function()
         seconds = [
-            [timeit.timeit(function, number=calls) / calls for function in functions]
+            [timeit.timeit(function, number=calls, timer=timer) / calls for function in functions]
             for _ in range(rounds)
         ]
         mine = statistics.median(row[-1] for row in seconds)

@@ -49,9 +49,8 @@ def main() -> int:
     touches[::2] = 0  # a second of contact, a second without
     faults = [Fault(code=code, rate=0.0005) for code in (errno.EREMOTEIO, errno.EIO)]
     file = skinfile.load(skinfile.shipped("cody"))
-    every = round(arguments.every * 6000)
-    before: tuple[int, int] | None = None
-    largest = written = 0
+    seen: list[tuple[float, int, int]] = []
+    written = 0
     print("| minute | frames | events | ticks left out | lines lost | descriptors | kB |")
     print("|---|---|---|---|---|---|---|", flush=True)
     with (
@@ -62,14 +61,13 @@ def main() -> int:
     ):
         listener.bind(("127.0.0.1", 0))
         listener.setblocking(False)
-        place = Path(folder) / "map.jsonl"
-        waiting = {"patient": lambda: True}
-        writer = map_writer(place, model.info, **waiting)
+        place, waiting = Path(folder) / "map.jsonl", {"patient": lambda: True}
         port = listener.getsockname()[1]
-        lines = Lines(out, f"127.0.0.1:{port}", more=[writer], **waiting)
+        more = [map_writer(place, model.info, **waiting)]
+        lines = Lines(out, f"127.0.0.1:{port}", more=more, **waiting)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * arguments.minutes)
-        pose = np.zeros(model.info.chain.dof if model.info.chain else 0)
+        pose = np.zeros(model.info.chain.dof)
         for frames, frame in enumerate(loop.frames(), 1):
             frame = type(frame)(frame.t, frame.counts, frame.valid, frame.times, pose)
             events = [event.to_dict() for event in classifier.push(frame)]
@@ -79,22 +77,20 @@ def main() -> int:
                 with suppress(BlockingIOError):
                     while listener.recv(65536):
                         pass
-            if frames % every == 0:
+            if frames % round(arguments.every * 6000) == 0:
                 gc.collect()
-                now = process.memory_info().rss // 1024, process.num_fds()
-                largest = max(largest, now[0])
-                if before is None or frames <= arguments.minutes * 600:
-                    before = now
-                print(
-                    f"| {frames / 6000:g} | {frames} | {written} | {loop.schedule.missed_ticks} "
-                    f"| {sum(lines.lost.values())} | {now[1]} | {now[0]} |",
-                    flush=True,
-                )
+                minute, lost = frames / 6000, sum(lines.lost.values())
+                seen.append((minute, process.memory_info().rss // 1024, process.num_fds()))
+                cells = frames, written, loop.schedule.missed_ticks, lost, *seen[-1][:0:-1]
+                print(f"| {minute:g} | {' | '.join(map(str, cells))} |", flush=True)
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
     print(f"{placed} contacts on the map")
     lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
-    flat = before is not None and largest - before[0] <= GROWTH_KB and now[1] == before[1]
+    early = [row for row in seen if row[0] <= arguments.minutes / 10] or seen[:1]
+    _, kilobytes, descriptors = early[-1]
+    grown = max(row[1] for row in seen) - kilobytes
+    flat = grown <= GROWTH_KB and seen[-1][2] == descriptors
     return 0 if flat and lost == 0 and placed else 1
 
 

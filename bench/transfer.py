@@ -51,43 +51,44 @@ SLIDES_M, WINDOW_S = 0.02, 1.2
 DRAWS = 50
 
 
-def draw_object(rng: np.random.Generator) -> Thing:
-    """One object's properties, from other ranges than those of any scene in train/."""
-    kind = str(rng.choice(["box", "drum", "foam", "cushion", "plant", "bale"]))
-    soft = {"foam": (3e3, 18e3), "cushion": (1.2e3, 5e3), "bale": (5e3, 12e3)}
-    between = partial(log_uniform, rng)
-    return Thing(
-        kind=kind,
-        mass_kg=between(0.25, 2.2),
-        floor=float(rng.uniform(0.25, 0.6)),
-        skin=float(rng.uniform(0.25, 0.65)),
-        height_m=float(rng.uniform(0.12, 0.45)),
-        breadth_m=float(rng.uniform(0.06, 0.4)),
-        stems=int(rng.integers(5, 12)),
-        stem_n_m=between(3.0, 25.0),
-        thick_m=float(rng.uniform(0.06, 0.16)),
-        modulus_pa=between(*soft.get(kind, (1.0, 2.0))),
-        seed=int(rng.integers(2**31)),
-    )
-
-
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """A draw, even in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
+def draw_body(
+    rng: np.random.Generator, kinds: list[str], mass_kg: tuple[float, float], narrowest_m: float
+) -> Thing:
+    """The properties that all things have."""
+    return Thing(
+        kind=str(rng.choice(kinds)),
+        mass_kg=log_uniform(rng, *mass_kg),
+        floor=rng.uniform(0.25, 0.6),
+        skin=rng.uniform(0.25, 0.65),
+        height_m=rng.uniform(0.12, 0.45),
+        breadth_m=rng.uniform(narrowest_m, 0.4),
+    )
+
+
+def draw_object(rng: np.random.Generator) -> Thing:
+    """One object's properties, from other ranges than those of any scene in train/."""
+    kinds = ["box", "drum", "foam", "cushion", "plant", "bale"]
+    body = draw_body(rng, kinds, (0.25, 2.2), 0.06)
+    soft = {"foam": (3e3, 18e3), "cushion": (1.2e3, 5e3), "bale": (5e3, 12e3)}
+    return replace(
+        body,
+        stems=int(rng.integers(5, 12)),
+        stem_n_m=log_uniform(rng, 3.0, 25.0),
+        thick_m=rng.uniform(0.06, 0.16),
+        modulus_pa=log_uniform(rng, *soft.get(body.kind, (1.0, 2.0))),
+        seed=int(rng.integers(2**31)),
+    )
+
+
 def draw_odd(rng: np.random.Generator) -> Thing:
     """A door, a drawer, a thick cloth over something light, or a person's arm."""
+    body = draw_body(rng, ["door", "drawer", "cloth", "limb"], (1.0, 3.0), 0.1)
     between = partial(log_uniform, rng)
-    kind = str(rng.choice(["door", "drawer", "cloth", "limb"]))
-    plain = Thing(
-        kind,
-        mass_kg=between(1.0, 3.0),
-        floor=float(rng.uniform(0.25, 0.6)),
-        skin=float(rng.uniform(0.25, 0.65)),
-        height_m=float(rng.uniform(0.12, 0.45)),
-        breadth_m=float(rng.uniform(0.1, 0.4)),
-    )
     slide = f'<joint type="slide" axis="1 0 0" frictionloss="{between(0.5, 4.0)}" damping="2"/>'
     hinge = (
         f'<joint type="hinge" axis="0 0 1" pos="0 {rng.choice([-1, 1]) * between(0.3, 0.7)} 0" '
@@ -99,12 +100,12 @@ def draw_odd(rng: np.random.Generator) -> Thing:
         "cloth": {"modulus_pa": between(1.5e3, 5e3), "thick_m": between(0.03, 0.06)},
         "limb": {
             "joint": slide,
-            "height_m": float(rng.uniform(0.07, 0.11)),
+            "height_m": rng.uniform(0.07, 0.11),
             "modulus_pa": between(8e3, 35e3),
-            "thick_m": float(rng.uniform(0.02, 0.04)),
+            "thick_m": rng.uniform(0.02, 0.04),
         },
     }
-    return replace(plain, **changes[kind])
+    return replace(body, **changes[body.kind])
 
 
 def draw_touch(
@@ -115,11 +116,11 @@ def draw_touch(
         thing=thing,
         fixed=fixed,
         start_rad=tuple(np.radians(rng.normal(0.0, (0.5, 1.0, 1.0, 3.0, 3.0)))),
-        place_m=PLACE_M + float(rng.normal(0.0, 0.015)),
-        aside_m=float(rng.normal(0.0, 0.01)),
-        yaw_rad=float(rng.normal(0.0, 0.03)),
+        place_m=PLACE_M + rng.normal(0.0, 0.015),
+        aside_m=rng.normal(0.0, 0.01),
+        yaw_rad=rng.normal(0.0, 0.03),
         slope_rad=math.radians(rng.normal(0.0, 0.7)),
-        taxel_n_m=float(np.exp(rng.uniform(np.log(5e3), np.log(1.5e4)))),
+        taxel_n_m=log_uniform(rng, 5e3, 1.5e4),
         noise=(6.0, rng),
     )
     return replace(touch, **{name: getattr(touch, name) * by for name, by in habit.items()})

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+CHECKOUT = Path(__file__).resolve().parents[1]
 APT = """\
 APT::Architecture "{architecture}";
 APT::Architectures {{ "{architecture}"; }};
@@ -41,44 +42,52 @@ def skipping() -> Iterator[None]:
         pytest.skip(str(error))
 
 
-def once(target: Path, wanted: str, make: Callable[[Path], None]) -> None:
-    """Make a folder, unless it was made from the same `wanted` before.
-
-    A folder whose making fails is not kept.
-    """
+def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
+    """Make a folder, unless it was made by the same recipe before; a failed one is not kept."""
     stamp = target / ".made-from"
-    digest = hashlib.sha256(wanted.encode()).hexdigest()
-    if stamp.is_file() and stamp.read_text() == digest:
-        return
-    fresh = target.with_name(target.name + ".new")
-    for old in (fresh, target):
-        shutil.rmtree(old, ignore_errors=True)
-    make(fresh)
-    (fresh / ".made-from").write_text(digest)
-    fresh.rename(target)
+    digest = hashlib.sha256(recipe.encode()).hexdigest()
+    if not (stamp.is_file() and stamp.read_text() == digest):
+        fresh = target.with_name(target.name + ".new")
+        for old in (fresh, target):
+            shutil.rmtree(old, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        make(fresh)
+        (fresh / stamp.name).write_text(digest)
+        fresh.rename(target)
+    return target
 
 
-def unpack(target: Path, architecture: str, packages: Sequence[str]) -> None:
-    """Unpack packages and their dependencies; their installation scripts do not run.
+def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
+    """A folder with packages and their dependencies; their installation scripts do not run.
 
     Raises:
         Unavailable: apt cannot fetch them.
     """
-    apt = target.with_name(target.name + ".apt")
-    shutil.rmtree(apt, ignore_errors=True)
-    for part in ("lists/partial", "archives/partial"):
-        (apt / part).mkdir(parents=True)
-    (apt / "status").touch()
-    config = apt / "apt.conf"
-    config.write_text(APT.format(architecture=architecture, folder=apt))
-    hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
-    get = ["env", f"APT_CONFIG={config}", "apt-get", "--quiet"]
-    run([*get, "update"], hint)
-    run([*get, "install", "--download-only", "--yes", *packages], hint)
-    target.mkdir(parents=True)
-    for archive in sorted((apt / "archives").glob("*.deb")):
-        run(["dpkg", "--extract", str(archive), str(target)])
-    shutil.rmtree(apt)
+
+    def unpack(fresh: Path) -> None:
+        apt = fresh.with_suffix(".apt")
+        shutil.rmtree(apt, ignore_errors=True)
+        for folder in ("lists/partial", "archives/partial"):
+            (apt / folder).mkdir(parents=True)
+        (apt / "status").touch()
+        config = apt / "apt.conf"
+        config.write_text(APT.format(architecture=architecture, folder=apt))
+        hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
+        get = ["env", f"APT_CONFIG={config}", "apt-get", "--quiet"]
+        run([*get, "update"], hint)
+        run([*get, "install", "--download-only", "--yes", *packages], hint)
+        for archive in sorted((apt / "archives").glob("*.deb")):
+            run(["dpkg", "--extract", str(archive), str(fresh)])
+        shutil.rmtree(apt)
+
+    return once(target, "\n".join((architecture, *packages)), unpack)
+
+
+def program(system: Path, name: str) -> list[str]:
+    """The command of a program among unpacked packages, with their loader and libraries."""
+    loader = next(system.glob("lib*/ld-linux*"))
+    libraries = {str(path.parent) for path in system.rglob("*-linux-gnu*/lib*.so.*")}
+    return [str(loader), "--library-path", ":".join(libraries), f"{system}/usr/bin/{name}"]
 
 
 def run(command: Sequence[str], hint: str = "") -> str:

@@ -1,4 +1,4 @@
-"""The wheel on aarch64 under qemu: numbers as on x86, tests of the edge, instructions executed.
+"""The wheel on aarch64 under qemu: the same numbers as on x86, and the instructions executed.
 
 `make board-test` builds the wheel and runs this. Without apt or a network the tests are skipped
 with the reason, except in CI.
@@ -6,56 +6,32 @@ with the reason, except in CI.
 
 import csv
 import json
-import os
 import shutil
 import statistics
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).resolve().parent
-CHECKOUT = HERE.parent
-sys.path.insert(0, str(HERE))
-
-import aarch64  # noqa: E402
-import debian  # noqa: E402
-
-from edge.demo import FOLDER, MODEL  # noqa: E402
-from tests.hard_cases import elsewhere  # noqa: E402
-from tests.hard_cases import golden as hard_golden  # noqa: E402
+from board import aarch64, debian
+from board.debian import CHECKOUT
+from edge.demo import FOLDER, MODEL
+from tests.hard_cases import elsewhere
+from tests.hard_cases import golden as hard_golden
 
 TABLE = aarch64.FOLDER / "instructions.csv"
-EMULATED = ("touch", "model", "skin", "test_classifier.py", "test_recording.py")
-"""Tests of edge/ that compute; commands, drivers and fakes are the same Python everywhere."""
 
 
 @pytest.fixture(scope="session")
-def python():
-    (wheel,) = sorted((CHECKOUT / "dist").glob("edge_classify-*.whl"))
+def counts(tmp_path_factory):
+    return tmp_path_factory.mktemp("counts") / "counts"
+
+
+@pytest.fixture(scope="session")
+def python(counts):
+    (wheel,) = (CHECKOUT / "dist").glob("edge_classify-*.whl")
     with debian.skipping():
-        return aarch64.build(wheel)
-
-
-@pytest.fixture(scope="session")
-def run(python, tmp_path_factory):
-    """Runs the emulated Python on the wheel, away from the checkout; returns what it printed."""
-    work = tmp_path_factory.mktemp("work")
-
-    def run(*arguments, **environment):
-        done = subprocess.run(
-            [python, *map(str, arguments)],
-            cwd=work,
-            env={**os.environ, "PYTHONPATH": "", **environment},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
-
-    return run
+        return aarch64.python(wheel, counts)
 
 
 def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_bound(
@@ -63,15 +39,12 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
 ):
     """In one process, as its start takes long: shipped model, the tests' model, the hard cases."""
     assert hard_golden.main(["--out", str(tmp_path)]) == 0
-    tests = CHECKOUT / "tests" / "golden"
-    for name, model, outputs in (
-        ("demo", MODEL, tests / "demo.npz"),
-        ("tests", exported / "model.onnx", exported / "golden.npz"),
-    ):
-        (tmp_path / name).mkdir()
-        shutil.copy(model, tmp_path / name / "model.onnx")
-        shutil.copy(outputs, tmp_path / name / "golden.npz")
-    machine, shares = elsewhere.ask(tmp_path, [str(python)])
+    golden = CHECKOUT / "tests" / "golden" / "demo.npz"
+    shutil.copytree(exported, tmp_path / "tests")
+    (tmp_path / "demo").mkdir()
+    shutil.copy(MODEL, tmp_path / "demo" / "model.onnx")
+    shutil.copy(golden, tmp_path / "demo" / "golden.npz")
+    machine, shares = elsewhere.ask(tmp_path, python)
     assert machine["machine"] == "aarch64"
     assert {name for name, _ in shares} == {folder.name for folder in elsewhere.sets(tmp_path)}
     assert {("demo", "series counts"), ("demo", "object_label")} <= set(shares)
@@ -79,10 +52,12 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
     assert {key: share for key, share in shares.items() if share > 1.0} == {}
 
 
-def test_the_demo_prints_the_same_lines(run):
-    demo = ("-m", "edge", "demo")
-    native = subprocess.run([sys.executable, *demo], capture_output=True, text=True, check=True)
-    assert timeless(run(*demo)) == timeless(native.stdout)
+def test_the_demo_prints_the_same_lines(python, tmp_path):
+    emulated, native = (
+        subprocess.check_output([*command, "-m", "edge", "demo"], cwd=folder, text=True)
+        for command, folder in ((python, tmp_path), ([sys.executable], CHECKOUT))
+    )
+    assert timeless(emulated) == timeless(native)
 
 
 def timeless(text):
@@ -92,35 +67,18 @@ def timeless(text):
     return [{k: v for k, v in line.items() if k != "latency_ms"} for line in lines]
 
 
-def test_the_tests_of_the_edge_pass(run, exported):
-    printed = run(
-        *("-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", "-p", "emulated"),
-        *("-c", CHECKOUT / "pyproject.toml", "--rootdir", CHECKOUT, "-o", "pythonpath="),
-        *("--durations=10", *(CHECKOUT / "tests" / "edge" / name for name in EMULATED)),
-        EDGE_CLASSIFY_EXPORTED=str(exported),
-        PYTHONPATH=f"{HERE}:{CHECKOUT}",  # comes after the wheel
-    )
-    print(printed)
-
-
-def test_instructions_per_frame_and_per_decision_are_counted(run, tmp_path):
+def test_the_instructions_of_each_kind_of_frame_are_counted(python, counts, tmp_path):
     """Instruction counts do not depend on the speed of the machine."""
-    counts, touch = tmp_path / "counts", FOLDER / "cardboard-box-movable.npz"
-    environment = {"QEMU_COUNT": str(counts), "PYTHONHASHSEED": "0"}
-    steps = run(HERE / "count_guest.py", MODEL, touch, **environment).splitlines()
+    program = [CHECKOUT / "board" / "count_guest.py", MODEL, FOLDER / "cardboard-box-movable.npz"]
+    printed = subprocess.check_output([*python, *program], cwd=tmp_path, text=True)
     marks = [int(line) for line in counts.read_text().split()][:-1]  # the last marks the end
-    table: dict[str, list[int]] = {}
-    for step, before, after in zip(steps, marks[::2], marks[1::2], strict=True):
-        table.setdefault(step, []).append(after - before)
-    nothing = min(table.pop("nothing"))
-    rows = [
-        (step, len(seen), *(round(f(seen)) - nothing for f in (min, statistics.median, max)))
-        for step, seen in table.items()
-    ]
+    instructions: dict[str, list[int]] = {}
+    for kind, before, after in zip(printed.splitlines(), marks[::2], marks[1::2], strict=True):
+        instructions.setdefault(kind, []).append(after - before)
+    medians = {kind: statistics.median(each) for kind, each in instructions.items()}
     with TABLE.open("w", newline="") as file:
-        csv.writer(file).writerows([("step", "n", "lowest", "median", "highest"), *rows])
+        rows = [(k, len(v), min(v), medians[k], max(v)) for k, v in instructions.items()]
+        csv.writer(file).writerows([("frame", "n", "lowest", "median", "highest"), *rows])
     print(f"aarch64 instructions ({TABLE.relative_to(CHECKOUT)})\n{TABLE.read_text()}")
-    medians = {step: median for step, _, _, median, _ in rows}
     assert 0 < medians["frame without contact"] < medians["frame in contact"]
     assert medians["frame in contact"] < medians["frame that decides"]
-    assert medians["model"] < medians["frame that decides"]

@@ -7,35 +7,14 @@ packages cannot be had (no apt, no network) it is skipped with the reason, but n
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
+from board import kernel
+from board.debian import CHECKOUT, skipping
+from edge.demo import MODEL
+from edge.skin import file as skinfile
 
-import debian  # noqa: E402
-import kernel  # noqa: E402
-
-from edge.demo import MODEL  # noqa: E402
-from edge.skin import file as skinfile  # noqa: E402
-
-PAD = """\
-[skin]
-name = "pad"
-rows = 4
-cols = 6
-threshold_counts = 8
-onset_counts = 16
-release_s = 0.001
-[read]
-rate_hz = 10.0
-[[bus]]
-device = 0
-kind = "mpr121"
-block = [4, 3]
-chips = [{ address = 0x5A, first = [0, 0] }, { address = 0x5B, first = [0, 3] }]
-"""
 SLOWED = {
     "rate_hz = 100.0": "rate_hz = 10.0",
     "release_s = 0.3 ": "release_s = 0.001 ",
@@ -51,7 +30,7 @@ def skins(tmp_path_factory):
     folder = kernel.FOLDER / "skins"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "pad.toml").write_text(PAD)
+    shutil.copy(CHECKOUT / "board" / "pad.toml", folder)
     head, *_, bus = skinfile.shipped("cody").read_text().split("[[bus]]")
     text = head + "[[bus]]" + bus
     for old, new in SLOWED.items():
@@ -62,7 +41,7 @@ def skins(tmp_path_factory):
     fake = f"edge fake --skin {folder}/pad.toml --out {touches}"
     export = f"export --data {touches}/touches --out {touches} --features paper --projection pca"
     for command in (fake, f"{export} --decision-points none"):
-        subprocess.run([sys.executable, "-m", *command.split()], cwd=kernel.CHECKOUT, check=True)
+        subprocess.run([sys.executable, "-m", *command.split()], cwd=CHECKOUT, check=True)
     shutil.copy(touches / "model.onnx", folder / "pad.onnx")
     shutil.copy(MODEL, folder / "cody.onnx")
     return folder
@@ -71,11 +50,11 @@ def skins(tmp_path_factory):
 def test_the_skin_is_read_through_a_real_kernel(skins):
     command = (
         "PYTHONDONTWRITEBYTECODE=1 PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OPENBLAS_NUM_THREADS=1 "
-        f"PYTHONPATH={kernel.CHECKOUT} SKINS={skins} {sys.executable} -m pytest "
-        f"{HERE}/kernel_guest.py -vv --color=no --noconftest -p no:cacheprovider "
-        f"--basetemp=/run/pytest --rootdir {kernel.CHECKOUT} --durations=10"
+        f"PYTHONPATH={CHECKOUT} SKINS={skins} {sys.executable} -m pytest "
+        f"{CHECKOUT}/board/kernel_guest.py -vv --color=no --noconftest -p no:cacheprovider "
+        f"--basetemp=/run/pytest --rootdir {CHECKOUT} --durations=10"
     )
-    with debian.skipping():
+    with skipping():
         status, printed = kernel.run_in_guest(command.split())
     print(printed)
     assert status == 0

@@ -1,7 +1,6 @@
 """The systemd unit under a real systemd: started, watched, started again, and stopped for good.
 
-`make service-test` runs this as root. A systemd of its own, in namespaces of its own, sees this
-machine's files, with empty folders over those that the unit and its installation write to.
+`make service-test` runs this as root; `service_init.sh` starts the systemd.
 """
 
 import os
@@ -25,46 +24,24 @@ UNIT = "edge-classify.service"
 FAKE = "--fake /etc/edge-classify/touch.npz --loop --real-time"
 SHOWN = "ActiveState SubState MainPID NRestarts StatusText ExecMainStatus LimitRTTIME".split()
 
-START = """\
-set -e
-for folder in /run /opt /var/lib; do mount -t tmpfs none $folder; done
-mkdir /run/etc /run/work /run/units
-mount -t overlay none -o lowerdir=/etc,upperdir=/run/etc,workdir=/run/work /etc
-getent group i2c || echo i2c:x:64000: >> /etc/group
-mkdir /opt/python /opt/packages /opt/checkout
-mount --bind {base} /opt/python
-mount --bind {packages} /opt/packages
-mount --bind {checkout} /opt/checkout
-install -D -m 755 {folder}/edge-classify /opt/edge-classify/bin/edge-classify
-install -D -m 644 -t /etc/edge-classify {folder}/model.onnx {folder}/skin.toml {folder}/touch.npz
-install -m 644 {here}/edge-classify.service {folder}/*.target /run/units
-install -D -m 644 -t /run/units/edge-classify.service.d {here}/real-time.conf {folder}/log.conf
-export container=edge SYSTEMD_UNIT_PATH=/run/units PATH=/usr/sbin:/usr/bin:/sbin:/bin
-exec {systemd} --system --unit=multi-user.target --show-status=no --log-target=null
-"""
-COMMAND = """\
-#!/bin/sh
-export PYTHONPATH=/opt/checkout:/opt/packages PYTHONDONTWRITEBYTECODE=1
-exec /opt/python/bin/{python} -m edge "$@"
-"""
-LOG = "[Service]\nStandardOutput=append:/run/log\nStandardError=append:/run/log\n"
-TARGETS = "multi-user.target basic.target shutdown.target sysinit.target".split()
-TARGET = "[Unit]\nDefaultDependencies=no\n"
-
 
 class Machine:
     """The machine of the new systemd, seen from this one."""
 
-    def __init__(self, start):
-        command = "unshare --pid --fork --mount --mount-proc --uts --kill-child bash -c".split()
-        self.process = subprocess.Popen([*command, start], stdin=subprocess.DEVNULL)
+    def __init__(self, variables):
+        command = "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()
+        environment = os.environ | {name: str(value) for name, value in variables.items()}
+        self.process = subprocess.Popen(
+            [*command, HERE / "service_init.sh"], stdin=subprocess.DEVNULL, env=environment
+        )
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
         (self.first,) = self.once(lambda: children.read_text().split(), len)
         self.root = Path(f"/proc/{self.first}/root")
         # Before that, /run and its sockets are this machine's, and so is the systemd behind them.
         name = Path(f"/proc/{self.first}/comm")
         assert self.once(name.read_text, "systemd\n".__eq__) == "systemd\n"
-        self.once(lambda: self.run("systemctl", "is-active", TARGETS[0]), "active\n".__eq__)
+        target = ("systemctl", "is-active", "multi-user.target")
+        self.once(lambda: self.run(*target), "active\n".__eq__)
 
     def run(self, *command):
         """What a command prints there."""
@@ -126,24 +103,20 @@ def results(tmp_path_factory):
     if os.geteuid() != 0:
         pytest.skip("a systemd of its own needs root")
     folder = tmp_path_factory.mktemp("service")
-    names = {
-        "base": sys.base_prefix,
-        "packages": Path(numpy.__file__).parents[1],
-        "checkout": HERE.parent,
-        "here": HERE,
-        "folder": folder,
-        "systemd": SYSTEMD,
-        "python": Path(sys.executable).resolve().name,
-    }
     shutil.copy(demo.MODEL, folder / "model.onnx")
     shutil.copy(demo.FOLDER / "cardboard-box-fixed.npz", folder / "touch.npz")
     skin = shutil.copy(skinfile.shipped("cody"), folder / "skin.toml")
     save_calibration(skin, calibrated(skinfile.load(skin)).calibration)
-    (folder / "edge-classify").write_text(COMMAND.format(**names))
-    (folder / "log.conf").write_text(LOG)
-    for target in TARGETS:
-        (folder / target).write_text(TARGET)
-    machine = Machine(START.format(**names))
+    machine = Machine(
+        {
+            "BASE": sys.base_prefix,
+            "PACKAGES": Path(numpy.__file__).parents[1],
+            "CHECKOUT": HERE.parent,
+            "FOLDER": folder,
+            "SYSTEMD": SYSTEMD,
+            "PYTHON": Path(sys.executable).resolve().name,
+        }
+    )
     try:
         return take_steps(machine)
     finally:

@@ -107,13 +107,7 @@ PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--job
 
 @pytest.fixture(scope="session")
 def exported(recordings, tmp_path_factory) -> Path:
-    """A folder with the model.onnx and golden.npz of those recordings.
-
-    `EDGE_CLASSIFY_EXPORTED` names an existing folder, for a board without scikit-learn.
-    """
-    ready = os.environ.get("EDGE_CLASSIFY_EXPORTED")
-    if ready is not None:
-        return Path(ready)
+    """A folder with the model.onnx and golden.npz of those recordings."""
     from export.__main__ import main
 
     out = tmp_path_factory.mktemp("exported")
