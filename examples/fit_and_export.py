@@ -1,4 +1,4 @@
-"""Fit and export: `python examples/fit_and_export.py RECORDINGS MODEL`, from the checkout."""
+"""Fit and export in the checkout: `PYTHONPATH=. python examples/fit_and_export.py DATA MODEL`."""
 
 import sys
 

@@ -1,8 +1,10 @@
 """The programs in examples/ run unchanged; the ROS node runs over a stand-in for rclpy."""
 
 import json
+import os
 import re
 import runpy
+import subprocess
 import sys
 import types
 from dataclasses import replace
@@ -47,6 +49,17 @@ def test_a_model_is_fitted_and_exported(monkeypatch, capsys, make_touch, tmp_pat
     events = edge.Classifier(model).classify(make_touch(kind="hard", seed=9))
     decided = {event.task: event.label for event in events if isinstance(event, edge.Decided)}
     assert decided["category"] == "rigid-fixed"
+
+
+def test_the_fitting_program_finds_its_packages_as_its_first_line_says():
+    """Without arguments it fails at the first one, after every import."""
+    line = (EXAMPLES / "fit_and_export.py").read_text().splitlines()[0]
+    path, _, program = line.split("`")[1].split()[:3]
+    environment = {**os.environ, "PYTHONPATH": path.removeprefix("PYTHONPATH=")}
+    ended = subprocess.run(
+        [sys.executable, program], cwd=EXAMPLES.parent, env=environment, capture_output=True
+    )
+    assert ended.stderr.splitlines()[-1] == b"IndexError: list index out of range"
 
 
 def test_a_skin_is_watched(monkeypatch, capsys):
