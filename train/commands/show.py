@@ -1,9 +1,9 @@
 """Draw a recording or a map of touch.
 
-Draws a recording: frames over time with the region found, and the three features; with --scene,
-what happens, seen from the side; with --model, its curves over those of the nearest training
+Draws a recording: frames over time with the contact region, and the three features; with --scene,
+the arm and the object from the side; with --model, its curves over those of the nearest training
 trials. Draws several recordings side by side, with the decisions of --model. Draws a map that
-`edge-classify run --map` wrote: where things were touched, and what they were.
+`edge-classify run --map` wrote: the places of the contacts, and their labels.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         "--model",
         metavar="model.onnx",
-        help="show why it decides so on a recording, its decisions on several, or its skin or arm "
-        "behind a map",
+        help="draw the reasons for its decision on a recording, its decisions on several, or its "
+        "skin or arm behind a map",
     )
     text = "with --model, the folder of the training trials (default: that of the recording)"
     option("--data", type=Path, metavar="DIR", help=text)

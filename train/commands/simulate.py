@@ -52,11 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
         given = {name: getattr(arguments, name) for name in ("batch", "jobs", "address")}
         with bar(total=total_trials(scene), unit="trial", desc=scene.name) as shown:
             written = write(scene, arguments.out, **given, progress=shown.update)
-        lines = [f"{len(written.paths)} recordings in {arguments.out}"]
+        lines = [f"recordings written to {arguments.out}: {len(written.paths)}"]
         if written.redrawn:
-            lines.append(
-                f"{written.redrawn} of them were drawn again until they fitted their labels"
-            )
+            lines.append(f"drawn again until they fitted their labels: {written.redrawn}")
         if written.unfelt:
             lines.append(
                 f"in {written.unfelt} of them no taxel rises above skin.onset_counts "

@@ -21,7 +21,7 @@ from train.labels import labels_of
 from train.progress import bar
 
 LEAD_S = 0.25
-"""Kept of the time before a contact, as far as no other contact lies there."""
+"""Seconds kept before a contact, or fewer where another contact ends in them."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,6 +1,6 @@
 """Repeat every analysis of the paper on a data set, beside the paper's own numbers.
 
-Writes OUT/report.html (nothing outside it is linked), each plot as PNG and each table as CSV.
+Writes OUT/report.html, which needs no other file, each plot as PNG and each table as CSV.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
     option(
         "--scene",
-        help="the scene that the recordings were simulated from: adds what needs simulating anew "
-        "(speeds, stiffness, sensor effects) and the paper's numbers",
+        help="the scene that the recordings were simulated from: adds the analyses that simulate "
+        "anew (speeds, stiffness, sensor effects) and the paper's numbers",
     )
     option("--out", type=Path, default=Path("build/study"), help="folder (default: %(default)s)")
     option("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")

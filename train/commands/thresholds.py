@@ -1,8 +1,9 @@
 """Propose thresholds from the recordings' own noise.
 
-Takes the first 0.1 s of each recording as noise. Proposes a threshold of twice the level that one
-in ten recordings exceeds, or of that level itself where twice of it misses touches, and an onset of
-1.5 times that threshold. Counts the contacts that these and other thresholds give.
+Takes the first 0.1 s of each recording as noise, and finds the level that one in ten recordings
+exceeds there. Proposes twice this level as threshold, or the level itself where its double misses
+touches. Proposes 1.5 times the threshold as onset. Counts the contacts that these and other
+thresholds give.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     hidden = max(counts.values())[0] - counts["proposed"][0]
     if hidden:
         print(
-            f"other thresholds show a contact in {hidden} more of the recordings, of noise or of "
-            "touches as weak as it; `make export` tries lower ones and takes what decides best"
+            f"other thresholds show a contact in {hidden} more of the recordings; this is noise, "
+            "or touches as weak as noise. `make export` also tries lower ones and keeps the best"
         )
     return 0

@@ -1,4 +1,4 @@
-"""Show what accuracy costs in time: waiting, the wire, arithmetic.
+"""Show the price of accuracy in time: waiting, the wire, arithmetic.
 
 Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each table as CSV, and
 front.json, which `python -m export --front` reads.
@@ -17,17 +17,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     option = parser.add_argument
     option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
-    text = "what `edge-classify bench` wrote of a model that was fitted on these recordings"
+    text = "file that `edge-classify bench` wrote of a model fitted on these recordings"
     option("--board", required=True, metavar="board.json", help=text)
-    text = "what `python -m export.arithmetic` wrote of that model: adds its number formats"
+    text = "file that `python -m export.arithmetic` wrote of that model: adds its number formats"
     option("--formats", metavar="formats.json", help=text)
     option(
         "--cost",
         type=cost,
         default=(10.0, 1.0),
         metavar="wrong=10,second=1",
-        help="what a wrong decision and a second's wait cost you: the report names the window of "
-        "least cost (default: wrong=10,second=1)",
+        help="your price of a wrong decision and of a second's wait: the report names the window "
+        "of least cost (default: wrong=10,second=1)",
     )
     option("--scene", help="the scene that they were simulated from: adds the physical limit")
     option("--task", help="task of front.json (default: category, or else the first)")
@@ -39,10 +39,10 @@ def cost(text: str) -> tuple[float, float]:
     """The prices of a wrong decision and of a second, out of `wrong=10,second=1`.
 
     Raises:
-        ArgumentTypeError: it has another form, or a price is below 0 or not finite.
+        ArgumentTypeError: the text has another form, or a price is below 0 or not finite.
     """
     with suppress(ValueError, KeyError):
-        prices = dict(part.split("=") for part in text.split(","))
+        prices = dict(term.split("=") for term in text.split(","))
         wrong, second = float(prices.pop("wrong")), float(prices.pop("second"))
         if not prices and 0.0 <= wrong < math.inf and 0.0 <= second < math.inf:
             return wrong, second

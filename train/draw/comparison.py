@@ -1,4 +1,4 @@
-"""Draw touches side by side: what the skin felt, the three features, and what was decided when."""
+"""Draw touches side by side: the loaded skin, the three features, the decision and its time."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def draw(
     style: dict[Any, Any] = {"font.size": 12, "axes.prop_cycle": cycler(color=[INK, DECISION])}
     if dark:
         style |= {"axes.prop_cycle": cycler(color=[DARK_INK, DARK_DECISION])}
-        style |= dict.fromkeys((f"{part}.facecolor" for part in PAINTED), PAPER)
-        style |= dict.fromkeys((f"{part}color" for part in INKED), LINES)
+        style |= dict.fromkeys((f"{element}.facecolor" for element in PAINTED), PAPER)
+        style |= dict.fromkeys((f"{element}color" for element in INKED), LINES)
     with rc_context(style):
         _draw(recordings, out, model)
 

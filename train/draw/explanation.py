@@ -1,4 +1,4 @@
-"""Draw why touches were answered as they were: their curves over those of the nearest trials."""
+"""Draw the reasons for a model's answers: a touch's curves over those of the nearest trials."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from train.draw.comparison import contact_of
 from train.draw.recording import curves
 from train.report.figures import STROKES, STYLE
 
-TOUCH, ALIKE, OTHER = STROKES[0], STROKES[2], STROKES[1]
+TOUCH, SAME, OTHER = STROKES[0], STROKES[2], STROKES[1]
 """Colour, marker and dashes of the touch, of trials with its answer, and of those with another."""
 MOST_NEAR, MOST_PULLS = 4, 5
 
@@ -31,12 +31,12 @@ class Case:
     """An answer that is to be drawn.
 
     Attributes:
-        title: what was answered.
+        title: the task and the answer.
         touch: the contact.
         near: text of the legend, contact (None if it is not at hand), and whether the label is
             that of the answer, for each of the nearest trials.
         pulls: {feature: how much more it pulls towards the answer}.
-        rival: the label that it does not pull to.
+        rival: the other label, with which the pulls compare the answer.
     """
 
     title: str
@@ -46,16 +46,16 @@ class Case:
     rival: str
 
 
-def draw_case(part: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool) -> None:
+def draw_case(canvas: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool) -> None:
     """Draw the three features of a case beside those of its nearest trials, and the pulls."""
-    axes = part.subplots(*(4, 1) if phone else (2, 2)).ravel()
+    axes = canvas.subplots(*(4, 1) if phone else (2, 2)).ravel()
     units = (layout.force_unit, "taxels", layout.length_unit)
     legend = {}
     for axis, unit, name in zip(axes, units, curves(case.touch), strict=False):
         own = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
         legend["this touch"] = axis.plot(*_within(case.touch, name, window_s), **own)[0]
-        for place, (text, series, alike) in enumerate(case.near, start=1):
-            colour, _, dashes = ALIKE if alike else OTHER
+        for place, (text, series, same) in enumerate(case.near, start=1):
+            colour, _, dashes = SAME if same else OTHER
             curve = ([], []) if series is None else _within(series, name, window_s)
             style = {"color": colour, "ls": dashes, "lw": 1.0, "ms": 4}
             marks = {"marker": STROKES[place][1], "markevery": (0.04 * place, 0.25)}
@@ -63,13 +63,13 @@ def draw_case(part: Any, case: Case, layout: SkinLayout, window_s: float, phone:
         axis.set(title=name, xlabel="seconds from onset", ylabel=unit, xlim=(0.0, 1.06 * window_s))
         axis.set_ylim(bottom=0.0)
     strongest = list(case.pulls.items())[:MOST_PULLS]
-    signs = [ALIKE[0] if pull > 0.0 else OTHER[0] for _, pull in strongest]
+    signs = [SAME[0] if pull > 0.0 else OTHER[0] for _, pull in strongest]
     axes[3].barh(range(len(strongest)), [pull for _, pull in strongest], color=signs)
     axes[3].set_yticks(range(len(strongest)), [name for name, _ in strongest], fontsize=8)
     axes[3].invert_yaxis()
     axes[3].axvline(0.0, color="0.3", lw=0.8)
     axes[3].set(title="pulls to the answer", xlabel=f"squared distance,\nagainst {case.rival}")
-    part.legend(legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False)
+    canvas.legend(legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False)
 
 
 def _within(series: FeatureSeries, name: str, window_s: float) -> tuple[Any, Any]:
@@ -109,11 +109,10 @@ def draw(recording: Recording, out: Path, model: Model, folder: Path, where: str
         )
     with mpl.rc_context(STYLE):
         drawn = Figure(figsize=(6.4, 5.0 * len(cases)), layout="constrained")
-        for part, case in zip(
-            drawn.subfigures(len(cases), squeeze=False)[:, 0], cases, strict=True
-        ):
-            part.suptitle(case.title, fontsize=10, weight="bold")
-            draw_case(part, case, recording.layout, info.window_s, False)
+        canvases = drawn.subfigures(len(cases), squeeze=False)[:, 0]
+        for canvas, case in zip(canvases, cases, strict=True):
+            canvas.suptitle(case.title, fontsize=10, weight="bold")
+            draw_case(canvas, case, recording.layout, info.window_s, False)
         with write_whole(out) as file:
             drawn.savefig(file, format="png", dpi=110)
 

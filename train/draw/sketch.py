@@ -17,8 +17,8 @@ from train.simulate.schema import OBJECT
 
 DEPTH_M, STANDS_M = 0.12, 0.15
 """Depth of an object, and its foot's distance below the contact, where the scene gives none."""
-LEAST_M = 0.02
-"""Least height of an object above the contact."""
+ABOVE_M = 0.02
+"""Smallest height of an object above the contact."""
 STEMS = 30
 """Most stems of a plant that are drawn."""
 LOST_S = 0.3
@@ -35,7 +35,7 @@ its first row."""
 def link_positions(chain: Chain, q: Any) -> np.ndarray:
     """(links, 3) positions of the chain's joints and its tip, in metres."""
     chains = [Chain(chain.joints[: i + 1]) for i in range(len(chain.joints))]
-    return np.vstack([np.zeros(3), *(part.pose(q[: part.dof])[:3, 3] for part in chains)])
+    return np.vstack([np.zeros(3), *(begin.pose(q[: begin.dof])[:3, 3] for begin in chains)])
 
 
 def simulated(recording: Recording, where: str) -> dict[str, Any]:
@@ -88,7 +88,7 @@ def draw_side(
             star = {"color": style, "ms": 13, "mec": "white", "ls": "none"}
             axis.plot(*place[0][[0, 2]], "*", **star, label=f"contact {text}")
         if drawn:
-            motion = _thing(axis, drawn, first, place[0], since, color=style, hatch=hatch)
+            motion = _object(axis, drawn, first, place[0], since, color=style, hatch=hatch)
     title = "seen from the side"
     if drawn:
         mass = drawn["values"].get("mass_kg")
@@ -132,13 +132,13 @@ def _turned(outline: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(outline @ np.array([[c, -s], [s, c]]))
 
 
-def _thing(
+def _object(
     axis: Any, drawn: dict[str, Any], first: Place, now: np.ndarray, since: float, **style: Any
 ) -> str:
     """Draw the object where it now stands; its motion in words, for the title.
 
-    Of a face that is larger than the skin the part beside the skin and below it is drawn, as
-    nothing is known of objects beside the upper arm.
+    Of a face larger than the skin, only the part beside and below the skin is drawn: nothing is
+    known of an object beside the upper arm.
 
     Args:
         first: the contact at onset.
@@ -150,7 +150,7 @@ def _thing(
     ahead = math.copysign(1.0, first[1][0] or 1.0)
     height = size("height_m") or STANDS_M
     width = size("width_m") or 0.1
-    top = max(min(0.5 * width, first[2]), LEAST_M)
+    top = max(min(0.5 * width, first[2]), ABOVE_M)
     floor = -max(height, 0.5 * min(width, 0.6))
     depth = size("base_m") or DEPTH_M
     z = np.linspace(floor, top, 33)

@@ -45,7 +45,7 @@ START = 3
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add options for what a table does not say itself."""
+    """Add options for the facts that a table lacks."""
     rate, scale = within(float, 1e-3, FASTEST_HZ), within(float, 1e-12, 1e12)
     for name, form, text in (
         ("--rate", {"type": rate, "metavar": "HZ"}, "frames a second, if no column is the time"),
@@ -59,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         ("--falls", {"action": "store_true"}, "values fall under pressure: subtract them from "
          "those at rest, which are those of the trial with the quietest start"),
         ("--scale", {"type": scale, "default": 1.0}, "counts in a unit of values with fractions"),
-        ("--task", {"default": "object"}, "what the names label (default: %(default)s)"),
+        ("--task", {"default": "object"}, "the task of these labels (default: %(default)s)"),
     ):  # fmt: skip
         parser.add_argument(name, help=text, **form)
 
@@ -284,11 +284,11 @@ def _trials_in(table: _Table) -> Named:
     trial = values[:, names.index("trial")]
     texts = [i for i, name in enumerate(names) if not _is_number(values[0, i]) and name != "trial"]
     kept = [i for i, name in enumerate(names) if name != "trial" and i not in texts]
-    for each in dict.fromkeys(trial.tolist()):
-        rows = values[trial == each]
+    for trial_name in dict.fromkeys(trial.tolist()):
+        rows = values[trial == trial_name]
         own = _Table(table.path, [names[i] for i in kept], rows[:, kept])
         labels = {names[i]: str(rows[0, i]) for i in texts}
-        yield each, labels, _pivoted(own) if "taxel" in names else own
+        yield trial_name, labels, _pivoted(own) if "taxel" in names else own
 
 
 def _pivoted(table: _Table) -> _Table:

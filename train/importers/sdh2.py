@@ -35,7 +35,7 @@ ONSET_COUNTS = 60
 LARGEST_BYTES = 1 << 26
 """Largest size of an unpacked file; the longest published grasp takes 1 MB."""
 STALE_S = 0.1
-"""Joint angles are unknown further than this before the first or after the last: ten periods."""
+"""Joint angles count as unknown so long before the first message or after the last: ten periods."""
 
 
 def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:

@@ -7,7 +7,8 @@ optionally with `"names": [...]`. A message may carry its own time (`header.stam
 otherwise the time at which it was logged is used.
 
 Joints are identified by name, in any order, and several messages may share them. With an arm, its
-joints are selected in the arm's order, and a warning names the others. Without one, all are kept.
+joints are selected in the arm's order, and a warning names the others. Without an arm, all joints
+are kept.
 
 A JSON file beside the log, `NAME.json`, may add what the log lacks: `labels` {task: label}, `skin`
 (see `edge.touch.layout.SkinLayout`), `arm`, and, if there are several topics of a kind, the ones to
@@ -166,7 +167,7 @@ class Log:
         Raises:
             InputError: the log has no topic of frames or several, or the frames' shapes differ.
         """
-        name, frames = self._only("frames", self._frames)
+        name, frames = self._topic("frames", self._frames)
         if not frames:
             raise InputError(
                 f"{self.path}: holds no frames; they must be {' or '.join(FRAMES)}, or JSON "
@@ -193,7 +194,7 @@ class Log:
         self, t: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64] | None, tuple[str, ...] | None]:
         """Angles (n, dof) at the frames' times, and the joints' names if the log has them."""
-        topic, series = self._only("joints", self._joints)
+        topic, series = self._topic("joints", self._joints)
         if not series:
             return None, None
         logged = tuple(series)
@@ -224,19 +225,19 @@ class Log:
         angles = np.stack([_at(t, series[name]) for name in wanted], axis=1)
         return angles, wanted if named else None
 
-    def _only(self, what: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
-        """The one topic of a kind with its messages, or the one that the JSON file names."""
-        name = self.beside.get(f"{what}_topic", None)
+    def _topic(self, kind: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
+        """The topic of a kind that the JSON file names, or else the only one, with its messages."""
+        name = self.beside.get(f"{kind}_topic", None)
         if name is None and len(topics) > 1:
             raise InputError(
-                f"{self.path}: {what} are on {', '.join(sorted(topics))}; name one of them as "
-                f'"{what}_topic" in {self.path.stem}.json beside it'
+                f"{self.path}: {kind} are on {', '.join(sorted(topics))}; name one of them as "
+                f'"{kind}_topic" in {self.path.stem}.json beside it'
             )
         if name is None:
             return next(iter(topics.items()), ("", ()))
         if not isinstance(name, str) or name not in topics:
             raise InputError(
-                f"{self.path}: {what}_topic in {self.path.stem}.json must be one of "
+                f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
                 f"{sorted(topics)}, not {shown(name)}"
             )
         return name, topics[name]

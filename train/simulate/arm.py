@@ -97,12 +97,12 @@ def _link(fixed: list[Joint], axis: Array) -> Link:
     )
 
 
-def _combined(parts: Array, rotation: Array) -> Array:
-    """(3, n) the sum of axes (3, 3, n) times parts (3,), without those of part 0."""
+def _combined(weights: Array, rotation: Array) -> Array:
+    """(3, n) the sum of axes (3, 3, n) times weights (3,); axes of weight 0 are left out."""
     out = np.zeros(rotation.shape[1:])
-    for part, axis in zip(parts.tolist(), rotation, strict=True):
-        if part != 0.0:
-            out += axis * part
+    for weight, axis in zip(weights.tolist(), rotation, strict=True):
+        if weight != 0.0:
+            out += axis * weight
     return out
 
 

@@ -82,7 +82,8 @@ def spring_loads(depths: Array, gaps: Array, stiffness: Array, weight: Array) ->
 def share_out(force: Array, loads: Array) -> None:
     """Share forces (n,) among springs in proportion to their loads (S, L, n), in place.
 
-    At a stiffness of 1e15 N/m the loads have fewer digits than the force, so they only give parts.
+    At a stiffness of 1e15 N/m the loads have fewer digits than the force, so they give
+    only proportions.
     """
     borne = total(total(loads.swapaxes(0, 1)))
     loads *= force / np.where(borne > 0.0, borne, 1.0)

@@ -1,6 +1,6 @@
 """Measures the step that a scene's trials need, and accounts for their effects.
 
-The step is halved until another half changes little.
+The step is halved until another halving changes the force little.
 """
 
 import math
@@ -24,7 +24,7 @@ Kind = tuple[str, ...]
 HALVINGS = 4
 """Most halvings of a frame."""
 FIRST_HALVINGS = 3
-"""Halvings that every kind of trials is run at; the last is for those not within the tolerance."""
+"""Halvings at which every kind of trials runs; a kind outside the tolerance runs at one more."""
 MOST_OBJECTS = 8
 """Most objects of a kind whose steps are measured; they are spread over its list."""
 MOST_STEPS = 20_000
@@ -36,7 +36,7 @@ SWING_PART = 0.2
 PRESSED_M = 0.002
 """Depth to which a swinging object is pressed: it swings on the springs met by then."""
 LITTLE_GAIN = 2.0
-"""Error of the step chosen, in smallest errors, where no step is within the tolerance."""
+"""Largest error of the step chosen where no step is within the tolerance, in smallest errors."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
         stiffness = np.where(stems > 0.0, stems, stiffness)
     steps = SWING_PART * np.sqrt(t.values.get("mass_kg", np.full(t.n, np.inf)) / stiffness)
     steps = np.where(t.plan.also("sliding", ALL), steps, np.inf)
-    return [float(part.min()) for part in _by_kind(steps, kinds)]
+    return [float(of_kind.min()) for of_kind in _by_kind(steps, kinds)]
 
 
 def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:

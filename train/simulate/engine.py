@@ -206,8 +206,8 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
 
     Only the motion of the equilibrium point puts energy in, W = int k (q_eq - q) dq_eq. The joints'
     damping takes at least d (dq)^2 / dt of it in each frame. So the arm's springs store at most the
-    rest, plus the energy of the arm's motion at the start. A contact may give back what it has
-    taken, but no more. A step that makes energy breaks this bound at once.
+    rest, plus the energy of the arm's motion at the start. A contact may give back the energy
+    that it has taken, but no more. A step that makes energy breaks this bound at once.
 
     Args:
         joints: (n, frames, dof) radians.
@@ -224,8 +224,8 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
     put_in = (0.5 * (torque[:, 1:] + torque[:, :-1]) * np.diff(targets, axis=1)).sum(axis=2)
     turned = t.damping.T * np.diff(joints, axis=1) ** 2 / np.diff(times)[:, None]
     work, both_ways, lost = (
-        np.pad(np.add.accumulate(part, axis=1), ((0, 0), (1, 0)))
-        for part in (put_in, np.abs(put_in), turned.sum(axis=2))
+        np.pad(np.add.accumulate(energy, axis=1), ((0, 0), (1, 0)))
+        for energy in (put_in, np.abs(put_in), turned.sum(axis=2))
     )
     held, brought = stored + lost, stored[:, :1] + moving + work
     made = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)

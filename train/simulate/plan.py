@@ -49,7 +49,7 @@ SAMPLE = (
     "bear",  # the force on the skin, and each row's depth
     "lean",  # further force on the skin
     "image",  # the load on the taxels
-    "pass_on",  # how it spreads, and what it breaks
+    "pass_on",  # how the load spreads, and the bubbles that it bursts
 )
 SENSOR = (
     "clock",  # the frames' times
@@ -58,13 +58,13 @@ SENSOR = (
 ANSWER = "answer"
 """The solver of a contact, which `press` calls."""
 INSTEAD = ("lay", "law", "locate", ANSWER, "bear", "image")
-"""Stages in which a trial runs only one hook: that of its last effect that has one."""
+"""Stages in which a trial runs a single hook: that of the last of its effects with such a hook."""
 STAGES = (*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER, *SAMPLE, *SENSOR)
 
 
 @dataclass
 class Call:
-    """A hook, the effect that owns it, and (n,) the trials that call for that."""
+    """A hook, the effect that owns it, and (n,) whether each trial calls for that effect."""
 
     owner: str
     function: Callable[..., Any]
@@ -174,7 +174,7 @@ def check_supported(scene: Scene, where: str) -> None:
     """Check that each effect that a scene names suits one of its objects.
 
     Raises:
-        InputError: one does not; the sentence says what it needs.
+        InputError: an effect suits none; the sentence names the object that it needs.
     """
     for name in scene.leave_out:
         for item in scene.objects:

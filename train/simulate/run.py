@@ -101,8 +101,8 @@ def batches_of(
 
     Args:
         batch: most trials in each.
-        convergences: the measured steps of a scene that gives none, as of `measured`.
-        jobs: least number of batches, if there are as many trials.
+        convergences: the measured steps (`measured`), for a scene that gives no step.
+        jobs: smallest number of batches, if there are so many trials.
     """
     if batch < 1:
         raise InputError(f"--batch must be at least 1, not {batch}")

@@ -18,7 +18,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Effect:
-    """What calls for an effect; its module, loaded only then, says what it does."""
+    """When a trial calls for an effect; the module of its name, loaded only then, computes it."""
 
     stage: str
     """`contact` (acts in the step), `sensor` (on the frames) or `clock` (on their times)."""
@@ -76,7 +76,7 @@ OBJECT = {
     "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
     "foot_m": Field(0.0, 10.0, None, "diameter of the object's foot", open_low=True),
     "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
-    "slope_deg": Field(-20.0, 20.0, None, "of what the object stands on, uphill along the push"),
+    "slope_deg": Field(-20.0, 20.0, None, "of the surface under the object, uphill along the push"),
     "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
     "modulus_pa": Field(0.0, 1e18, 12e3, "of the elastic foundation", open_low=True),
     "depth_m": Field(0.0, 10.0, 0.10, "of the elastic foundation", open_low=True),
@@ -103,10 +103,10 @@ class Family:
     """A kind of objects.
 
     Attributes:
-        effects: those that each of its objects calls for; that it is soft rests on the first.
+        effects: effects that each of its objects calls for; the first makes the objects soft.
         thickness: the key of the depth to which a soft object can yield; empty for a rigid one.
         own: keys that objects of other families do not have.
-        defaults: {key: what is typical of it}, in place of the default in `OBJECT`.
+        defaults: {key: the family's typical value}, in place of the default in `OBJECT`.
     """
 
     effects: tuple[str, ...] = ()

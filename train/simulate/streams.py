@@ -43,10 +43,10 @@ def draws(
 
 @cache
 def quantiles(deviation: float = 1.0) -> NDArray[np.float32]:
-    """Normal quantiles of 65,536 equal parts, from -4.3 to 4.3 deviations."""
+    """The normal quantiles of 65,536 equally likely intervals, from -4.3 to 4.3 deviations."""
     upper = map(NormalDist().inv_cdf, ((np.arange(32768) + 32768.5) / 65536.0).tolist())
-    parts = np.array(list(upper), dtype=np.float32)
-    return np.concatenate([-parts[::-1], parts]) * np.float32(deviation)
+    positive = np.array(list(upper), dtype=np.float32)
+    return np.concatenate([-positive[::-1], positive]) * np.float32(deviation)
 
 
 def add_normal(generator: np.random.Generator, deviation: float, to: NDArray[np.float32]) -> None:

@@ -33,8 +33,8 @@ class Trials:
         values: {name: (n,)} the values drawn for each trial.
         plan: the hooks to run.
         own: {effect: its state}.
-        usual, steps, left: (n,) number of steps of a frame away from jolts, of the present frame,
-            and those still to come.
+        usual, steps, left: (n,) the number of steps in a frame away from jolts, in the present
+            frame, and still to come in it.
         frame, t, h: (n,) number of frames ended, seconds now, and seconds of a step. Each trial has
             its own clock.
         start, rate, travel_s: (dof, n), (dof, 1), (dof, n): the equilibrium point's angles at

@@ -1,8 +1,8 @@
-"""Draws a trial again where what happened contradicts its label.
+"""Draws a trial again where its course contradicts its label.
 
-An object labelled movable has to slide, and one labelled soft has to yield, before the window ends
-in which labels are judged; the paper's did ("For an object to be considered movable in our
-experiments, it needed to be moved by the robot's stereotyped motion", section IV-C).
+Labels are judged in a window after the first touch. In it an object labelled movable has to slide,
+and an object labelled soft has to yield. So it was in the paper ("For an object to be considered
+movable in our experiments, it needed to be moved by the robot's stereotyped motion", section IV-C).
 """
 
 from collections.abc import Iterator
@@ -29,12 +29,12 @@ class Contradiction:
 
     Attributes:
         label: `soft`, or the trial's condition.
-        what: the end of a sentence on what the trial did.
+        course: the end of a sentence that begins with the trial, such as "was never touched".
         remedy: a change of the scene that may help.
     """
 
     label: str
-    what: str
+    course: str
     remedy: str
 
 
@@ -54,27 +54,27 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     for i, trial in enumerate(trials.specs):
         key = FAMILIES[trial.object.family].thickness
         thickness = trials.values[key][i] if key else 0.0
-        label, what = trial.condition, ""
+        label, course = trial.condition, ""
         if not touched[i, onset[i]]:
-            what = "was never touched"
+            course = "was never touched"
             remedy = "let [motion] reach it, and turn the skin's columns to it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
-            what = f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
+            course = f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             remedy = "lower its mass_kg or its friction, or leave movable out of its conditions"
         elif depth[i] < labels["yields"] * thickness:
             label = "soft"
-            what = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
+            course = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
             remedy = "lower its stiffness, or labels.yields"
-        if not what:
+        if not course:
             out.append(None)
             continue
         cut, longer = _cut_short(physics, i, physics.t[onset[i]])
-        out.append(Contradiction(label, what + cut, longer + remedy))
+        out.append(Contradiction(label, course + cut, longer + remedy))
     return out
 
 
 def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
-    """Words on what ended trial i before its window did, and the remedy; else empty texts."""
+    """The cause in words, if trial i ended before its window, and the remedy; else empty texts."""
     trials = physics.trials
     scene, moves = trials.scene, trials.rate[:, 0] != 0.0
     stroke_s = float(trials.travel_s[moves, i].max())
@@ -118,7 +118,7 @@ def _next_draws(scene: Scene, last: TrialSpec, wrong: Contradiction) -> Iterator
         raise InputError(
             f"{scene.name}: object {last.object.name!r} is labelled {wrong.label}, but each of "
             f"{REDRAWS} draws contradicted that within {scene.labels['window_s']:g} s of the touch "
-            f"(the last {wrong.what}); {wrong.remedy}"
+            f"(the last {wrong.course}); {wrong.remedy}"
         )
     for attempt in range(first, min(first + AHEAD, REDRAWS)):
         yield replace(last, attempt=attempt)

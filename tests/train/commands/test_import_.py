@@ -1,4 +1,4 @@
-"""What import adds to what it reads: offsets taken away, thresholds from the noise."""
+"""Offsets taken away, and thresholds from the noise, of imported recordings."""
 
 from dataclasses import replace
 
@@ -24,8 +24,8 @@ def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch)
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
     noise = np.random.default_rng(0).integers(0, 41, (60, 16, 24)).astype(np.uint16)
     touches = [make_touch(seed=seed, seconds=0.4, arm=False) for seed in range(2)]
-    for i, one in enumerate(touches):
-        write_frames(tmp_path / "csv" / f"trial{i}", one.t, np.maximum(one.frames, noise))
+    for i, touch in enumerate(touches):
+        write_frames(tmp_path / "csv" / f"trial{i}", touch.t, np.maximum(touch.frames, noise))
     given = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*given, str(tmp_path / "out")]) == 0
     assert "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have a" in (

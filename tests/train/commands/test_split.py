@@ -15,12 +15,12 @@ def test_each_contact_becomes_a_recording_with_its_own_labels(make_touch, tmp_pa
     save(tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": each}))
     assert main(["split", str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 0
     assert "recordings written to" in capsys.readouterr().out
-    whole = contacts(two, ContactTracker(two.layout))
+    unsplit = contacts(two, ContactTracker(two.layout))
     for i, label in enumerate(("one", "other")):
-        part = load(tmp_path / "out" / f"two-{i:02d}.npz")
-        assert part.labels["object"] == label
-        assert part.labels["category"] == two.labels["category"]
-        (found,) = contacts(part, ContactTracker(part.layout))
-        assert found[0] == whole[i][0]
-        assert (found[1].peak == whole[i][1].peak[: len(found[1].peak)]).all()
-        assert "contacts" not in part.meta
+        trial = load(tmp_path / "out" / f"two-{i:02d}.npz")
+        assert trial.labels["object"] == label
+        assert trial.labels["category"] == two.labels["category"]
+        (contact,) = contacts(trial, ContactTracker(trial.layout))
+        assert contact[0] == unsplit[i][0]
+        assert (contact[1].peak == unsplit[i][1].peak[: len(contact[1].peak)]).all()
+        assert "contacts" not in trial.meta

@@ -1,4 +1,4 @@
-"""Touches side by side: a column each, with what was decided."""
+"""Touches side by side: a column each, with its decision."""
 
 import pytest
 from matplotlib import image

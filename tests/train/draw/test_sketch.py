@@ -15,7 +15,7 @@ def sketch(effects, moved=0.1, since=0.0, **values):
     axis = Figure().add_subplot()
     drawn = {"effects": effects, "values": values}
     now = FIRST[0] + [moved, 0.0, 0.0]
-    return axis, sketches._thing(axis, drawn, FIRST, now, since, color="blue", hatch="//")
+    return axis, sketches._object(axis, drawn, FIRST, now, since, color="blue", hatch="//")
 
 
 def outline(axis):
@@ -23,16 +23,16 @@ def outline(axis):
     return patch.get_xy()[:-1]
 
 
-def test_what_slides_stands_on_its_floor_where_it_was_pushed_to():
+def test_an_object_that_slides_stands_on_its_floor_where_it_was_pushed_to():
     still, moved = sketch(["sliding"], 0.0)[0], sketch(["sliding"], 0.1)[0]
     np.testing.assert_allclose(outline(moved) - outline(still), [[0.1, 0.0]] * len(outline(still)))
     floor = still.lines[0].get_ydata()[0]
     assert outline(still)[:, 1].min() == pytest.approx(floor)
-    # What is fixed has not moved, however the contact did.
+    # A fixed object has not moved, however the contact did.
     np.testing.assert_array_equal(outline(sketch([], 0.1)[0]), outline(still))
 
 
-def test_what_tips_stands_on_its_edge_until_it_lies():
+def test_an_object_that_tips_stands_on_its_edge_until_it_lies():
     values = {"base_m": 0.1, "height_m": 0.25, "friction_static": 0.9}
     leaning, says = sketch(["sliding", "tipping"], 0.05, **values)
     assert says == ", leans by 11 degrees"
@@ -44,7 +44,7 @@ def test_what_tips_stands_on_its_edge_until_it_lies():
     assert np.ptp(outline(lying)[:, 1]) == pytest.approx(0.1)
 
 
-def test_what_turns_is_seen_from_above_turned_about_where_it_is_pushed():
+def test_an_object_that_turns_is_seen_from_above_turned_about_where_it_is_pushed():
     values = {"aside_m": 0.05, "foot_m": 0.3}
     axis, says = sketch(["sliding", "turning"], 0.1, **values)
     angle = 0.1 * 0.05 / (0.1**2 + 0.05**2)

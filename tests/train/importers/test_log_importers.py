@@ -57,11 +57,11 @@ def array(types, frame, *, dims=True):
 
 
 def joint_state(types, t, q, names=NAMES):
-    none = np.zeros(0)
+    empty = np.zeros(0)
     q = np.asarray(q, dtype=np.float64)
     names = list(names)
     return types.types["sensor_msgs/msg/JointState"](
-        header=header(types, t), name=names, position=q, velocity=none, effort=none
+        header=header(types, t), name=names, position=q, velocity=empty, effort=empty
     )
 
 

@@ -116,7 +116,7 @@ class TestCommand:
     def test_simulate_writes_and_says_how_many(self, tmp_path, capsys):
         assert main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)]) == 0
         err = capsys.readouterr().err
-        assert f"8 recordings in {tmp_path}" in err
+        assert f"recordings written to {tmp_path}: 8" in err
         assert len(list(tmp_path.iterdir())) == 8
 
     def test_explain_lists_effects_reasons_and_costs(self, tmp_path, capsys):

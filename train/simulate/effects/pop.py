@@ -1,8 +1,8 @@
 """Bubble wrap: a bubble under each taxel stiffens by the gas law, and is gone once it bursts.
 
 p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b. Three tangents (at 0,
-b/2 and 3b/4) approximate it, each exactly in series with the skin's spring. A burst bubble leaves
-the hard backing, b deeper.
+b/2 and 3b/4) approximate it, each exactly in series with the skin's spring. Behind a
+burst bubble lies the hard backing, b deeper.
 """
 
 from dataclasses import dataclass
