@@ -52,7 +52,7 @@ FEW_NEIGHBOURS = (1, 3, 5)
 PAPER_SCALINGS = ("none", "I", "IV", "V")
 DRAWN_SHRINKAGES, DRAWN_COMPONENTS = (1.0, 0.3), (1, 2, 3, 4, 6, 8, 10)
 """Those tried for touches of simulated things of several kinds, and the most discriminants. Another
-physics differs most in what is small beside the features' spread."""
+physics differs most in differences that are small beside the features' spread."""
 
 
 @dataclass(frozen=True)

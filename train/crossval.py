@@ -83,9 +83,11 @@ def neighbours(
             mean, gain, known = centred_and_scaled(X[others], scaling, features)
             axes = Spectrum(known).leading(max_components)
             weights, grid, used = on_grid(axes.T), Grid.of(known, len(axes)), len(axes)
-            apart = grid.project(known, weights) - grid.project((query - mean) * gain, weights)
+            differences = grid.project(known, weights) - grid.project(
+                (query - mean) * gain, weights
+            )
             # Sums of squares by the first 1, 2, ... components: exact, as all are whole numbers.
-            squares = np.cumsum(apart.T**2, axis=0)
+            squares = np.cumsum(differences.T**2, axis=0)
             order = np.argsort(squares, axis=1, kind="stable")[:, : rows.shape[2]]
             rows[i, :used] = others[order]
             rows[i, used:] = others[order[-1]] if used else others[: rows.shape[2]]

@@ -135,13 +135,13 @@ def _counted(
     train: NDArray[np.int64],
 ) -> list[tuple[list[str], NDArray[np.int64]]]:
     """A grid's tasks, by how often each of the `train` trials counts for them."""
-    alike: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
+    by_counts: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
     for task, labels in classes.items():
         if not grid.tasks or task in grid.tasks:
             names = np.where(labels < 0, "", "labelled")
             counts = grid.choices(1)[0].counts(names, own)[train]
-            alike.setdefault(counts.tobytes(), ([], counts))[0].append(task)
-    return list(alike.values())
+            by_counts.setdefault(counts.tobytes(), ([], counts))[0].append(task)
+    return list(by_counts.values())
 
 
 def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]) -> int:

@@ -44,9 +44,9 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     tasks = set().union(*trials)
     out = [dict(labels) for labels in trials]
     for triple in permutations(sorted(tasks | set(JOINED)), 3):
-        whole, first, second = triple
+        product, *factors = triple
         known = [own for own in trials if own.keys() >= set(triple)]
-        holds = all(own[whole] == f"{own[first]}-{own[second]}" for own in known)
+        holds = all(own[product] == "-".join(own[factor] for factor in factors) for own in known)
         if holds and (known or triple == JOINED):
             out = [joined(own, triple) for own in out]
     return [{task: label for task, label in own.items() if task in tasks} for own in out]

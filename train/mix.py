@@ -147,8 +147,8 @@ def mix(
         }
         answers_of = table.held_out(task)[:, table.tested[task]].mean(axis=1)
         shares = {c.weights: s for c, s in zip(table.choices[task], answers_of, strict=True)}
-        told = ", ".join(f"{names[each]} {share:.1%}" for each, share in shares.items())
-        notes.append(f"{task}: {told}; taken: {names[best.weights]}")
+        by_weights = ", ".join(f"{names[each]} {share:.1%}" for each, share in shares.items())
+        notes.append(f"{task}: {by_weights}; taken: {names[best.weights]}")
         if task in shared and shares[ALONE] == max(shares.values()):
             notes.append(
                 f"simulated trials no longer help {task}: export your own alone, which also "

@@ -16,7 +16,7 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
     """A progress bar; where stderr is no terminal, a line every ten seconds at most.
 
     Args:
-        iterable: what is worked through; None where `update` counts.
+        iterable: the items to work through; None where `update` counts.
         options: of tqdm.
     """
     if not sys.stderr.isatty():

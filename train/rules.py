@@ -86,8 +86,8 @@ class Course:
         every = np.arange(self.unknown.shape[1])
         at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
         last = np.max(at, axis=0)
-        parts = [wrong[own, every] for wrong, own in zip(self.wrong, at, strict=True)]
-        return last, np.any([*parts, self.unknown[last, every] & self.withheld], axis=0)
+        by_part = [wrong[own, every] for wrong, own in zip(self.wrong, at, strict=True)]
+        return last, np.any([*by_part, self.unknown[last, every] & self.withheld], axis=0)
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:

@@ -101,7 +101,7 @@ def scale_of(
 
     def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
         gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
-        with np.errstate(over="ignore"):  # what is then infinite is refused
+        with np.errstate(over="ignore"):  # `centred_and_scaled` refuses infinite gains
             return np.asarray(np.ldexp(gain, -powers))
 
     if method in ("I", "II"):

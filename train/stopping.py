@@ -86,7 +86,7 @@ def held_out(
     own: NDArray[np.bool_] | None = None,
     jobs: int = 1,
 ) -> list[Answers]:
-    """[fold] what is decided about the fold's trials, in their order, by models without them.
+    """[fold] decisions of models without the fold's trials on these, in their order.
 
     Args:
         X: (decision points, n, p).
@@ -313,10 +313,10 @@ class SequentialClassifier:
         """
         courses = {}
         for task in self.choices:
-            parts = tuple(self.products_.get(task, (task,)))
-            own = np.all([tested[t] for t in (task, *parts)], axis=0)
-            said = [confidence[part][:, own] for part in parts]
-            wrong = [~right[part][:, own] for part in parts]
+            deciding = tuple(self.products_.get(task, (task,)))
+            own = np.all([tested[t] for t in (task, *deciding)], axis=0)
+            said = [confidence[part][:, own] for part in deciding]
+            wrong = [~right[part][:, own] for part in deciding]
             courses[task] = Course(said, wrong, unknown[:, own], task == self.novelty_.task)
         return courses
 

@@ -12,12 +12,12 @@ from train.arms import arm_of, joint_angles
 def test_an_arm_is_the_recordings_own_or_the_one_given_or_codys(make_touch):
     touch = make_touch()
     swing = Chain([Joint("swing", (0.0, 0.0, 1.0))])
-    one = replace(touch, joints=touch.joints[:, :1])
+    first_joint = replace(touch, joints=touch.joints[:, :1])
     assert arm_of(touch, "a").names == Chain.cody().names
-    assert arm_of(one, "a", swing) is swing
-    own = replace(one, meta={**one.meta, "arm": swing.to_dict()})
+    assert arm_of(first_joint, "a", swing) is swing
+    own = replace(first_joint, meta={**first_joint.meta, "arm": swing.to_dict()})
     assert arm_of(own, "a").to_dict() == swing.to_dict()
-    assert arm_of(replace(one, meta={**one.meta, "arm": None}), "a", swing) is None
+    assert arm_of(replace(first_joint, meta={**first_joint.meta, "arm": None}), "a", swing) is None
     assert arm_of(make_touch(arm=False), "a", swing) is None
 
 

@@ -22,8 +22,8 @@ def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn
 
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():
-    assert {one.sets for one in candidates(TASKS)} == set(PLAIN)
-    assert {one.sets for one in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
+    assert {candidate.sets for candidate in candidates(TASKS)} == set(PLAIN)
+    assert {candidate.sets for candidate in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
 
@@ -46,9 +46,14 @@ def test_arguments_you_pass_are_held_fixed():
 def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
     for joints in (False, True):
         tried = candidates(TASKS, joints=joints, drawn=True)
-        assert not {"posture", "taxels", "sqrt_taxels"} & {s for one in tried for s in one.sets}
-        assert min(min(grid.shrinkages) for one in tried for grid in one.grids) == 0.3
-    assert min(min(grid.shrinkages) for one in candidates(TASKS) for grid in one.grids) < 0.3
+        assert not {"posture", "taxels", "sqrt_taxels"} & {
+            s for candidate in tried for s in candidate.sets
+        }
+        assert min(min(grid.shrinkages) for candidate in tried for grid in candidate.grids) == 0.3
+    assert (
+        min(min(grid.shrinkages) for candidate in candidates(TASKS) for grid in candidate.grids)
+        < 0.3
+    )
 
 
 def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():

@@ -53,8 +53,8 @@ def test_simulated_things_that_a_scene_numbers_are_of_kinds(make_touch):
 def test_entire_kinds_are_left_out_where_every_class_has_three(
     kinds, left_out, make_touch, tmp_path
 ):
-    for thing, one in drawn_touches(make_touch, kinds).items():
-        save(tmp_path / f"{thing}.npz", one)
+    for thing, touch in drawn_touches(make_touch, kinds).items():
+        save(tmp_path / f"{thing}.npz", touch)
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     assert fitted.chosen["category"].left_out == left_out
     assert fitted.chosen["object"].left_out == "trial"
@@ -107,10 +107,10 @@ def touches(make_touch, folder, seconds, late_s):
     """Touches of two kinds that differ from `late_s` after onset on."""
     for seed in range(20):
         labels = {"kind": "ab"[seed % 2]}
-        one = make_touch(seed=seed, seconds=seconds, arm=False, rate=25.0, labels=labels)
-        frames = np.minimum(one.frames, 700)
-        frames[one.t > 0.2 + late_s] //= 1 + seed % 2
-        save(folder / f"{seed}.npz", replace(one, frames=frames))
+        touch = make_touch(seed=seed, seconds=seconds, arm=False, rate=25.0, labels=labels)
+        frames = np.minimum(touch.frames, 700)
+        frames[touch.t > 0.2 + late_s] //= 1 + seed % 2
+        save(folder / f"{seed}.npz", replace(touch, frames=frames))
     return str(folder)
 
 

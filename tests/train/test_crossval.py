@@ -189,5 +189,5 @@ def test_the_neighbours_are_those_of_a_projection_fitted_without_the_trial():
     for i in range(16):
         train = np.delete(np.arange(16), i)
         model = Projection("IV", 6).fit(X[train])
-        apart = model.transform(X[train]) - model.transform(tested[i : i + 1])
-        assert (train[(apart**2).sum(axis=1).argsort(kind="stable")] == rows[i, 5]).all()
+        differences = model.transform(X[train]) - model.transform(tested[i : i + 1])
+        assert (train[(differences**2).sum(axis=1).argsort(kind="stable")] == rows[i, 5]).all()

@@ -119,7 +119,7 @@ def twice(recording):
     )
 
 
-def told(recording, contacts):
+def with_contacts(recording, contacts):
     return replace(recording, meta={**recording.meta, "contacts": contacts})
 
 
@@ -128,12 +128,12 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(make_t
     save(tmp_path / "two.npz", two)
     data = load_trials([tmp_path])
     assert (len(data.trials), [path.name for path in data.unused]) == (1, ["two.npz"])
-    save(tmp_path / "two.npz", told(two, "alike"))
+    save(tmp_path / "two.npz", with_contacts(two, "alike"))
     data = load_trials([tmp_path])
     assert (len(data.trials), data.unused) == (2, ())
     assert data.trials[1].onset_s == data.trials[0].onset_s + 1.3
     assert data.trials[1].labels == data.trials[0].labels
-    save(tmp_path / "two.npz", told(two, [{"object": "one"}, {"object": "other"}]))
+    save(tmp_path / "two.npz", with_contacts(two, [{"object": "one"}, {"object": "other"}]))
     assert load_trials([tmp_path]).labels("object").tolist() == ["one", "other"]
 
 
@@ -146,7 +146,7 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(make_t
     ],
 )
 def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, make_touch, tmp_path):
-    save(tmp_path / "two.npz", told(twice(make_touch(seconds=0.6)), contacts))
+    save(tmp_path / "two.npz", with_contacts(twice(make_touch(seconds=0.6)), contacts))
     with pytest.raises(InputError, match=f"two.npz: meta.contacts .*{word}"):
         load_trials([tmp_path])
 

@@ -28,7 +28,7 @@ def trials(n=36, seed=0):
     return X, y
 
 
-def told(choice, X, y, train, test):
+def told_right(choice, X, y, train, test):
     """Whether the classifier that is exported tells the tests."""
     model = ContactClassifier({"t": choice}, TWO).fit(X[train], {"t": y[train]})
     return model.predict(X[test])["t"] == y[test]
@@ -44,7 +44,7 @@ def test_every_answer_is_that_of_the_exported_estimators():
             train = np.flatnonzero((folds != i) & (folds != j))
             test = np.flatnonzero(folds == j)
             for choice, right in zip(table.choices["t"], table.right["t"][i], strict=True):
-                assert (right[test] == told(choice, X, y, train, test)).all()
+                assert (right[test] == told_right(choice, X, y, train, test)).all()
 
 
 def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
@@ -58,7 +58,7 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
         for fold in range(3):
             train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
             for choice, right in zip(table.choices["t"], table.right["t"][fold], strict=True):
-                assert (right[test] == told(choice, X, y, train, test)).all()
+                assert (right[test] == told_right(choice, X, y, train, test)).all()
 
 
 def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_of_the_estimators():
@@ -89,7 +89,7 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
         inner = [
             np.concatenate(
                 [
-                    told(c, X, y, np.flatnonzero((folds != i) & (folds != j)), folds == j)
+                    told_right(c, X, y, np.flatnonzero((folds != i) & (folds != j)), folds == j)
                     for j in range(4)
                     if j != i
                 ]
@@ -97,7 +97,9 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
             for c in table.choices["t"]
         ]
         best = table.choices["t"][int(np.argmax(inner))]
-        right += told(best, X, y, np.flatnonzero(folds != i), np.flatnonzero(folds == i)).sum()
+        right += told_right(
+            best, X, y, np.flatnonzero(folds != i), np.flatnonzero(folds == i)
+        ).sum()
     assert table.nested("t").right == right
 
 
@@ -120,10 +122,10 @@ def test_twins_of_a_group_do_not_tell_each_other():
     X = np.repeat(rng.normal(size=(12, 12)), 4, axis=0)
     y = np.repeat(np.tile(["a", "b"], 6), 4)
     grids = [SearchGrid("none", "pca", components=(6,), neighbours=(1,))]
-    apart = evaluate(X, {"t": y}, group_folds(objects), grids, features=TWO)
-    mixed = evaluate(X, {"t": y}, stratified_folds(y), grids, features=TWO)
-    assert mixed.nested("t").accuracy == 1.0
-    assert apart.nested("t").accuracy < 0.8
+    by_object = evaluate(X, {"t": y}, group_folds(objects), grids, features=TWO)
+    by_trial = evaluate(X, {"t": y}, stratified_folds(y), grids, features=TWO)
+    assert by_trial.nested("t").accuracy == 1.0
+    assert by_object.nested("t").accuracy < 0.8
     few = group_folds(objects, count=5)
     assert all(len(set(few[objects == name])) == 1 for name in objects)
 
@@ -188,6 +190,6 @@ def test_progress_is_told_after_each_of_the_fits_that_are_announced():
     folds, seen = stratified_folds(y, 5), []
     for nested, count in ((True, 15), (False, 5)):
         seen.clear()
-        told = {"progress": lambda: seen.append(1), "nested": nested, "features": TWO}
-        evaluate(X, {"t": y}, folds, GRIDS[:1], **told)
+        options = {"progress": lambda: seen.append(1), "nested": nested, "features": TWO}
+        evaluate(X, {"t": y}, folds, GRIDS[:1], **options)
         assert len(seen) == fits(folds, nested) == count

@@ -50,7 +50,7 @@ PEAKS = (100, 300, 200, 400, 400)
 
 
 def test_every_set_has_features_that_exist_and_none_is_in_two_sets():
-    members = [name for one in SETS.values() for name in one]
+    members = [name for names in SETS.values() for name in names]
     assert len(members) == len(set(members))
     assert [feature(name).name for name in members] == members
     assert SETS["paper"] == FEATURES
@@ -89,9 +89,9 @@ def test_a_vector_has_the_widths_that_are_told(name, samples):
     wanted = SETS[name]
     frames = touch(PEAKS, joints=np.zeros((5, 3)))
     vector = vector_of(frames, *wanted, samples=samples, joints=3)
-    told = widths(wanted, samples, SKIN, joints=3)
-    assert len(told) == len(wanted)
-    assert len(vector) == sum(told)
+    column_counts = widths(wanted, samples, SKIN, joints=3)
+    assert len(column_counts) == len(wanted)
+    assert len(vector) == sum(column_counts)
     assert np.isfinite(vector).all()
 
 
@@ -206,9 +206,9 @@ def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
 
 def test_every_nth_frame_of_a_series_has_all_that_was_measured():
     wanted = [*SETS["moments"], "taxel_force", "joint_angle", "skin_force", "force_motion"]
-    whole = series_of(touch(PEAKS, joints=np.arange(10.0).reshape(5, 2)), wanted, joints=2)
-    thin = whole._frames(slice(None, None, 2))
-    assert thin.integers.tolist() == whole.integers[::2].tolist()
+    every_frame = series_of(touch(PEAKS, joints=np.arange(10.0).reshape(5, 2)), wanted, joints=2)
+    thin = every_frame._frames(slice(None, None, 2))
+    assert thin.integers.tolist() == every_frame.integers[::2].tolist()
     assert thin.joints.tolist() == [[0.0, 1.0], [4.0, 5.0], [8.0, 9.0]]
     assert thin.t.tolist() == [0.0, 0.5, 1.0]
     assert len(feature_vector(thin, 1.0, 5, wanted)) == sum(widths(wanted, 5, SKIN, 2))

@@ -24,14 +24,14 @@ def test_softness_and_mobility_follow_from_the_category_and_the_reverse():
 
 
 def test_labels_of_other_tasks_follow_where_all_trials_that_have_them_agree():
-    whole = {"grasp": "left-full", "side": "left", "filling": "full"}
-    assert completed([whole, {"grasp": "right-empty"}])[1] == {
+    complete = {"grasp": "left-full", "side": "left", "filling": "full"}
+    assert completed([complete, {"grasp": "right-empty"}])[1] == {
         "grasp": "right-empty",
         "side": "right",
         "filling": "empty",
     }
-    odd = {**whole, "grasp": "left-empty"}
-    assert completed([whole, odd, {"grasp": "right-empty"}])[2] == {"grasp": "right-empty"}
+    odd = {**complete, "grasp": "left-empty"}
+    assert completed([complete, odd, {"grasp": "right-empty"}])[2] == {"grasp": "right-empty"}
 
 
 def test_no_task_is_added_and_a_label_of_another_form_is_left():

@@ -190,10 +190,10 @@ def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
 
 def test_the_discriminants_of_several_tasks_stand_side_by_side():
     X = features(40)
-    one, two = np.repeat(["a", "b"], 20), np.tile(["x", "y", "z", "z"], 10)
-    both = Projection("IV", kind="lda").fit(X, np.column_stack([one, two]))
-    apart = [Projection("IV", kind="lda").fit(X, y).weights_ for y in (one, two)]
-    assert (both.weights_ == np.hstack(apart)).all()
+    sides, shapes = np.repeat(["a", "b"], 20), np.tile(["x", "y", "z", "z"], 10)
+    both = Projection("IV", kind="lda").fit(X, np.column_stack([sides, shapes]))
+    alone = [Projection("IV", kind="lda").fit(X, y).weights_ for y in (sides, shapes)]
+    assert (both.weights_ == np.hstack(alone)).all()
     assert both.rank_ == 3
 
 

@@ -36,12 +36,12 @@ class TestLogistic:
     def test_the_unit_of_the_distances_does_not_matter(self):
         rng = np.random.default_rng(2)
         margins, right = rng.normal(size=60), rng.random(60) < 0.8
-        one, other = (
+        in_metres, in_microns = (
             confidences([a], [b], size * margins[None])
             for size in (1.0, 1e-6)
             for a, b in [logistic(size * margins, right)]
         )
-        assert one == pytest.approx(other)
+        assert in_metres == pytest.approx(in_microns)
 
 
 SECONDS = np.array([0.4, 0.8, 1.2])
