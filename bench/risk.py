@@ -165,8 +165,8 @@ def run(arguments: argparse.Namespace) -> int:
     columns = dict(zip(first.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
 
     def judged(rows: NDArray[np.int64]) -> Any:
-        own = {**vars(first), "trials": tuple(trials[rows])}
-        return delayed(realised)(DrawnSet(**own, rows=rows, pool=X, columns=columns), y)
+        drawn = {**vars(first), "trials": tuple(trials[rows])}
+        return delayed(realised)(DrawnSet(**drawn, rows=rows, pool=X, columns=columns), y)
 
     draws = (np.sort(rng.permutation(n)[: arguments.trials]) for _ in range(sets))
     outcomes, shown = map(np.array, zip(*work(map(judged, draws), sets, "data sets"), strict=True))

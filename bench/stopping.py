@@ -30,7 +30,7 @@ from train.feature_sets import expand
 from train.rules import NEVER, THRESHOLDS, Course
 from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
-from train.tradeoff.choices import followed, some
+from train.tradeoff.choices import followed, trials_of
 from train.tradeoff.early import FOLDS, StoppingComparison, compare_stopping
 
 TREES = 300
@@ -108,7 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
     dataset = followed(read(arguments.data), NAMES)
     n = len(dataset.trials)
     rows = np.sort(np.random.default_rng(0).permutation(n)[: arguments.trials or n])
-    dataset = some(dataset, rows)
+    dataset = trials_of(dataset, rows)
     y = {task: dataset.labels(task) for task in dataset.tasks}
     X = np.stack([dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S])
     compared = compare_stopping(dataset, DECISION_POINTS_S, jobs=arguments.jobs)

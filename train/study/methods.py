@@ -41,9 +41,9 @@ def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> 
     right = dict.fromkeys(y, 0)
     for task, labels in y.items():
         for fold in range(int(folds.max()) + 1):
-            own = folds == fold
-            trees = ExtraTreesClassifier(TREES, random_state=0).fit(X[~own], labels[~own])
-            right[task] += int((trees.predict(X[own]) == labels[own]).sum())
+            tested = folds == fold
+            trees = ExtraTreesClassifier(TREES, random_state=0).fit(X[~tested], labels[~tested])
+            right[task] += int((trees.predict(X[tested]) == labels[tested]).sum())
     return {task: Result(right[task], len(labels)) for task, labels in y.items()}
 
 
@@ -127,8 +127,8 @@ def section(context: Context) -> Section:
                 [name.replace("`", "") for name in known],
                 {task: [result[task] for result in known.values()] for task in y},
                 marks={
-                    task: {method.replace("`", ""): share for method, share in own.items()}
-                    for task, own in never.items()
+                    task: {method.replace("`", ""): share for method, share in shares.items()}
+                    for task, shares in never.items()
                 },
                 mark="never met",
             )

@@ -96,10 +96,10 @@ def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
     return round(gap - below, 2), round(gap + above, 2)
 
 
-def mean_of(every: Sequence[Numbers]) -> Numbers:
+def mean_of(data_sets: Sequence[Numbers]) -> Numbers:
     """The mean over several data sets of each number that all of them have."""
-    shared = set.intersection(*(set(numbers) for numbers in every))
-    return {key: float(np.mean([numbers[key] for numbers in every])) for key in shared}
+    shared = set.intersection(*(set(numbers) for numbers in data_sets))
+    return {key: float(np.mean([numbers[key] for numbers in data_sets])) for key in shared}
 
 
 def negative_by_chance(percents: Sequence[float], tested: int) -> float:
@@ -146,20 +146,20 @@ def rank_correlation(theirs: Sequence[float], ours: Sequence[float]) -> float | 
     return float(spearmanr(theirs, ours).statistic)
 
 
-def comparison(every: Sequence[Numbers], tested: int) -> Section:
+def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """Each of the paper's numbers beside ours, and the rank correlations.
 
     Args:
-        every: percent, of each data set.
+        data_sets: percent, of each data set.
         tested: number of trials behind their mean.
     """
-    mean = mean_of(every)
+    mean = mean_of(data_sets)
     known = [entry for entry in entries() if entry.key in mean]
-    side: list[Row] = []
+    rows: list[Row] = []
     for entry in known:
         ours = mean[entry.key]
         low, high = difference(entry.percent, ours, tested)
-        side.append(
+        rows.append(
             {
                 "place": entry.place,
                 "task": entry.task,
@@ -173,27 +173,27 @@ def comparison(every: Sequence[Numbers], tested: int) -> Section:
             }
         )
     pairs = dict.fromkeys((entry.table, entry.task) for entry in known)
-    ranks = [_ranks(*pair, known, side, mean, every, tested) for pair in pairs]
-    inside = [row for row in side if row["within"] == "yes"]
-    free = [row for row in side if not row["headline"]]
-    free_inside = sum(not row["headline"] for row in inside)
+    ranks = [_ranks(*pair, known, rows, mean, data_sets, tested) for pair in pairs]
+    inside = [row for row in rows if row["within"] == "yes"]
+    others = [row for row in rows if not row["headline"]]
+    others_inside = sum(not row["headline"] for row in inside)
     title = f"{len(inside)} of the paper's {len(known)} numbers lie within the interval"
     return Section(
         "Ours beside the paper's",
         [
-            f"{len(inside)} of {len(side)} numbers lie within the 95 % interval of the difference "
-            f"between {tested} trials here ({counted(len(every), 'simulated data set')}) and the "
-            f"paper's {TRIALS}. {len(side) - len(free)} of them repeat the three headline "
+            f"{len(inside)} of {len(rows)} numbers lie within the 95 % interval of the difference "
+            f"between {tested} trials here ({counted(len(data_sets), 'simulated data set')}) and "
+            f"the paper's {TRIALS}. {len(rows) - len(others)} of them repeat the three headline "
             "accuracies of section IV-A, which the free values of the scene were chosen to meet, "
-            f"so there the scene predicts nothing. Of the other {len(free)}, {free_inside} lie "
+            f"so there the scene predicts nothing. Of the other {len(others)}, {others_inside} lie "
             "within. The paper's trials and ours are of different objects; the interval covers the "
             "chance in both. The head of the scene's file says what the simulation was fitted to "
             "and what it predicts. Nothing was changed to meet the other numbers.",
-            *_disagreements(side, ranks),
+            *_disagreements(rows, ranks),
             *_wrong_objects({e.key: e.percent for e in known}, mean),
         ],
         [
-            Table("paper", "The paper's 46 numbers and ours", side),
+            Table("paper", "The paper's 46 numbers and ours", rows),
             Table(
                 "paper_ranks",
                 "Spearman's rank correlation of the settings' order here and in the paper",
@@ -201,7 +201,7 @@ def comparison(every: Sequence[Numbers], tested: int) -> Section:
                 narrow=5,
             ),
         ],
-        [_against(known, side, title)],
+        [_against(known, rows, title)],
     )
 
 
@@ -209,24 +209,24 @@ def _ranks(
     table: str,
     task: str,
     known: Sequence[Entry],
-    side: Sequence[Row],
+    rows: Sequence[Row],
     mean: Numbers,
-    every: Sequence[Numbers],
+    data_sets: Sequence[Numbers],
     tested: int,
 ) -> Row:
     """The row of one task in one of the paper's tables."""
-    own = [entry for entry in known if (entry.table, entry.task) == (table, task)]
-    theirs = [entry.percent for entry in own]
-    rank = rank_correlation(theirs, [mean[entry.key] for entry in own])
-    alone = [rank_correlation(theirs, [n[entry.key] for entry in own]) for n in every]
-    within = [row["within"] for entry, row in zip(known, side, strict=True) if entry in own]
+    settings = [entry for entry in known if (entry.table, entry.task) == (table, task)]
+    theirs = [entry.percent for entry in settings]
+    rank = rank_correlation(theirs, [mean[entry.key] for entry in settings])
+    of_each = [rank_correlation(theirs, [n[entry.key] for entry in settings]) for n in data_sets]
+    within = [row["within"] for entry, row in zip(known, rows, strict=True) if entry in settings]
     return {
         "table": table,
         "task": task,
         "rank correlation": "all equal" if rank is None else round(rank, 2),
-        "positive in data sets": f"{sum((r or 0.0) > 0.0 for r in alone)} of {len(every)}",
+        "positive in data sets": f"{sum((r or 0.0) > 0.0 for r in of_each)} of {len(data_sets)}",
         "perfect copies below zero %": negative_by_chance(theirs, tested),
-        "within interval": f"{within.count('yes')} of {len(own)}",
+        "within interval": f"{within.count('yes')} of {len(settings)}",
     }
 
 

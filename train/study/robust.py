@@ -132,13 +132,13 @@ def section(context: Context) -> Section | None:
             "or study them without a scene"
         )
     changed = [vectors(contacts) for contacts in series.values()]
-    own = context.workers.map("their accuracy", grid_search, [(x, y) for x in changed])
+    retrained = context.workers.map("their accuracy", grid_search, [(x, y) for x in changed])
     plain = grid_search(X, y)
-    to = context.workers.map("trained here", transfer, [(X, y, plain, x) for x in changed])
+    transferred = context.workers.map("trained here", transfer, [(X, y, plain, x) for x in changed])
     rows = [
         {"change": name, "task": task, "trained and tested": how, **score(result)}
         | {"without contact": sum(contact is None for contact in series[name])}
-        for name, *sets in zip(series, own, to, strict=True)
+        for name, *sets in zip(series, retrained, transferred, strict=True)
         for how, results in zip(HOW, sets, strict=True)
         for task, result in results.items()
     ]
@@ -149,7 +149,7 @@ def section(context: Context) -> Section | None:
             list(series),
             {
                 how: [result[task] for result in results]
-                for how, results in zip(HOW, (own, to), strict=True)
+                for how, results in zip(HOW, (retrained, transferred), strict=True)
             },
             reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
         )

@@ -86,13 +86,13 @@ def study(
     with nullcontext() if address is None else on_cluster(address):
         # The last first: it notices when the recordings are of another scene.
         sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
-        every = [_numbers(sections)]
+        numbers = [_numbers(sections)]
         if source is not None:
-            every += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
+            numbers += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
     findings, *others = sections
     comparison = None
     if source is not None:
-        comparison = paper.comparison(every, len(every) * len(dataset.trials))
+        comparison = paper.comparison(numbers, len(numbers) * len(dataset.trials))
     shown = [section for section in (findings, comparison, *others) if section]
     name = source.name if source is not None else Path(data[0]).name
     written = write(out, f"What a touch reveals: {name}", _lead(context, constant), shown)

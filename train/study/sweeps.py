@@ -184,7 +184,7 @@ def resolution(context: Context) -> Section:
         if chunk.size
     ]
     answers = context.workers.map("taxel resolution", _through_coarser, cases)
-    series = [list(chain.from_iterable(parts)) for parts in zip(*answers, strict=True)]
+    series = [list(chain.from_iterable(chunk)) for chunk in zip(*answers, strict=True)]
     skins = data.layout, *(skin for skin, _ in coarser(data.layout, []))
     taxels = [skin.rows * skin.cols for skin in skins]
     X = [context.vectors(), *map(vectors, series)]

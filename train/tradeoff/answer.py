@@ -28,10 +28,10 @@ def answers(measured: Measured, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
 
     def row(
-        how: str, seconds: float, result: Result, met: Result | None = None, command: str = ""
+        how: str, seconds: float, result: Result, unmet: Result | None = None, command: str = ""
     ) -> Row:
         cells = {"how": how, "time s": round(seconds, 3), "accuracy %": 0.0}
-        cells["objects never met %"] = "" if met is None else percent(met.accuracy)
+        cells["objects never met %"] = "" if unmet is None else percent(unmet.accuracy)
         cells |= {key: score(result)[key] for key in ("accuracy %", "from %", "to %")}
         return cells | {"command": command}
 
@@ -52,7 +52,7 @@ def answers(measured: Measured, task: str) -> list[Row]:
 def distinct(compared: StoppingComparison) -> list[Certified]:
     """The errors that most folds certify; a rule that serves two errors stands at the smaller."""
     able = [certified for certified in compared.certified if certified.folds > FOLDS // 2]
-    return list({(own.mean_s, own.wrong): own for own in reversed(able)}.values())[::-1]
+    return list({(rule.mean_s, rule.wrong): rule for rule in reversed(able)}.values())[::-1]
 
 
 def section(measured: Measured) -> Section:
@@ -85,7 +85,7 @@ def early(measured: Measured) -> Section:
         for rule in compared.certified
         if rule.folds
     ]
-    off = (f"{t} {100 * own.calibration_error:.1f}" for t, own in measured.comparisons.items())
+    off = (f"{t} {100 * c.calibration_error:.1f}" for t, c in measured.comparisons.items())
     return Section(
         "As soon as it is sure",
         [
@@ -196,8 +196,8 @@ def drawn(measured: Measured) -> Figure:
         across = 1 if phone else wide
         upper, lower = canvas.subfigures(2, 1, height_ratios=[heights[phone] - 1.8, 1.8])
         grid = upper.subplots(-(-m // across), across, squeeze=False, sharey=True)
-        for axes, (task, own) in zip(grid.flat, compared.items(), strict=False):
-            _panel(axes, task, own, measured)
+        for axes, (task, comparison) in zip(grid.flat, compared.items(), strict=False):
+            _panel(axes, task, comparison, measured)
         for axes in grid.flat[m:]:
             axes.set_visible(False)
         for axes in grid[:, 0]:

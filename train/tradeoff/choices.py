@@ -49,7 +49,7 @@ def followed(
     )
 
 
-def some(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
+def trials_of(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
     """The trials of these rows."""
     return replace(dataset, trials=tuple(dataset.trials[i] for i in rows))
 

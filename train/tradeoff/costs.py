@@ -22,7 +22,7 @@ from train.report.skins import coarser
 from train.report.work import Workers
 from train.stopping import finest
 from train.tradeoff.board import ESTIMATED, estimated_s
-from train.tradeoff.choices import Points, chosen, followed, some
+from train.tradeoff.choices import Points, chosen, followed, trials_of
 from train.tradeoff.measured import Measured, Saving
 from train.tradeoff.wires import Wire, wires
 
@@ -100,7 +100,7 @@ def changes(raw: Recordings, dataset: DataSet) -> list[Change]:
         if len(rows) >= FEWEST:
             what = f"{len(rows)} of {len(dataset.trials)} trials"
             cost = f"{counted(len(dataset.trials) - len(rows), 'recording')} fewer"
-            cases.append(Change(what, cost, some(dataset, rows), fewer=True))
+            cases.append(Change(what, cost, trials_of(dataset, rows), fewer=True))
     return cases
 
 
@@ -170,9 +170,9 @@ def measure(raw: Recordings, dataset: DataSet, windows: Points, workers: Workers
 def section(measured: Measured) -> Section:
     """A row for each change, number format and board."""
     rows = [
-        _row(measured, own.what, own.cost, f"{own.choice_s:.1f} s to train" * bool(own.choice_s))
-        | {f"{task}, points": points(gain) for task, gain in own.tasks.items()}
-        for own in measured.costs
+        _row(measured, saving.what, saving.cost, _training(saving.choice_s))
+        | {f"{task}, points": points(gain) for task, gain in saving.tasks.items()}
+        for saving in measured.costs
     ]
     rows += [
         _row(
@@ -205,6 +205,10 @@ def section(measured: Measured) -> Section:
         ],
         [Table("costs", "Points of accuracy, and the price", rows, timed=(TIME,), narrow=3)],
     )
+
+
+def _training(seconds: float) -> str:
+    return f"{seconds:.1f} s to train" if seconds else ""
 
 
 def _row(measured: Measured, what: str, price: str, time: str = "") -> Row:

@@ -18,7 +18,7 @@ from train.report.score import paired
 from train.report.work import Workers
 from train.rules import Course, candidates
 from train.stopping import finest
-from train.tradeoff.choices import Promise, some
+from train.tradeoff.choices import Promise, trials_of
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -114,7 +114,9 @@ def compare_stopping(
         rules = [(courses[task], model.stopping_[task]) for model, _, _, courses in held_out]
         certified = [
             _certified(
-                error, [(course, own.rule(error)) for course, own in rules], decision_points_s
+                error,
+                [(course, stopping.rule(error)) for course, stopping in rules],
+                decision_points_s,
             )
             for error in ERRORS
         ]
@@ -128,9 +130,9 @@ def _held_out(
     dataset: DataSet, test: NDArray[np.int64], decision_points_s: Sequence[float]
 ) -> tuple[Any, ...]:
     """The model that was fitted without a fold, and what it answers to the fold (`judged`)."""
-    train = some(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
+    train = trials_of(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
     fitted = fit(train, quick=True, leave_out=TRIAL, decision_points_s=decision_points_s, jobs=1)
-    model, others = fitted.sequential, some(dataset, test)
+    model, others = fitted.sequential, trials_of(dataset, test)
     assert model is not None
     names = fitted.dataset.names
     new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])

@@ -52,9 +52,9 @@ def slider(points: Points) -> str:
 
 def _texts(choice: Chosen) -> tuple[str, str, str]:
     """Accuracy, interval, and accuracy on objects never met."""
-    met, result = unseen(choice), choice.by_trial
-    never = "" if met is None else f"{100 * met.accuracy:.0f} %"
-    return f"{100 * result.accuracy:.0f} %", f"({interval(result)})", never
+    unmet, result = unseen(choice), choice.by_trial
+    share = "" if unmet is None else f"{100 * unmet.accuracy:.0f} %"
+    return f"{100 * result.accuracy:.0f} %", f"({interval(result)})", share
 
 
 def _curve(results: Mapping[float, Result], first: int) -> str:
