@@ -137,6 +137,12 @@ def test_an_axis_of_any_length_is_a_direction(axis):
     assert Chain([Joint("j", axis)]).pose([1.0]) == pytest.approx(expected, abs=4e-16)
 
 
+def test_a_joint_that_slides_moves_along_its_axis():
+    pose = Chain([Joint("s", (2.0, 3.0, 6.0), kind="prismatic")]).pose([7.0])
+    assert pose[:3, 3].tolist() == pytest.approx([2.0, 3.0, 6.0], rel=1e-15)
+    assert (pose[:3, :3] == np.eye(3)).all()
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_point_is_where_the_pose_takes_it(seed):
     """Turned joint by joint, it rounds no more than the whole pose does."""

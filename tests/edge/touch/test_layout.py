@@ -52,6 +52,7 @@ def test_metadata_round_trip():
         16, 24, True, (0.0108, 0.01205), 0.046, 0.18, tuple(ANGLES), 1000.0, 100, 150, (3, 7), 0.25
     )
     assert SkinLayout.from_dict(layout.to_dict()) == layout
+    assert not SkinLayout.from_dict({"rows": 3, "cols": 4}).wraps
     assert not layout.alive[0, 3]
     assert layout.alive.sum() == 382
 
