@@ -42,7 +42,6 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     for command in add_commands(top, "edge.commands", wanted):
         flag = partial(command.add_argument, action="store_true")
         flag("--json", help="print JSON lines even to a terminal")
-        flag("-v", "--verbose", help="print more messages to stderr")
         flag("-q", "--quiet", help="print only errors to stderr")
     return top
 
@@ -80,8 +79,7 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
             argcomplete.autocomplete(top)
     arguments = top.parse_args(argv)
-    quieter = logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
-    level = logging.DEBUG if getattr(arguments, "verbose", False) else quieter
+    level = logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter(f"{top.prog}: %(message)s"))
     loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]

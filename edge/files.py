@@ -56,6 +56,10 @@ def refusing(action: str) -> Iterator[None]:
         raise InputError(f"{action}: {getattr(error, 'strerror', None) or error}") from None
 
 
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
 @contextmanager
 def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryIO]:
     """Open a regular file for reading. Reading a FIFO could wait, and a device may never end.
@@ -66,21 +70,16 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
     name = os.fspath(path)
     with refusing(f"{name}: cannot be read"):
         # Without O_NONBLOCK, opening a FIFO waits until another process opens it for writing.
-        handle = os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-    try:
-        status = os.fstat(handle)
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError(f"{name}: cannot be read: it is a folder")
+        file = open(name, "rb", opener=_without_waiting)  # noqa: SIM115
+    with file:
+        status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{name}: cannot be read: it is not a regular file")
         if status.st_size > at_most:
             raise InputError(
                 f"{name}: has {status.st_size} bytes; a file of this kind has at most {at_most}"
             )
-        with open(handle, "rb", closefd=False) as file:
-            yield file
-    finally:
-        os.close(handle)
+        yield file
 
 
 def read_bytes(path: str | os.PathLike[str], at_most: int = LARGEST_TEXT) -> bytes:

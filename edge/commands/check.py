@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from importlib.util import find_spec
-from typing import Any
 
 from edge.commands.options import within
 from edge.commands.output import Output
@@ -101,9 +100,9 @@ def run(arguments: argparse.Namespace) -> int:
     spent = [c / FRAMES for c in frame_bits(file, FRAMES, arguments.overhead * 1e-6)]
     clocks = [bus.clock_hz for bus in file.buses]
     rate, asked = frame_rate(spent, clocks), file.reading.rate_hz
-    wrong, said = list(faults(file)), list(remarks(file))
+    wrong, remarked = list(faults(file)), list(remarks(file))
     if rate < asked and file.reading.region_of_interest:
-        said.append(
+        remarked.append(
             f"full frames come at {rate:.1f} Hz; the chips near a contact are read at {asked:g} Hz"
         )
     elif rate < asked:
@@ -123,30 +122,23 @@ def run(arguments: argparse.Namespace) -> int:
         "frame_rate_hz": round(rate, 1),
         "overhead_us": arguments.overhead,
         "asked_hz": asked,
-        "remarks": wrong + said,
+        "remarks": wrong + remarked,
     }
-    output.event(event, _text(arguments.skin, file, event, wrong, said))
-    return 1 if wrong else 0
-
-
-def _text(
-    path: str, file: SkinFile, event: dict[str, Any], wrong: list[str], said: list[str]
-) -> str:
     rows, cols = file.layout.shape
-    lines = [f"{path}: {file.name}, {rows} x {cols} taxels on {_chips(len(file.chips))}"]
-    lines += [
-        f"  {bus['device']:<16} {_chips(bus['chips'], 3):<9}  {bus['bits']:>8.0f} bits a frame at "
-        f"{bus['clock_hz'] / 1000:g} {'kbit/s' if spec.serial else 'kHz'}"
-        for bus, spec in zip(event["buses"], file.buses, strict=True)
+    lines = [
+        f"{arguments.skin}: {file.name}, {rows} x {cols} taxels on {_chips(len(file.chips))}",
+        *(
+            f"  {bus.device:<16} {_chips(len(bus.chips), 3):<9}  {count:>8.0f} bits a frame at "
+            f"{bus.clock_hz / 1000:g} {'kbit/s' if bus.serial else 'kHz'}"
+            for bus, count in zip(file.buses, bits, strict=True)
+        ),
+        f"The wires carry {rate:.1f} frames a second, with {arguments.overhead:g} us of software "
+        f"for each transaction; the file asks for {asked:g}.",
+        *(f"Wrong:  {sentence}" for sentence in wrong),
+        *(f"Remark: {sentence}" for sentence in remarked),
     ]
-    lines.append(
-        f"The wires carry {event['frame_rate_hz']:g} frames a second, with "
-        f"{event['overhead_us']:g} us of software for each transaction; the file asks for "
-        f"{event['asked_hz']:g}."
-    )
-    lines += [f"Wrong:  {sentence}" for sentence in wrong]
-    lines += [f"Remark: {sentence}" for sentence in said]
-    return "\n".join(lines)
+    output.event(event, "\n".join(lines))
+    return 1 if wrong else 0
 
 
 def _chips(count: int, width: int = 0) -> str:

@@ -126,10 +126,6 @@ def open_skin(
         for status in skin.status():
             if status.error:
                 LOG.warning(f"{status.error}; left out for now")
-        LOG.debug(
-            f"{source}: {file.layout.rows} x {file.layout.cols} taxels, {len(file.chips)} chips on "
-            f"{len(file.buses)} buses at {file.reading.rate_hz:g} Hz"
-        )
         yield Opened(skin, lasts_s, playback, source)
 
 

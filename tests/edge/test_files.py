@@ -27,7 +27,7 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path):
     for path, why in (
         (tmp_path / "fifo", "not a regular file"),
         ("/dev/zero", "not a regular file"),
-        (tmp_path, "a folder"),
+        (tmp_path, "Is a directory"),
         (tmp_path / "none", "No such file"),
         ("a\0b", "null"),
     ):
