@@ -226,13 +226,9 @@ class Classifier:
     def _afresh(self, layout: SkinLayout, frames: Iterable[Frame]) -> Iterator[Event]:
         """The events of a stream of its own, with this classifier's settings."""
         fresh = Classifier(
-            self.model,
-            layout,
-            error=self.error,
-            novelty_rate=self.novelty_rate,
-            max_contacts=self._max_contacts,
-            motion_on_skin=self._motion_on_skin,
-        )
+            self.model, layout, error=self.error, novelty_rate=self.novelty_rate,
+            max_contacts=self._max_contacts, motion_on_skin=self._motion_on_skin,
+        )  # fmt: skip
         for frame in frames:
             yield from fresh.push(frame)
         yield from fresh.finish()

@@ -13,12 +13,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from edge.commands.output import Output, wrapped
-from edge.commands.replay import suited
-from edge.errors import InputError
+from edge.commands.replay import contact_of
 from edge.model.explanation import Near, Space, explain
 from edge.model.info import ModelInfo
 from edge.model.model import Model
-from edge.model.verify import first_series
 from edge.recording import Recording, find, load
 
 MOST = 3
@@ -51,10 +49,7 @@ def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict
         InputError: the recording does not suit the model, or holds no contact.
     """
     info = model.info
-    contact = first_series(suited(model, recording, name), model)
-    if contact is None:
-        raise InputError(f"{name}: holds no contact")
-    vector = info.vector(contact[1])
+    vector = info.vector(contact_of(model, recording, name))
     for task, decision in model.decide(vector).items():
         labels = info.tasks[task].labels
         answer, rows = labels.index(decision.label), decision.neighbours.tolist()

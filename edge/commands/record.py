@@ -189,15 +189,17 @@ def run(arguments: argparse.Namespace) -> int:
             "skin_name": skin.file.name,
             "source": live.source,
             "rate_hz": skin.file.reading.rate_hz,
-            **({} if arm is None else {"arm": arm.to_dict()}),
         }
+        if arm is not None:
+            meta["arm"] = arm.to_dict()
         recorder = Recorder(arguments.out, labels, meta, names, lines)
         tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead_frames = round(LEAD_S / skin.period_s)
         trials = Trials(tracker, lead_frames=lead_frames, length_s=arguments.length)
         LOG.info("waiting for a contact" + (KEYS if by_key else ""))
-        for number, (task, label) in enumerate(arguments.label[:9] if by_key else (), 1):
-            LOG.info(f"  {number}  {task}={label}")
+        choices = arguments.label if by_key else []
+        for digit, (task, label) in zip(DIGITS, choices, strict=False):
+            LOG.info(f"  {digit}  {task}={label}")
         for frame, faults in live.frames():
             lines.write(faults)
             frames = trials.push(frame)
@@ -205,7 +207,7 @@ def run(arguments: argparse.Namespace) -> int:
                 recorder.labels = page.labels
                 frames = frames if page.recording else None
             for key in typed() if by_key else "":
-                recorder.press(key, arguments.label)
+                recorder.press(key, choices)
             live.show(frame, faults)
             saved = recorder.save(frames, complete=True)
             if page is not None and saved is not None:
@@ -261,19 +263,17 @@ class Recorder:
         """Save the frames of a trial, if there is one; returns its file and what it holds."""
         if frames is None:
             return None
-        without = sum(frame.joints is None for frame in frames)
+        unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}
-        if self.names is not None and without < len(frames):
+        if self.names is not None and unposed < len(frames):
             meta["joint_names"] = list(self.names)
         trial = recording(frames, meta)
         while True:
             path = trial_path(self.out, self.labels)
             meta["trial"] = path.stem
-            try:
+            with suppress(NameTaken):  # another recorder in this folder was faster
                 save(path, trial, overwrite=False)
                 break
-            except NameTaken:  # another recorder in this folder was faster
-                continue
         self.paths.append(path)
         self.any_joints |= trial.joints is not None
         event = {
@@ -286,9 +286,9 @@ class Recorder:
             "missing_taxels": trial.valid is not None,
             "complete": complete,
         }
-        if trial.joints is not None and without:
-            LOG.warning(f"{path}: {without} of {len(frames)} frames have no joint angles")
-            event["frames_without_joints"] = without
+        if trial.joints is not None and unposed:
+            LOG.warning(f"{path}: {unposed} of {len(frames)} frames have no joint angles")
+            event["frames_without_joints"] = unposed
         if not complete:
             event["reason"] = "reading stopped before the contact's end"
         self.lines.write([event])

@@ -16,7 +16,9 @@ from edge.commands.output import Output
 from edge.commands.summary import Summary
 from edge.errors import InputError
 from edge.model.model import Model, require_joints
+from edge.model.verify import first_series
 from edge.recording import Recording, find, load
+from edge.touch.contact import FeatureSeries
 
 LOG = logging.getLogger(__name__)
 
@@ -43,6 +45,18 @@ def suited(model: Model, recording: Recording, name: str) -> Recording:
         recording = recording.for_joints(model.info.chain.names, name)
     require_joints(model, recording.dof, name)
     return recording
+
+
+def contact_of(model: Model, recording: Recording, name: str) -> FeatureSeries:
+    """The series of a recording's first contact.
+
+    Raises:
+        InputError: the recording does not suit the model, or holds no contact.
+    """
+    contact = first_series(suited(model, recording, name), model)
+    if contact is None:
+        raise InputError(f"{name}: holds no contact")
+    return contact[1]
 
 
 def decide(

@@ -114,13 +114,9 @@ def open_skin(
         # Without a skin file nobody calibrates, and the chips serve the recording as it is.
         noise = 0.0 if arguments.skin is None else arguments.noise
         skin, playback = play(
-            file,
-            recording,
-            loop=arguments.loop,
-            clock=clock,
-            noise_counts=noise,
+            file, recording, loop=arguments.loop, clock=clock, noise_counts=noise,
             touch_counts=touch,
-        )
+        )  # fmt: skip
         lasts_s, source = min(playback.ends, lasts_s), f"fake {arguments.fake}"
     with skin:
         for status in skin.status():
@@ -129,47 +125,38 @@ def open_skin(
         yield Opened(skin, lasts_s, playback, source)
 
 
-@contextmanager
 def open_joints(
-    arguments: argparse.Namespace, opened: Opened, arm: Chain | None, dof: int | None
-) -> Iterator[JointSource | None]:
-    """The source of joint angles that the options name, or else the recording being played.
+    arguments: argparse.Namespace, opened: Opened, arm: Chain | None, dof: int, stack: ExitStack
+) -> Joints:
+    """The source of joint angles that `--joints` names.
 
     Args:
         arguments: with the options of `options.add_reading`.
         opened: the skin that is being read.
         arm: whose joint angles are wanted, or None if it is unknown.
-        dof: how many angles a line must have; None if none are wanted.
+        dof: how many angles a line must have.
+        stack: closes the source.
 
     Raises:
-        InputError: the options contradict each other.
+        InputError: the option cannot be used.
     """
-    if arguments.joints is None:
-        yield opened.playback if opened.dof else None
-        return
-    if dof is None:
-        raise InputError("the model uses no joint angles; leave --joints out")
     kind, _, address = arguments.joints.partition(":")
-    if kind not in ("stdin", "udp") or (kind == "stdin" and address):
+    source: Source
+    if kind == "udp":
+        source = stack.enter_context(closing(Datagrams(address)))
+    elif arguments.joints == "stdin":
+        source = from_file(sys.stdin.fileno())
+    else:
         raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {arguments.joints!r}")
     clock = opened.skin.clock
-    with ExitStack() as stack:
-        source: Source
-        if kind == "udp":
-            source = stack.enter_context(closing(Datagrams(address)))
-        else:
-            source = from_file(sys.stdin.fileno())
-        stream = Joints(
-            source,
-            dof=dof,
-            names=None if arm is None else arm.names,
-            now=clock.real if isinstance(clock, PacedClock) else clock.now,
-        )
-        yield stream
-        if stream.malformed:
-            LOG.warning(
-                f"--joints: unusable lines: {stream.malformed}; the last one: {stream.problem}"
-            )
+    now = clock.real if isinstance(clock, PacedClock) else clock.now
+    return Joints(source, dof=dof, names=None if arm is None else arm.names, now=now)
+
+
+def report_malformed(joints: Joints) -> None:
+    """Warn of lines of joint angles that could not be used."""
+    if joints.malformed:
+        LOG.warning(f"--joints: unusable lines: {joints.malformed}; the last one: {joints.problem}")
 
 
 @dataclass(frozen=True)
@@ -259,9 +246,14 @@ def reading(
         opened = stack.enter_context(open_skin(arguments, model=model, arm=played))
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
-        if model is not None and needs_joints and arguments.joints is None:
+        joints: JointSource | None = opened.playback if opened.dof else None
+        if arguments.joints is not None:
+            if dof is None:
+                raise InputError("the model uses no joint angles; leave --joints out")
+            joints = open_joints(arguments, opened, arm, dof, stack)
+            stack.callback(report_malformed, joints)
+        elif model is not None and needs_joints:
             require_joints(model, opened.dof, opened.source)
-        joints = stack.enter_context(open_joints(arguments, opened, arm, dof))
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:

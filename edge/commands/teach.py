@@ -15,12 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from edge.commands.output import Output
-from edge.commands.replay import suited
-from edge.errors import InputError
+from edge.commands.replay import contact_of
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.model.teaching import joined, taught
-from edge.model.verify import first_series, renew
+from edge.model.verify import renew
 from edge.recording import find, load
 
 LOG = logging.getLogger(__name__)
@@ -41,12 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     names, vectors, labels = [], [], []
     for path in find(arguments.recordings):
         recording = load(path)
-        contact = first_series(suited(model, recording, str(path)), model)
-        if contact is None:
-            raise InputError(f"{path}: holds no contact")
+        series = contact_of(model, recording, str(path))
         names.append(str(path))
         labels.append(joined(recording.labels))
-        vectors.append([model.info.vector(contact[1], s) for s in model.decision_points_s])
+        vectors.append([model.info.vector(series, s) for s in model.decision_points_s])
     golden = Path(arguments.model).with_name("golden.npz")
     at_points = np.array(vectors).swapaxes(0, 1)
     data = taught(model, names, at_points, labels)

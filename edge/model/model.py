@@ -219,14 +219,11 @@ class Model:
 
     def _refusal(self, x: NDArray[np.float64]) -> InputError:
         """The error for a vector that the graph answers with label -1."""
-        if np.isfinite(x).all():
+        finite = np.isfinite(x)
+        if finite.all():
             return InputError("the features are too large to be scaled")
-        bad = int(np.argmin(np.isfinite(x)))
-        ends = np.cumsum(self.info.widths)
-        which = int(ends.searchsorted(bad, side="right"))
-        feature = self.info.features[which]
-        within = bad - int(ends[which]) + self.info.widths[which]
-        return InputError(f"value {within} of {feature} is not finite")
+        feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
+        return InputError(f"value {finite.argmin()} of the features, of {feature}, is not finite")
 
 
 def require_joints(model: Model, dof: int | None, where: str) -> None:
