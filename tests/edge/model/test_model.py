@@ -74,9 +74,7 @@ def test_decisions_do_not_share_their_arrays(model, golden):
 def test_a_value_that_is_not_finite_is_refused_with_its_place(model, golden, value):
     vector = golden["vectors"][0].copy()
     vector[43] = value
-    with pytest.raises(
-        InputError, match="value 43 of the features, of contact_area, is"
-    ):
+    with pytest.raises(InputError, match="value 43 of the features, of contact_area, is"):
         model.decide(vector)
     answer = model.run(vector[None])
     assert answer["object_label"].tolist() == [-1]
