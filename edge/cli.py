@@ -121,8 +121,8 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
 def _open_missing_streams() -> None:
     """Open the null device for each standard stream that was closed before the program began.
 
-    Otherwise the next file to be opened would take the stream's descriptor, and receive what is
-    printed. Characters that the output's encoding lacks are then written as escapes.
+    Otherwise the next file to be opened would take the stream's descriptor, and receive the printed
+    lines. Characters that the output's encoding lacks are then written as escapes.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:

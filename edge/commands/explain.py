@@ -53,8 +53,8 @@ def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict
     for task, decision in model.decide(vector).items():
         labels = info.tasks[task].labels
         answer, rows = labels.index(decision.label), decision.neighbours.tolist()
-        given = recording.labels.get(task)
-        truth = labels.index(given) if given in labels else None
+        true_label = recording.labels.get(task)
+        truth = labels.index(true_label) if true_label in labels else None
         space = Space.of(model, task)
         why = explain(space, vector, rows, answer, info.features, info.widths, truth)
 

@@ -43,12 +43,11 @@ def run(arguments: argparse.Namespace) -> int:
         recording = load(path)
         if names or labels:
             save(path, replace(recording, meta=meta))
-        own = meta.get("labels", {})
-        counts.update(own.items())
-        text = " ".join(f"{task}={label}" for task, label in own.items()) or "no label"
-        output.event(
-            {"event": "labels", "file": str(path), "labels": own}, f"{path!s:<{width}}  {text}"
-        )
+        current = meta.get("labels", {})
+        counts.update(current.items())
+        text = " ".join(f"{task}={label}" for task, label in current.items()) or "no label"
+        event = {"event": "labels", "file": str(path), "labels": current}
+        output.event(event, f"{path!s:<{width}}  {text}")
     for (task, label), count in sorted(counts.items()):
         output.text(f"{count:>6} of {len(paths)}  {task}={label}")
     return 0
@@ -62,13 +61,14 @@ def changed(
     Raises:
         InputError: the recording has a task of the new name, or its contacts have their own labels.
     """
-    own = meta.get("labels", {})
+    current = meta.get("labels", {})
     for old, new in names.items():
-        if old in own and new in own:
+        if old in current and new in current:
             raise InputError(f"{name}: has a label for {new} already; {old} cannot take its name")
     if meta.get("contacts") and (names or labels):
         raise InputError(
             f"{name}: its contacts have labels of their own; `python -m train split` makes a "
             "recording of each"
         )
-    return {**meta, "labels": {**{names.get(task, task): own[task] for task in own}, **labels}}
+    renamed = {names.get(task, task): label for task, label in current.items()}
+    return {**meta, "labels": {**renamed, **labels}}

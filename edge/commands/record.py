@@ -260,7 +260,7 @@ class Recorder:
             self.lines.write([{"event": "deleted", "file": str(path)}])
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> tuple[Path, Recording] | None:
-        """Save the frames of a trial, if there is one; returns its file and what it holds."""
+        """Save the frames of a trial, if there is one; returns its file and the recording."""
         if frames is None:
             return None
         unposed = sum(frame.joints is None for frame in frames)

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         LOG.warning(f"{golden}: no such file, so none is written for the taught model")
     for task, entry in after.info.tasks.items():
-        count = sum(own.get(task) in entry.labels for own in labels)
+        count = sum(trial_labels.get(task) in entry.labels for trial_labels in labels)
         line = {"event": "taught", "task": task, "trials": count, "file": str(target)}
         output.event(line, f"{task}: {count} of {len(names)} trials taught")
     LOG.info(f"{target}: its accuracy is not measured, and no error rate is certified any more")

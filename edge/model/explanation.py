@@ -95,7 +95,8 @@ class Space(NamedTuple):
 class Near(NamedTuple):
     """A training trial near a touch: its row, label (index) and distance, and the features' pulls.
 
-    A pull is by how much a feature lowers the squared distance; the strongest come first.
+    A feature's pull is the amount by which it lowers the squared distance. The strongest pull comes
+    first.
     """
 
     row: int
@@ -121,8 +122,8 @@ class Explanation(NamedTuple):
 
     Attributes:
         voters: the nearest training trials, nearest first.
-        rival: the nearest one of another label than the answer, or of the right one; None if there
-            is none.
+        rival: the nearest trial with another label than the answer, or with the right label if that
+            is known; None without such a trial.
         pulls: {feature: how much more it pulls towards the nearest trial with the answer than
             towards the rival}, the strongest first.
         changes: one for each feature that can change the answer, the smallest of them, in
@@ -158,7 +159,7 @@ def explain(
     feature_of = np.repeat(features, widths)[space.columns]
     members = {name: feature_of == name for name in features if name in feature_of}
     differences = space.differences(vector)
-    shifts = np.array([differences[own] @ space.weights[own] for own in members.values()])
+    shifts = np.array([differences[c] @ space.weights[c] for c in members.values()])
     squares = ((space.rows - space.coordinates(differences)) ** 2).sum(axis=1)
 
     def pulls(towards: NDArray[np.float64]) -> dict[str, float]:
@@ -174,14 +175,14 @@ def explain(
         return Explanation(nearest)
     others = space.labels == truth
     others = others if truth != label and others.any() else ~answered
-    own, rival = (int(np.where(of, squares, np.inf).argmin()) for of in (answered, others))
-    direction = space.rows[own] - space.rows[rival]
+    ally, rival = (int(np.where(rows, squares, np.inf).argmin()) for rows in (answered, others))
+    direction = space.rows[ally] - space.rows[rival]
     changes = []
     for name, columns in members.items():
         slope = 2.0 * space.weights[columns] @ direction
         if not slope.any():
             continue
-        step = slope * (min(squares[own] - squares[rival], 0.0) / (slope @ slope))
+        step = slope * (min(squares[ally] - squares[rival], 0.0) / (slope @ slope))
         for times in STEPS:
             changed = differences.copy()
             changed[columns] += times * step

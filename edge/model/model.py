@@ -123,10 +123,10 @@ class Model:
                     f"{self.path}: its graph has no {kind} {name} of shape {shape}, which its "
                     "metadata describes; export it again"
                 )
-        for given in inputs:
-            if given.name not in expected:
+        for value in inputs:
+            if value.name not in expected:
                 raise InputError(
-                    f"{self.path}: has an input {given.name}, which no exported model has; export "
+                    f"{self.path}: has an input {value.name}, which no exported model has; export "
                     "it again"
                 )
 
@@ -156,11 +156,11 @@ class Model:
         point = last if decision_point is None else decision_point
         if not 0 <= point <= last:
             raise InputError(f"{self.path}: has the decision points 0 to {last}, not {point}")
-        given: dict[str, NDArray[Any]] = {"features": vectors}
+        inputs: dict[str, NDArray[Any]] = {"features": vectors}
         if self.info.decision_points_s:
-            given["decision_point"] = np.array([point], dtype=np.int64)
+            inputs["decision_point"] = np.array([point], dtype=np.int64)
         try:
-            values = self._session.run(list(self._outputs), given)
+            values = self._session.run(list(self._outputs), inputs)
         except Exception as error:  # an index past its tensor, shapes that do not match
             raise self._broken(str(error)) from None
         outputs = dict(zip(self._outputs, values, strict=True))

@@ -78,7 +78,7 @@ class Contents:
             point: the decision point at which to take such a value; None for all of them.
 
         Raises:
-            KeyError: there is none of the name.
+            KeyError: the graph has no such constant.
         """
         if name in self.tensors:
             tensor: Any = self.tensors[name]

@@ -42,11 +42,11 @@ def margin(distances: Sequence[float], label: int) -> float:
         The difference of the roots. It is minus infinity if the label's own trials are infinitely
         far away, and 0 if there is no other label.
     """
-    own = math.sqrt(distances[label])
+    own_distance = math.sqrt(distances[label])
     others = [d for other, d in enumerate(distances) if other != label]
     if not others:
         return 0.0
-    return math.sqrt(min(others)) - own if own < math.inf else -math.inf
+    return math.sqrt(min(others)) - own_distance if own_distance < math.inf else -math.inf
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class Novelty:
     limits: tuple[tuple[float, ...], ...]
 
     def rate(self, decision_point: int, distance: float) -> float:
-        """The smallest novelty rate at which the distance counts as unknown; 1 if there is none."""
+        """The smallest novelty rate at which the distance counts as unknown; 1 if it never does."""
         smallest = 1.0
         for rate, limit in zip(self.rates, self.limits[decision_point], strict=True):
             if distance > limit:

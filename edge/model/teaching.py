@@ -1,8 +1,8 @@
 """Teaching a model on the board: trials become neighbours, in the projection that the model has.
 
-An exported model keeps what the neighbours of a task are in constants of its graph that carry the
-task's name. They alone are changed. Scaling, projection, calibration and certificates are still
-those of the trials that the model was fitted on.
+The neighbours of a task are constants of the model's graph that carry the task's name. Only these
+constants change. Scaling, projection, calibration and certificates remain those of the trials that
+the model was fitted on.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from edge.model.onnx_file import Contents
 NEAREST_OF_LABEL = 3
 LABEL_SHARE = 20
 JOINED = ("category", "softness", "mobility")
-"""A task whose labels are those of two others, joined by a hyphen."""
+"""A task, and the two tasks whose labels its own are made of, joined by a hyphen."""
 
 
 def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many of so many training trials stand for their label: a twentieth, or 3 where there are.
+    """How many trials stand for a label with so many trials: a twentieth, but at least three.
 
-    The distance of a part of the trials stays what it is when there are more of them.
+    A label with fewer than three trials is represented by all of them. With a share rather than a
+    number, a label's distance does not shrink as its trials become more.
     """
     return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
@@ -63,14 +64,19 @@ def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[A
 
 
 def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str, str]:
-    """{task: label} of a trial, with those of `tasks`, like `JOINED`, that follow from others."""
-    whole, *halves = tasks
-    follow: dict[str, str] = {}
-    if labels.get(whole, "").count("-") == 1:
-        follow = dict(zip(halves, labels[whole].split("-"), strict=True))
-    elif labels.keys() >= set(halves):
-        follow = {whole: "-".join(labels[half] for half in halves)}
-    return {**follow, **labels}
+    """{task: label} of a trial, with the labels of `tasks` that follow from its others.
+
+    Args:
+        labels: {task: label} of the trial.
+        tasks: a task and its two factors, like `JOINED`.
+    """
+    product, *factors = tasks
+    implied: dict[str, str] = {}
+    if labels.get(product, "").count("-") == 1:
+        implied = dict(zip(factors, labels[product].split("-"), strict=True))
+    elif labels.keys() >= set(factors):
+        implied = {product: "-".join(labels[factor] for factor in factors)}
+    return {**implied, **labels}
 
 
 def taught(
@@ -94,14 +100,14 @@ def taught(
             the file was exported by an earlier version.
     """
     info = model.info
-    for name, trial, own in zip(names, vectors.swapaxes(0, 1), labels, strict=True):
-        decisions = [model.decide(vector, point) for point, vector in enumerate(trial)]
-        if any(next(iter(each.values())).out_of_range for each in decisions):
+    for name, trial, trial_labels in zip(names, vectors.swapaxes(0, 1), labels, strict=True):
+        points = [model.decide(vector, point) for point, vector in enumerate(trial)]
+        if any(next(iter(decisions.values())).out_of_range for decisions in points):
             raise InputError(
                 f"{name}: lies far outside the trials that the model was fitted on, so its "
                 "projection cannot place it; export a model with it"
             )
-        if not any(own.get(task) in entry.labels for task, entry in info.tasks.items()):
+        if not any(trial_labels.get(task) in entry.labels for task, entry in info.tasks.items()):
             known = "; ".join(f"{t}: {', '.join(e.labels[:6])}" for t, e in info.tasks.items())
             raise InputError(
                 f"{name}: has no label that the model knows ({known}); label it, or export anew"
@@ -111,7 +117,7 @@ def taught(
         changed: dict[str, NDArray[Any]] = {}
         for task, entry in info.tasks.items():
             index = {label: i for i, label in enumerate(entry.labels)}
-            new = np.array([index.get(own.get(task, ""), -1) for own in labels])
+            new = np.array([index.get(named.get(task, ""), -1) for named in labels])
             z = np.stack([coordinates(contents, task, p, x) for p, x in enumerate(vectors)])
             lengths = np.where(new < 0, np.inf, (z**2).sum(axis=2))
             more = {"columns": -2.0 * z.swapaxes(1, 2) * (new >= 0), "lengths": lengths}
