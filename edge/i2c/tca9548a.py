@@ -15,8 +15,6 @@ from edge.i2c.chip import FakeChip
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = 8
-CONTROLS = [0, *(1 << n for n in range(CHANNELS))]
-"""Control bytes that connect no channel, and each one alone."""
 LEAVE_ATTEMPTS = 4
 SELECT_BITS = wire_bits([write(0x70, b"\0")])
 """Bits on the wire of selecting a channel."""
@@ -56,7 +54,7 @@ class TCA9548A:
         self.bus, self.address, self.verify = bus, address, verify
         self.control: int | None = None
         """The control byte, a bit for each connected channel; None where it is unknown."""
-        self._writes = [bus.prepare(write(address, [n])) for n in CONTROLS]
+        self._write = bus.prepare(write(address, [0]))
         self._read = bus.prepare(read(address, 1))
         self._beside = beside
         self.select(None)
@@ -79,7 +77,8 @@ class TCA9548A:
                 mux.leave()
         self.forget()
         self._expected = control
-        self.bus.transfer(self._writes[CONTROLS.index(control)])
+        self._write.buffer[0] = control
+        self.bus.transfer(self._write)
         if self.verify and not self.kept():
             raise bus_error(errno.EIO, self.bus.name, self.address)
         self.control = control

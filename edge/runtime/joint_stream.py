@@ -139,12 +139,11 @@ class Joints:
     def _line(self, line: bytes, arrived: float) -> None:
         try:
             pose = parse_json(line, "a line")
-            t, q = pose["t"], pose["q"]
+            t, q = pose["t"], list(pose["q"])
+            if not {type(number) for number in (t, *q)} <= {int, float}:
+                raise TypeError
         except (InputError, KeyError, TypeError):
             return self._bad('a line is not {"t": seconds, "q": [angles]}')
-        numbers = [t, *q] if isinstance(q, list) else [None]
-        if any(type(x) not in (int, float) for x in numbers):
-            return self._bad("a time or an angle is not a number")
         names = pose.get("names")
         if names is not None and self._names is not None:
             if not isinstance(names, list) or len(names) != len(q):

@@ -106,6 +106,8 @@ class Contact:
     Attributes:
         onset_s: when it began, on the frames' clock.
         age_s: time of the last frame taken in, seconds from onset.
+        touched_s: when the region was last seen, seconds from onset.
+        frames: number of frames since onset.
         layout: the skin.
         chain: the arm that its motion is measured with; None where it is measured on the skin.
         ended: no more frames will come.
@@ -118,7 +120,8 @@ class Contact:
     def __init__(
         self, onset_s: float, layout: SkinLayout, measurer: Measurer, chain: Chain | None = None
     ) -> None:
-        self.onset_s, self.age_s = onset_s, 0.0
+        self.onset_s, self.age_s, self.touched_s = onset_s, 0.0, 0.0
+        self.frames = 0
         self.layout, self.chain = layout, chain
         self.ended = self.missing_taxels = self.missing_pose = False
         self.region: Region | None = None

@@ -31,46 +31,6 @@ class TrackSettings:
     The first of them is its onset."""
 
 
-class RegionTrack:
-    """Follows one region from its onset to the end of its contact.
-
-    A contact begins with the first of `debounce` frames in a row whose region has a peak above
-    the skin's onset count. It ends when no taxel of it has been above the threshold for the skin's
-    `release_s`. With two thresholds, a force that hovers at one of them stays one contact. With the
-    time, an arm that bounces off a rigid thing and comes back makes one contact.
-
-    Attributes:
-        contact: the contact followed, confirmed or not.
-    """
-
-    def __init__(self, contact: Contact, settings: TrackSettings, horizon_s: float) -> None:
-        """Follow a contact from the frame that is pushed next."""
-        self.contact = contact
-        self._settings, self._horizon_s = settings, horizon_s
-        self._run = 0
-        self._touched_s = 0.0
-
-    def push(self, frame: Frame, active: ActiveTaxels, region: Region | None) -> Contact | None:
-        """The contact, from the frame that confirms it on, else None; takes in a frame."""
-        contact, layout = self.contact, self.contact.layout
-        age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
-        if self._run < self._settings.debounce:
-            if region is None or region.peak <= layout.onset:
-                contact.ended = True
-                return None
-            contact.add(frame, active, region, age_s)
-            self._touched_s = age_s
-            self._run += 1
-            return contact if self._run == self._settings.debounce else None
-        if contact.age_s < self._horizon_s:
-            contact.add(frame, active, region, age_s)
-        if region is not None:
-            self._touched_s = age_s
-        elif released(self._touched_s, age_s, layout.release_s):
-            contact.ended = True
-        return contact
-
-
 class ContactTracker:
     """Finds contacts in a stream of frames and follows them.
 
@@ -79,6 +39,11 @@ class ContactTracker:
     contact that it shares most taxels with, or else one that it touches. Where two contacts grow
     into one region, the older one keeps it and the other ends. Where a region splits, the larger
     share continues the contact and the other share begins a new one.
+
+    A contact begins with the first of `debounce` frames in a row whose region has a peak above
+    the skin's onset count. It ends when no taxel of it has been above the threshold for the skin's
+    `release_s`. With two thresholds, a force that hovers at one of them stays one contact. With the
+    time, an arm that bounces off a rigid thing and comes back makes one contact.
 
     Attributes:
         layout: the skin, with its thresholds.
@@ -124,7 +89,7 @@ class ContactTracker:
         self._chain, self._motion_on_skin = chain, motion_on_skin
         self._measurer = Measurer(layout, features, joints)
         self._max_contacts = max_contacts
-        self._tracks: list[RegionTrack] = []
+        self._contacts: list[Contact] = []
         self._t = -math.inf
 
     def push(self, frame: Frame) -> list[Contact]:
@@ -142,26 +107,42 @@ class ContactTracker:
         active = ActiveTaxels(
             frame.counts, self.layout.threshold_counts, valid=frame.valid, wraps=self.layout.wraps
         )
-        tracks = self._tracks
+        contacts = list(self._contacts)
         if self._max_contacts > 1:
             regions = active.regions
-            shares = _shared(tracks, regions)
+            shares = _shared(contacts, regions)
         else:
-            largest = active.largest(tracks[0].contact.region if tracks else None)
+            largest = active.largest(contacts[0].region if contacts else None)
             regions = [] if largest is None else [largest]
-            shares = dict.fromkeys(range(len(tracks)), 0) if regions else {}
+            shares = dict.fromkeys(range(len(contacts)), 0) if regions else {}
         self.region = regions[0] if regions else None
-        pairs = [
-            (track, regions[shares[i]] if i in shares else None) for i, track in enumerate(tracks)
-        ]
+        of_contacts = [regions[shares[i]] if i in shares else None for i in range(len(contacts))]
         for j, region in enumerate(regions):
             begins = j not in shares.values() and region.peak > self.layout.onset
-            if begins and len(pairs) < self._max_contacts:
-                contact = self._contact(frame, region)
-                pairs.append((RegionTrack(contact, self._settings, self.horizon_s), region))
-        contacts = [track.push(frame, active, region) for track, region in pairs]
-        self._tracks = [track for track, _ in pairs if not track.contact.ended]
-        return [contact for contact in contacts if contact is not None]
+            if begins and len(contacts) < self._max_contacts:
+                contacts.append(self._contact(frame, region))
+                of_contacts.append(region)
+        for contact, of_contact in zip(contacts, of_contacts, strict=True):
+            self._follow(contact, frame, active, of_contact)
+        self._contacts = [contact for contact in contacts if not contact.ended]
+        return [contact for contact in contacts if contact.frames >= self._settings.debounce]
+
+    def _follow(
+        self, contact: Contact, frame: Frame, active: ActiveTaxels, region: Region | None
+    ) -> None:
+        """Take a frame into a contact, and end it where it is over."""
+        age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
+        confirmed = contact.frames >= self._settings.debounce
+        if not confirmed and (region is None or region.peak <= self.layout.onset):
+            contact.ended = True
+            return
+        contact.frames += 1
+        if not confirmed or contact.age_s < self.horizon_s:
+            contact.add(frame, active, region, age_s)
+        if region is not None:
+            contact.touched_s = age_s
+        elif released(contact.touched_s, age_s, self.layout.release_s):
+            contact.ended = True
 
     def _check(self, frame: Frame) -> None:
         if frame.counts.shape != self.layout.shape:
@@ -185,12 +166,12 @@ class ContactTracker:
         return Contact(region_time(frame, region), self.layout, self._measurer, chain)
 
 
-def _shared(tracks: list[RegionTrack], regions: list[Region]) -> dict[int, int]:
-    """{track: region} by the most taxels in common, then the older, then the larger region."""
+def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
+    """{contact: region} by the most taxels in common, then the older, then the larger region."""
     pairs = []
-    for i, track in enumerate(tracks):
+    for i, contact in enumerate(contacts):
         for j, region in enumerate(regions):
-            former = track.contact.region
+            former = contact.region
             if former is not None and former.touches(region):
                 pairs.append((-(former.bits & region.bits).bit_count(), i, j))
     shares: dict[int, int] = {}
