@@ -52,8 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.file.exists():
         raise InputError(f"{arguments.file}: no such file or folder")
     importer = arguments.importer
-    own = (arguments,) if hasattr(importer, "add_options") else ()
-    trials = importer.trials(arguments.file, arm, *own)
+    options = (arguments,) if hasattr(importer, "add_options") else ()
+    trials = importer.trials(arguments.file, arm, *options)
     without_threshold: list[tuple[Path, Recording]] = []
     paths: set[Path] = set()
     for name, recording in bar(trials, desc="importing", unit=" trials"):

@@ -26,8 +26,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the proposal, and the contacts that it and other thresholds give."""
     recordings = read(arguments.data, progress=True).recordings
     threshold, onset = proposed(recordings)
-    own = recordings[0].layout
-    rows = [("recorded", own.threshold_counts, own.onset), ("proposed", threshold, onset)]
+    recorded = recordings[0].layout
+    rows = [("recorded", recorded.threshold_counts, recorded.onset), ("proposed", threshold, onset)]
     for name, factor in (("half", 0.5), ("twice", 2), ("four times", 4)):
         # Multiples of nothing say nothing, so those of one count stand in.
         low, high = (round(factor * max(level, 1)) for level in (threshold, onset))

@@ -52,8 +52,8 @@ def draw_case(canvas: Any, case: Case, layout: SkinLayout, window_s: float, phon
     units = (layout.force_unit, "taxels", layout.length_unit)
     legend = {}
     for axis, unit, name in zip(axes, units, curves(case.touch), strict=False):
-        own = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
-        legend["this touch"] = axis.plot(*_within(case.touch, name, window_s), **own)[0]
+        stroke = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
+        legend["this touch"] = axis.plot(*_within(case.touch, name, window_s), **stroke)[0]
         for place, (text, series, same) in enumerate(case.near, start=1):
             colour, _, dashes = SAME if same else OTHER
             curve = ([], []) if series is None else _within(series, name, window_s)

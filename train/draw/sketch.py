@@ -35,7 +35,7 @@ its first row."""
 def link_positions(chain: Chain, q: Any) -> np.ndarray:
     """(links, 3) positions of the chain's joints and its tip, in metres."""
     chains = [Chain(chain.joints[: i + 1]) for i in range(len(chain.joints))]
-    return np.vstack([np.zeros(3), *(begin.pose(q[: begin.dof])[:3, 3] for begin in chains)])
+    return np.vstack([np.zeros(3), *(link.pose(q[: link.dof])[:3, 3] for link in chains)])
 
 
 def simulated(recording: Recording, where: str) -> dict[str, Any]:

@@ -156,7 +156,8 @@ def _tables(path: Path, folder: Path, options: argparse.Namespace) -> Named:
     for file in _files(folder.rglob("*")) if path.is_dir() else [path]:
         table = _table(file)
         if "trial" in table.names:
-            yield from _trials_in(table)
+            with parsing(str(file), "a table of trials"):
+                yield from _trials_in(table)
         else:
             yield *_called(file.relative_to(folder).with_suffix(""), options.task), table
 
@@ -176,8 +177,8 @@ def _files(paths: Iterable[Path]) -> list[Path]:
 
 def _called(place: Path, task: str) -> tuple[str, dict[str, str]]:
     """The name and label of the trial at a place in the folder."""
-    own = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
-    return "_".join(place.parts), {task: place.parent.name or own}
+    label = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
+    return "_".join(place.parts), {task: place.parent.name or label}
 
 
 def _labels(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
@@ -245,8 +246,8 @@ def _of_arrays(path: Path, data: bytes) -> _Table:
         shape = array.shape[1:] if array.ndim == 3 else shape
         if array.size % n == 0:
             blocks.append(array.reshape(n, -1))
-            wide = range(1, blocks[-1].shape[1] + 1)
-            names += [f"{key}.{i}".strip(".") for i in wide] if len(wide) > 1 else [key]
+            columns = range(1, blocks[-1].shape[1] + 1)
+            names += [f"{key}.{i}".strip(".") for i in columns] if len(columns) > 1 else [key]
     return _Table(path, names, np.hstack(blocks), shape)
 
 
@@ -281,14 +282,14 @@ def _is_number(text: str) -> bool:
 def _trials_in(table: _Table) -> Named:
     """The trials of a long table."""
     names, values = table.names, table.values
-    trial = values[:, names.index("trial")]
+    trial = values[:, names.index("trial")].astype(str)
     texts = [i for i, name in enumerate(names) if not _is_number(values[0, i]) and name != "trial"]
     kept = [i for i, name in enumerate(names) if name != "trial" and i not in texts]
     for trial_name in dict.fromkeys(trial.tolist()):
         rows = values[trial == trial_name]
-        own = _Table(table.path, [names[i] for i in kept], rows[:, kept])
+        rows_of_trial = _Table(table.path, [names[i] for i in kept], rows[:, kept])
         labels = {names[i]: str(rows[0, i]) for i in texts}
-        yield trial_name, labels, _pivoted(own) if "taxel" in names else own
+        yield trial_name, labels, _pivoted(rows_of_trial) if "taxel" in names else rows_of_trial
 
 
 def _pivoted(table: _Table) -> _Table:

@@ -167,12 +167,12 @@ def _joints(
             raise ValueError(f"a line of joint angles does not hold {JOINTS} finite numbers")
     if not angles:
         return None
-    own = (np.array(stamps) - start_ms) / 1000.0
-    if (np.diff(own) < 0.0).any():
+    joints_t = (np.array(stamps) - start_ms) / 1000.0
+    if (np.diff(joints_t) < 0.0).any():
         raise ValueError("the times of its joint angles go back")
     radians = np.radians(np.array(angles))
-    joints = np.stack([np.interp(t, own, column) for column in radians.T], axis=1)
-    joints[(t < own[0] - STALE_S) | (t > own[-1] + STALE_S)] = np.nan
+    joints = np.stack([np.interp(t, joints_t, column) for column in radians.T], axis=1)
+    joints[(t < joints_t[0] - STALE_S) | (t > joints_t[-1] + STALE_S)] = np.nan
     return joints
 
 

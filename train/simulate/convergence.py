@@ -92,9 +92,9 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
     """
     if scene.step_s:
         return {}
-    every = kinds(scene)
-    begin(scene, tuple(spec for specs in every.values() for spec in specs))
-    return dict(zip(every, measure(scene, list(every.values())), strict=True))
+    trials_by_kind = kinds(scene)
+    begin(scene, tuple(spec for specs in trials_by_kind.values() for spec in specs))
+    return dict(zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True))
 
 
 def at_middle(scene: Scene) -> Scene:
@@ -250,13 +250,13 @@ def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:
 
 def explain(scene: Scene) -> str:
     """The account that `simulate --explain` prints."""
-    every = kinds(scene)
-    measured = dict(zip(every, measure(scene, list(every.values())), strict=True))
-    every = kinds(scene, None if scene.step_s else measured)
-    first_trials = {spec.key: spec for specs in every.values() for spec in reversed(specs)}
+    trials_by_kind = kinds(scene)
+    measured = dict(zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True))
+    trials_by_kind = kinds(scene, None if scene.step_s else measured)
+    first_trials = {spec.key: spec for specs in trials_by_kind.values() for spec in reversed(specs)}
     spent = costs(scene, tuple(first_trials.values()))
-    lines = [f"{scene.name}: {sum(map(len, every.values()))} trials"]
-    for effects, specs in every.items():
+    lines = [f"{scene.name}: {sum(map(len, trials_by_kind.values()))} trials"]
+    for effects, specs in trials_by_kind.items():
         first = {spec.key: spec for spec in specs}
         step = _step_line(specs[0].step_s, measured[effects], scene)
         lines += ["", ", ".join(sorted(first)), step]
@@ -265,8 +265,8 @@ def explain(scene: Scene) -> str:
         for effect in effects:
             why = {required_effects(scene, s.object, s.condition)[effect] for s in first.values()}
             lines.append(f"  {effect:<16}{spent.get(effect, 0.0):>9.0f}  {', '.join(sorted(why))}")
-    left = [name for name in EFFECTS if not any(name in effects for effects in every)]
-    lines += ["", "not called for, not loaded: " + (", ".join(left) or "none")]
+    unused = [name for name in EFFECTS if not any(name in effects for effects in trials_by_kind)]
+    lines += ["", "not called for, not loaded: " + (", ".join(unused) or "none")]
     return "\n".join(lines)
 
 

@@ -123,6 +123,13 @@ def test_the_first_frame_of_a_folder_is_the_earliest(folder):
     assert recordings["cup"].t.tolist() == [0.0, 1.0]
 
 
+def test_trials_may_be_numbered_in_an_array(folder):
+    rows = np.array([[0.0], [0.0], [7.0]])
+    savemat(folder / "all.mat", {"trial": rows, "t": np.array([[0.0], [0.1], [0.0]]), "a": rows})
+    _, recordings = imported(folder)
+    assert {name: len(trial.t) for name, trial in recordings.items()} == {"0.0": 2, "7.0": 1}
+
+
 def test_joints_fractions_gaps_and_files_beside(folder):
     rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
     (folder / "a.csv").write_text(text(rows, head="left,right,q.1,q.2"))

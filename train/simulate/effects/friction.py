@@ -65,25 +65,25 @@ def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
 
 def reach_along(t: Trials, i: Index) -> None:
     """Find how the joints move the skin along the face."""
-    own = t.own["friction"]
+    state = t.own["friction"]
     skin = pick(t.point, i) + t.skin.radius_m * pick(t.normal, i)
     turned = cross(pick(t.along_face, i)[:, None], pick(t.axes, i))
     lever = dot(skin[:, None] - pick(t.origins, i), turned)
     given = pick(t.give, i) * lever
-    own.jacobian[:, i], own.give[i] = lever, total(lever * given)
-    own.coupled[:, i] = total(pick(t.jacobian, i) * given[:, None])
+    state.jacobian[:, i], state.give[i] = lever, total(lever * given)
+    state.coupled[:, i] = total(pick(t.jacobian, i) * given[:, None])
 
 
 def predict(t: Trials, i: Index) -> None:
     """Choose the pull of this step, and let arm and contact give way to it."""
-    own = t.own["friction"]
+    state = t.own["friction"]
     q, q_free, loads = pick(t.q, i), pick(t.q_free, i), pick(t.loads, i)
-    jacobian, coupled = pick(own.jacobian, i), pick(own.coupled, i)
+    jacobian, coupled = pick(state.jacobian, i), pick(state.coupled, i)
     drawn = total(jacobian * (q_free - q)) - coupled[0] * loads[0] - coupled[1] * loads[1]
-    stuck = own.stiffness * (pick(own.stretch, i) + drawn)
-    stuck = stuck / (1.0 + own.stiffness * pick(own.give, i))
+    stuck = state.stiffness * (pick(state.stretch, i) + drawn)
+    stuck = stuck / (1.0 + state.stiffness * pick(state.give, i))
     pull = np.clip(stuck, *bounds(t, i))
-    own.before[:, i], own.pull[i] = q, pull
+    state.before[:, i], state.pull[i] = q, pull
     t.q_free[:, i] = q_free - pick(t.give, i) * jacobian * pull
     t.y[:, i] = pick(t.y, i) - coupled * pull
 
@@ -99,11 +99,11 @@ def drag(t: Trials, i: Index) -> None:
 
 def settle(t: Trials, i: Index) -> None:
     """Update the stretch; the skin slips where friction cannot hold it."""
-    own = t.own["friction"]
-    moved = total(pick(own.jacobian, i) * (pick(t.q, i) - pick(own.before, i)))
+    state = t.own["friction"]
+    moved = total(pick(state.jacobian, i) * (pick(t.q, i) - pick(state.before, i)))
     low, high = bounds(t, i)
-    stretch = pick(own.stretch, i) + moved
-    own.stretch[i] = np.clip(stretch, low / own.stiffness, high / own.stiffness)
+    stretch = pick(state.stretch, i) + moved
+    state.stretch[i] = np.clip(stretch, low / state.stiffness, high / state.stiffness)
 
 
 def lean(t: Trials, i: Index) -> None:

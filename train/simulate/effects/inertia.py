@@ -66,36 +66,36 @@ def stand(t: Trials, i: Index) -> None:
 
 def pace(t: Trials, i: Index) -> None:
     """Shorten the steps when a touch is near, and for a while after a jolt."""
-    own, depth, force = t.own["inertia"], pick(t.inside, i), pick(t.force, i)
-    closing = np.maximum(depth - pick(own.depth, i), 0.0)
-    change, peak = force - pick(own.force, i), np.maximum(pick(own.peak, i), force)
-    jolts = np.abs(change - pick(own.change, i)) > JOLT * peak
-    left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(own.left, i))
+    state, depth, force = t.own["inertia"], pick(t.inside, i), pick(t.force, i)
+    closing = np.maximum(depth - pick(state.depth, i), 0.0)
+    change, peak = force - pick(state.force, i), np.maximum(pick(state.peak, i), force)
+    jolts = np.abs(change - pick(state.change, i)) > JOLT * peak
+    left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(state.left, i))
     near = (force == 0.0) & (depth + NEAR * closing > 0.0)
-    own.depth[i], own.force[i], own.change[i], own.peak[i] = depth, force, change, peak
+    state.depth[i], state.force[i], state.change[i], state.peak[i] = depth, force, change, peak
     t.steps[i] = np.where(near | (left > 0), FINER, 1) * pick(t.usual, i)
-    own.left[i] = np.maximum(left - 1, 0)
+    state.left[i] = np.maximum(left - 1, 0)
 
 
 def tune(t: Trials, i: Index) -> None:
     """Add inertia to the joint's stiffness within a step."""
-    own, h = t.own["inertia"], pick(t.h, i)
-    weight = own.inertia / h
+    state, h = t.own["inertia"], pick(t.h, i)
+    weight = state.inertia / h
     held = pick(t.held, i) + weight / h
-    own.weight[:, i], t.held[:, i] = weight, held
+    state.weight[:, i], t.held[:, i] = weight, held
     t.give[:, i] = 1.0 / (held + t.joint_k)
 
 
 def predict(t: Trials, i: Index) -> None:
     """Add the joints' speed to their position without load."""
-    own = t.own["inertia"]
-    further = pick(own.weight, i) * pick(own.speed, i) * pick(t.give, i)
-    own.before[:, i] = pick(t.q, i)
+    state = t.own["inertia"]
+    further = pick(state.weight, i) * pick(state.speed, i) * pick(t.give, i)
+    state.before[:, i] = pick(t.q, i)
     t.q_free[:, i] = pick(t.q_free, i) + further
     t.y[:, i] = pick(t.y, i) + total(pick(t.jacobian, i) * further[:, None])
 
 
 def settle(t: Trials, i: Index) -> None:
     """Update the speed at the end of the step."""
-    own = t.own["inertia"]
-    own.speed[:, i] = (pick(t.q, i) - pick(own.before, i)) / pick(t.h, i)
+    state = t.own["inertia"]
+    state.speed[:, i] = (pick(t.q, i) - pick(state.before, i)) / pick(t.h, i)

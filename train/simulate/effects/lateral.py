@@ -50,8 +50,8 @@ def widen(t: Trials, i: Index) -> None:
 def fill(t: Trials, i: Index) -> None:
     """Add one spring to each row, touched first, for the foam beside the contact."""
     width = 2.0 * MARGIN * pick(t.values["depth_m"], i) / t.skin.pitch[1]
-    more = pick(t.taxel_k, i) * width * pick(t.reach, i).any(axis=0)
-    t.add_springs(i, np.zeros((1, len(more))), more[None])
+    beside = pick(t.taxel_k, i) * width * pick(t.reach, i).any(axis=0)
+    t.add_springs(i, np.zeros((1, len(beside))), beside[None])
 
 
 def askew(depth: Array, weight: Array, pitch_m: float) -> Array:

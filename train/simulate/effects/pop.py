@@ -48,20 +48,20 @@ def lay(t: Trials, i: Index) -> None:
     steeper = (slopes[0], slopes[1] - slopes[0], slopes[2] - slopes[1], skin)
     stiffness = np.concatenate([reach * k for k in steeper])
     base.lay_rows(t, i)
-    own = t.own["pop"] = Bubbles(
+    state = t.own["pop"] = Bubbles(
         len(t.gaps), *[*np.zeros((2, len(gaps), t.n)), np.zeros((len(gaps), t.rows, t.n))]
     )
-    own.gaps[:, i], own.stiffness[:, i] = gaps, stiffness
-    own.alive[: -len(reach)] = 1.0
+    state.gaps[:, i], state.stiffness[:, i] = gaps, stiffness
+    state.alive[: -len(reach)] = 1.0
     t.add_springs(i, gaps, stiffness)
 
 
 def law(t: Trials, i: Index) -> None:
     """The law of the springs that are left, for a forearm that does not pivot."""
-    own, trials = t.own["pop"], np.arange(t.n)[i]
-    alive, weight = pick(own.alive, trials), pick(t.weight, trials)
-    gaps = pick(t.line_gap, trials) + pick(own.gaps, trials)[:, None]
-    stiffness = weight * (pick(own.stiffness, trials)[:, None] * alive)
+    state, trials = t.own["pop"], np.arange(t.n)[i]
+    alive, weight = pick(state.alive, trials), pick(t.weight, trials)
+    gaps = pick(t.line_gap, trials) + pick(state.gaps, trials)[:, None]
+    stiffness = weight * (pick(state.stiffness, trials)[:, None] * alive)
     t.obey(trials, gaps.reshape(-1, len(trials)), stiffness.reshape(-1, len(trials)))
 
 
@@ -72,21 +72,21 @@ def stand(t: Trials, i: Index) -> None:
 
 def change(t: Trials, trials: Places) -> None:
     """Give the solver the springs that are left."""
-    own, tilted = t.own["pop"], t.plan.also("tilt", trials)
+    state, tilted = t.own["pop"], t.plan.also("tilt", trials)
     if tilted.any():
         pivots = trials[tilted]
-        t.own["tilt"].keep_alive(pivots, own.first, own.alive.take(pivots, -1))
+        t.own["tilt"].keep_alive(pivots, state.first, state.alive.take(pivots, -1))
     if not tilted.all():
         law(t, trials[~tilted])
 
 
 def image(t: Trials, i: Index) -> None:
     """Share the force among the springs, then add up the four of each taxel."""
-    own = t.own["pop"]
+    state = t.own["pop"]
     loads = spring_loads(
-        pick(t.line_depth, i), pick(own.gaps, i), pick(own.stiffness, i), pick(t.weight, i)
+        pick(t.line_depth, i), pick(state.gaps, i), pick(state.stiffness, i), pick(t.weight, i)
     )
-    loads *= pick(own.alive, i)
+    loads *= pick(state.alive, i)
     share_out(pick(t.force, i), loads)
     by_segment = loads.reshape(SEGMENTS, -1, *loads.shape[1:])
     t.image[:, :, i] = total(by_segment).swapaxes(0, 1)
@@ -94,13 +94,13 @@ def image(t: Trials, i: Index) -> None:
 
 def pass_on(t: Trials, i: Index) -> None:
     """Burst the overloaded bubbles, which leaves their backing from the next frame on."""
-    own = t.own["pop"]
+    state = t.own["pop"]
     burst = (pick(t.image, i) > pick(t.values["pop_n"], i)).swapaxes(0, 1)
     at = np.flatnonzero(burst.any(axis=(0, 1)))
     if not at.size:
         return
     trials, gone = np.arange(t.n)[i][at], burst.take(at, -1)
-    alive = own.alive.take(trials, -1).reshape(SEGMENTS, *gone.shape)
+    alive = state.alive.take(trials, -1).reshape(SEGMENTS, *gone.shape)
     alive[:-1][:, gone], alive[-1][gone] = 0.0, 1.0
-    own.alive[:, :, trials] = alive.reshape(-1, *gone.shape[1:])
+    state.alive[:, :, trials] = alive.reshape(-1, *gone.shape[1:])
     change(t, trials)

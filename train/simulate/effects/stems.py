@@ -74,45 +74,47 @@ def lay(t: Trials, i: Index) -> None:
 
 def law(t: Trials, i: Index) -> None:
     """The law of the stems by depth."""
-    own = t.own["stems"]
-    own.order[:, i] = t.obey(i, pick(own.depth, i), pick(own.stiffness, i))
+    state = t.own["stems"]
+    state.order[:, i] = t.obey(i, pick(state.depth, i), pick(state.stiffness, i))
     let_go(t, i)
 
 
 def let_go(t: Trials, i: Index) -> None:
     """The law of the stems that are still held."""
-    own, order = t.own["stems"], pick(t.own["stems"].order, i)
-    gaps, stiffness = (np.take_along_axis(pick(a, i), order, 0) for a in (own.depth, own.stiffness))
-    own.slopes[:, i], own.intercepts[:, i] = bed_law(gaps, stiffness)
+    state, order = t.own["stems"], pick(t.own["stems"].order, i)
+    gaps, stiffness = (
+        np.take_along_axis(pick(a, i), order, 0) for a in (state.depth, state.stiffness)
+    )
+    state.slopes[:, i], state.intercepts[:, i] = bed_law(gaps, stiffness)
 
 
 def tune(t: Trials, i: Index) -> None:
     """The law of the next step: the stems still held, and implicitly the damping of bent ones."""
-    own = t.own["stems"]
-    drag, stems = pick(own.drag, i) / pick(t.h, i), len(own.depth)
-    t.slopes[:stems, i] = pick(own.slopes, i) + drag
-    t.intercepts[:stems, i] = pick(own.intercepts, i) + drag * pick(t.depth[0], i)
+    state = t.own["stems"]
+    drag, stems = pick(state.drag, i) / pick(t.h, i), len(state.depth)
+    t.slopes[:stems, i] = pick(state.slopes, i) + drag
+    t.intercepts[:stems, i] = pick(state.intercepts, i) + drag * pick(t.depth[0], i)
 
 
 def settle(t: Trials, i: Index) -> None:
     """Let stems slip off that are bent too far; the others damp the next step."""
-    own = t.own["stems"]
-    bent = pick(t.depth[0], i) - pick(own.depth, i)
-    slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(own.stiffness, i) > 0.0)
+    state = t.own["stems"]
+    bent = pick(t.depth[0], i) - pick(state.depth, i)
+    slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(state.stiffness, i) > 0.0)
     at = slips.any(axis=0).nonzero()[0]
     if at.size:
         trials, held = np.arange(t.n)[i][at], ~slips.take(at, -1)
-        own.stiffness[:, trials] *= held
-        own.damping[:, trials] *= held
+        state.stiffness[:, trials] *= held
+        state.damping[:, trials] *= held
         let_go(t, trials)
-    own.drag[i] = total(np.where(bent > 0.0, pick(own.damping, i), 0.0))
+    state.drag[i] = total(np.where(bent > 0.0, pick(state.damping, i), 0.0))
     tune(t, i)
 
 
 def bear(t: Trials, i: Index) -> None:
     """The force on the skin, and how far the first stem is bent."""
-    own, depth = t.own["stems"], pick(t.depth[0], i)
-    held, bent = pick(own.stiffness, i) > 0.0, depth - pick(own.depth, i)
+    state, depth = t.own["stems"], pick(t.depth[0], i)
+    held, bent = pick(state.stiffness, i) > 0.0, depth - pick(state.depth, i)
     t.force[i] = pick(t.loads[0], i)
     t.deepest[i] = np.where(held, bent, 0.0).max(axis=0)
     t.inside[i] = np.where(held, bent, FAR_M).max(axis=0)
@@ -120,14 +122,14 @@ def bear(t: Trials, i: Index) -> None:
 
 def image(t: Trials, i: Index) -> None:
     """Put each stem's load on the two rows that it lies between."""
-    own, m = t.own["stems"], len(np.arange(t.n)[i])
-    bent = np.maximum(pick(t.depth[0], i) - pick(own.depth, i), 0.0)
-    loads = bent * pick(own.stiffness, i)
+    state, m = t.own["stems"], len(np.arange(t.n)[i])
+    bent = np.maximum(pick(t.depth[0], i) - pick(state.depth, i), 0.0)
+    loads = bent * pick(state.stiffness, i)
     borne = total(loads)
     loads = loads * (pick(t.force, i) / np.where(borne > 0.0, borne, 1.0))
-    image, part, every = np.zeros((t.image[..., 0].size, m)), pick(own.part, i), np.arange(m)
+    image, part, every = np.zeros((t.image[..., 0].size, m)), pick(state.part, i), np.arange(m)
     beside = len(t.columns) if t.rows > 1 else 0
-    shares = zip(pick(own.taxel, i), loads * (1.0 - part), loads * part, strict=True)
+    shares = zip(pick(state.taxel, i), loads * (1.0 - part), loads * part, strict=True)
     for taxel, first, second in shares:
         image[taxel, every] += first
         image[taxel + beside, every] += second

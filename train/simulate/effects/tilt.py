@@ -102,30 +102,30 @@ def locate(t: Trials, i: Index) -> None:
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
-    own, viscous = t.own["tilt"], t.own.get("viscous")
+    state, viscous = t.own["tilt"], t.own.get("viscous")
     pivots = Pivots(
         i,
-        own.gaps,
-        own.stiffness,
-        own.nearest,
+        state.gaps,
+        state.stiffness,
+        state.nearest,
         pick(t.weight, i),
         pick(t.line_gap, i),
-        pick(own.lever, i),
+        pick(state.lever, i),
         1.0 if viscous is None else pick(viscous.gain, i),
         0.0 if viscous is None else pick(viscous.load, i),
         np.array([y, pick(t.y[1], i)]),
         np.array([c, *pick(t.compliance[1:], i)]),
     )
-    loads, t.row_force[:, i], lost = search(pivots, pick(own.guess, i))
+    loads, t.row_force[:, i], lost = search(pivots, pick(state.guess, i))
     t.lost[i] |= lost
     return loads
 
 
 def settle(t: Trials, i: Index) -> None:
     """Guess the next loads by extrapolating the last two."""
-    own, loads = t.own["tilt"], pick(t.loads, i)
-    own.guess[:, i] = 2.0 * loads - pick(own.settled, i)
-    own.settled[:, i] = loads
+    state, loads = t.own["tilt"], pick(t.loads, i)
+    state.guess[:, i] = 2.0 * loads - pick(state.settled, i)
+    state.settled[:, i] = loads
 
 
 def bear(t: Trials, i: Index) -> None:

@@ -50,9 +50,9 @@ def stand(t: Trials, i: Index) -> None:
 
 def drag(t: Trials, i: Index) -> None:
     """Let only the lever of its weight hold an object that tips."""
-    own, mover = t.own["tipping"], t.own["sliding"]
-    tips, force, slide = pick(own.tips, i), pick(own.force, i), pick(mover.slide, i)
+    state, mover = t.own["tipping"], t.own["sliding"]
+    tips, force, slide = pick(state.tips, i), pick(state.force, i), pick(mover.slide, i)
     mover.leans[i] = tips & (slide > 0.0)
     mover.hold[i] = np.where(tips, force, pick(mover.hold, i))
-    leaning = force * (1.0 - slide / pick(own.travel, i))
+    leaning = force * (1.0 - slide / pick(state.travel, i))
     mover.resist[i] = np.where(tips, leaning, pick(mover.resist, i))

@@ -46,9 +46,9 @@ def pass_on(t: Trials, i: Index) -> None:
 
     A load between two columns is shared by them; a load beyond the window goes to its last column.
     """
-    own = t.own["turning"]
-    turned = pick(own.per_metre, i) * pick(t.own["sliding"].slide, i)
-    own.turned[i] = turned
+    state = t.own["turning"]
+    turned = pick(state.per_metre, i) * pick(t.own["sliding"].slide, i)
+    state.turned[i] = turned
     columns = turned * (t.skin.cols / (2.0 * math.pi))
     moving = (columns != 0.0).nonzero()[0]
     if not moving.size:
@@ -56,10 +56,10 @@ def pass_on(t: Trials, i: Index) -> None:
     further = np.floor(columns[moving])
     part, trials, last = columns[moving] - further, np.arange(t.n)[i][moving], len(t.columns) - 1
     image = t.image.take(trials, -1)
-    moved, every = np.zeros_like(image), np.arange(len(moving))
+    moved, places = np.zeros_like(image), np.arange(len(moving))
     for beyond, share in ((0, 1.0 - part), (1, part)):
         shared = image * share
         for column in range(last + 1):
             to = np.clip(column + beyond + further, 0, last).astype(np.intp)
-            moved[:, to, every] += shared[:, column]
+            moved[:, to, places] += shared[:, column]
     t.image[:, :, trials] = moved

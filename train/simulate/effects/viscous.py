@@ -76,9 +76,9 @@ class Viscous:
 
 def begin(rows: int, n: int) -> Viscous:
     """The state of n trials without an element or a dashpot."""
-    own = Viscous(*[*np.zeros((8, n)), *np.zeros((3, rows, n))])
-    own.relax_s[:] = own.gain[:] = 1.0
-    return own
+    state = Viscous(*[*np.zeros((8, n)), *np.zeros((3, rows, n))])
+    state.relax_s[:] = state.gain[:] = 1.0
+    return state
 
 
 def stand(t: Trials, i: Index) -> None:
