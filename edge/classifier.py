@@ -45,7 +45,7 @@ class _Waiting:
     decision_point: int
     """Index of the next of the model's decision points."""
     tasks: list[str]
-    """Those that wait; a task follows those of which it is the product."""
+    """The tasks that wait; a product stands behind its factors."""
     decided: dict[str, Decided] = field(default_factory=dict)
 
 

@@ -76,16 +76,16 @@ def read_json(path: str | os.PathLike[str]) -> Any:
 
 
 @contextmanager
-def json_file(path: str | os.PathLike[str], what: str, mend: str) -> Iterator[Any]:
+def json_file(path: str | os.PathLike[str], kind: str, mend: str) -> Iterator[Any]:
     """The value of a JSON file, for a block that takes it apart.
 
     Raises:
         InputError: the file cannot be read; or it is not JSON, or the block failed, as it does at
-            a missing key or a wrong type. The message then says that the file is not `what`, and
+            a missing key or a wrong type. The message then says that the file is not `kind`, and
             ends with the remedy `mend`.
     """
     text = read_bytes(path)
-    with parsing(os.fspath(path), what, f"; {mend}"):
+    with parsing(os.fspath(path), kind, f"; {mend}"):
         yield _DECODER.decode(text.decode())
 
 
@@ -251,10 +251,10 @@ class ConfigTable:
         """A list of whole numbers."""
         return self._list(key, default, int, "whole numbers")
 
-    def _list(self, key: str, default: Any, kind: type, what: str) -> tuple[Any, ...]:
+    def _list(self, key: str, default: Any, kind: type, plural: str) -> tuple[Any, ...]:
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or any(type(x) is not kind for x in value):
-            raise self.fail(key, f"a list of {what}")
+            raise self.fail(key, f"a list of {plural}")
         return tuple(value)
 
     def pair(self, key: str, value: object = REQUIRED) -> tuple[int, int]:

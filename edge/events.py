@@ -128,7 +128,7 @@ Event = Onset | Decided | Release
 
 
 def _line(name: str, event: Event) -> dict[str, Any]:
-    """What the lines of all events have."""
+    """The keys that the lines of all events have."""
     contact = {} if event.contact is None else {"contact": event.contact}
     return {"event": name, **contact, "onset_s": round(event.onset_s, 6)}
 

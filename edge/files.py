@@ -16,8 +16,8 @@ LARGEST_TEXT = 16 << 20
 
 
 @contextmanager
-def parsing(name: str, what: str, mend: str = "") -> Iterator[None]:
-    """Turn any exception of a parser into one sentence: `NAME: not WHAT: REASON` and MEND.
+def parsing(name: str, kind: str, mend: str = "") -> Iterator[None]:
+    """Turn any exception of a parser into one sentence: `NAME: not KIND: REASON` and MEND.
 
     On damaged or hostile input, parsers raise exceptions of many kinds; no list is complete.
 
@@ -38,7 +38,7 @@ def parsing(name: str, what: str, mend: str = "") -> Iterator[None]:
             reason = "it is nested too deeply"
         elif isinstance(error, KeyError):
             reason = f"{error} is missing"
-        raise InputError(f"{name}: not {what}: {reason}{mend}") from None
+        raise InputError(f"{name}: not {kind}: {reason}{mend}") from None
 
 
 @contextmanager

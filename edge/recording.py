@@ -240,7 +240,7 @@ def load_arrays(
     Args:
         path: of the file, for errors.
         file: its contents, if they have been read already.
-        keys: the arrays to read, as far as the file has them; all if None.
+        keys: names of arrays; those that the file has are read. None reads all.
 
     Raises:
         InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds something
@@ -294,7 +294,7 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
 
     Raises:
         InputError: the file is missing, damaged, or not as the contract says; the sentence
-            names the file and what to do.
+            names the file and the remedy.
     """
     name = os.fspath(path)
     arrays = load_arrays(name, file, KEYS)

@@ -2,8 +2,8 @@
 
 Reads a skin file and runs its drivers over a fake bus that counts the bits on the wires. The exit
 status is 1 if the skin cannot work as the file describes it, or the wires cannot carry the frame
-rate that the file asks for. Without a skin file, prints what a board needs and what this machine
-has: buses and rights, versions, clock, load and disk, with a remedy for all that will not do.
+rate that the file asks for. Without a skin file, prints the state of this machine: buses and
+rights, versions, clock, load and disk, with a remedy for each shortcoming.
 """
 
 from __future__ import annotations

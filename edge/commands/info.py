@@ -1,7 +1,7 @@
 """Describe a model, or compare two: tasks, labels, accuracy, features, data, skin and arm.
 
 Prints a model's tasks with their labels and accuracy, its features and training data, and the skin
-and arm that it needs, and its size. Of two models it prints what differs.
+and arm that it needs, and its size. Of two models it prints the differences.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the description, or what differs."""
+    """Print the description, or the differences."""
     output, model = Output.of(arguments), Model(arguments.model)
     if arguments.other is None:
         about = described(model)

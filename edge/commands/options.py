@@ -62,7 +62,7 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
 
 
 def add_noise(parser: argparse.ArgumentParser, chips: str) -> None:
-    """Add the option for the noise of these chips, which are fake."""
+    """Add the option for the noise of fake chips; its help names them by `chips`."""
     from edge.fake.player import NOISE_COUNTS  # a replay needs no chips
 
     parser.add_argument(

@@ -161,7 +161,7 @@ def report_malformed(joints: Joints) -> None:
 
 @dataclass(frozen=True)
 class Reading(Opened):
-    """A skin that is being read, and what the options put beside it.
+    """A skin that is being read, with its loop, page and output.
 
     Attributes:
         loop: gives the frames with their joint angles.

@@ -93,7 +93,7 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
 
 
 def legend(columns: int) -> list[str]:
-    """What the colours mean, in lines of at most so many columns."""
+    """The meaning of the colours, in lines no longer than `columns`."""
     marks = iter((*TOUCH[2::3], REST[-1], LOST))
     return [
         re.sub("■", lambda _: f"\x1b[38;5;{next(marks)}m■{PLAIN}", line)
@@ -102,7 +102,7 @@ def legend(columns: int) -> list[str]:
 
 
 def screen(lines: Sequence[str]) -> str:
-    """Lines from the upper left corner on, each clearing what it does not overwrite."""
+    """Lines from the upper left corner on; each clears the rest of its row."""
     return HOME + "".join(f"{line}\x1b[K\n" for line in "\n".join(lines).split("\n"))
 
 

@@ -26,7 +26,7 @@ class Space(NamedTuple):
 
     Attributes:
         columns: (p,) of the feature vectors that it takes.
-        mean, gain: (p,) of these.
+        mean, gain: (p,) of these columns.
         weights: (p, c) from scaled differences to coordinates.
         rows: (n, c) training trials.
         labels: (n,) indices of their labels.

@@ -88,7 +88,7 @@ class ModelInfo:
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be kept."""
     taught: int = 0
-    """The last so many trials were added on a board (`edge.model.teaching`)."""
+    """Number of the last trials, which were added on a board (`edge.model.teaching`)."""
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -177,7 +177,7 @@ class ModelInfo:
 
     @classmethod
     def from_json(cls, text: str, name: str) -> ModelInfo:
-        """Read what `to_json` wrote.
+        """Read the text that `to_json` wrote.
 
         Raises:
             InputError: something is missing or of the wrong kind; the sentence names `name`.

@@ -29,7 +29,7 @@ class Decision(NamedTuple):
     (2, True)
 
     Attributes:
-        label: what was touched. A task that is decided together with others (see
+        label: the answer. A task that is decided together with others (see
             `edge.model.agreement`) may have another label than most votes.
         confidence: the label's share of the votes, 0 to 1.
         scores: (labels,) share of the votes of each label.

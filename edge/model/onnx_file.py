@@ -63,7 +63,7 @@ class Contents:
     """{name of a constant: the fields of its TensorProto}."""
     metadata: dict[str, str] = field(default_factory=dict)
     foreign: list[str] = field(default_factory=list)
-    """What it holds that no exported model holds."""
+    """Its contents that no exported model has, in words."""
 
     @cached_property
     def makers(self) -> dict[str, Node]:

@@ -20,14 +20,14 @@ TEST_SHARE = 0.5
 which errs more or less often than the folds' models do on average."""
 
 
-def check_rate(value: float, what: str) -> float:
+def check_rate(value: float, name: str) -> float:
     """The value, if it is a rate inside (0, 1).
 
     Raises:
-        InputError: it is not; the sentence begins with `what`.
+        InputError: it is not; the sentence begins with `name`.
     """
     if not 0.0 < value < 1.0:
-        raise InputError(f"{what} must be above 0 and below 1, not {value:g}")
+        raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
     return value
 
 
@@ -84,7 +84,7 @@ class Stopping:
         rules: rising in error. Mean times fall, but from a factor's own rules to those that it
             shares with its product (see `edge.model.agreement`).
         trials: number of trials that certify the rules.
-        wrong: number of these that are decided wrongly at the full window.
+        wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
     """
 
@@ -162,7 +162,7 @@ class Novelty:
     """When a contact is unlike everything in training.
 
     The distance to the nearest training trial is taken in the space of the task with most labels:
-    of all tasks' spaces it keeps most of what distinguishes objects.
+    of all spaces, it distinguishes objects best.
 
     Attributes:
         task: whose space it is. It names no label for an unknown contact: a new object can still

@@ -46,9 +46,9 @@ def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[A
         classes: how many labels there are.
 
     Returns:
-        `members` (classes, largest) trials of each label, filled up with n; `counts` (classes,) of
-        them that stand for the label, and `most` (1,) of these; `taken` (classes, most) whether one
-        does.
+        `members` (classes, largest): the trials of each label, filled up with n. `counts`
+        (classes,): how many trials stand for each label. `most` (1,): the largest count. `taken`
+        (classes, most): True in the first `counts` columns of each label.
     """
     sizes = np.bincount(labels[labels >= 0], minlength=classes)
     counts = nearest_of_label(sizes)
