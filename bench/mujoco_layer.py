@@ -42,23 +42,23 @@ def layer_xml(
     xml, between, knots = "", "", []
     for r in range(rows + 1):
         for c in range(cols + 1):
-            part = (0.5 if r in (0, rows) else 1.0) * (0.5 if c in (0, cols) else 1.0)
+            share = (0.5 if r in (0, rows) else 1.0) * (0.5 if c in (0, cols) else 1.0)
             y, z = (c - cols / 2) * dy, ABOVE_FLOOR_M + (r - rows / 2) * dz
             # A body with a face may have no damped joint, so the face hangs on a second body.
             xml += (
                 f'<body pos="{FACE_M} {y} {z}"><joint name="b{r}_{c}" type="slide" axis="1 0 0" '
-                f'stiffness="{k * part}" damping="{0.06 * k * part + 0.02}" '
+                f'stiffness="{k * share}" damping="{0.06 * k * share + 0.02}" '
                 f'range="0 {thick_m * 0.9}" limited="true"/><inertial pos="0 0 0" '
-                f'mass="{mass * part}" diaginertia="1e-6 1e-6 1e-6"/><body name="n{r}_{c}">'
+                f'mass="{mass * share}" diaginertia="1e-6 1e-6 1e-6"/><body name="n{r}_{c}">'
                 '<inertial pos="0 0 0" mass="1e-5" diaginertia="1e-9 1e-9 1e-9"/></body></body>'
             )
             knots.append(f"n{r}_{c}")
             beside = [(r + 1, c, dy / dz * (0.5 if c in (0, cols) else 1.0))]
             beside += [(r, c + 1, dz / dy * (0.5 if r in (0, rows) else 1.0))]
-            for r2, c2, part in beside:
+            for r2, c2, share in beside:
                 if r2 <= rows and c2 <= cols:
                     between += (
-                        f'<fixed stiffness="{shear * part}"><joint joint="b{r}_{c}" coef="1"/>'
+                        f'<fixed stiffness="{shear * share}"><joint joint="b{r}_{c}" coef="1"/>'
                         f'<joint joint="b{r2}_{c2}" coef="-1"/></fixed>'
                     )
     triangles = []

@@ -110,8 +110,8 @@ def answers(
     )
     labels = session.run([f"{task}_label" for task in tasks], {"features": vectors})
 
-    def distances(some: NDArray[Any]) -> NDArray[Any]:
-        return np.hstack(session.run([f"{t}_distances" for t in tasks], {"features": some}))
+    def distances(inputs: NDArray[Any]) -> NDArray[Any]:
+        return np.hstack(session.run([f"{t}_distances" for t in tasks], {"features": inputs}))
 
     alone = np.vstack([distances(vector[None]) for vector in vectors])
     changed = float((alone != distances(vectors)).mean())

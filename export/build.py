@@ -100,8 +100,8 @@ class Builder:
         """Whole numbers (n, m) cut off at plus and minus a limit for each decision point.
 
         Returns:
-            Names of the numbers, and of the sum (n, 1) of what was cut off, which is 0 within the
-            limits and not finite where a number is not.
+            Names of the numbers, and of their summed excess (n, 1), which is 0 within the limits
+            and not finite where a number is not.
         """
         low, high = (self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0))
         inside = self.node("Clip", [x, low, high])

@@ -60,15 +60,15 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     beyond them, and two that are not finite (label -1).
     """
     info = model.info
-    pieces: list[Recording] = []
+    recordings: list[Recording] = []
     contacts: list[tuple[float, Any]] = []
     for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
-        part = trimmed(trial.recording, trial.onset_s, model)
-        series = first_series(part, model)
-        if series is not None:
-            pieces.append(part)
-            contacts.append(series)
+        recording = trimmed(trial.recording, trial.onset_s, model)
+        contact = first_series(recording, model)
+        if contact is not None:
+            recordings.append(recording)
+            contacts.append(contact)
     rng = np.random.default_rng(20120101)
     own = np.stack([info.vector(s) for _, s in contacts])
     rows = X[rng.permutation(len(X))[: VECTORS // 2]]
@@ -79,10 +79,10 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     wrong[0, 5], wrong[1, -1] = np.nan, np.inf
     vectors = np.concatenate([own, rows, mixed, wrong])
     arrays: dict[str, NDArray[Any]] = {
-        "start": np.cumsum([0, *(len(p.t) for p in pieces)]),
-        "t": np.concatenate([p.t for p in pieces]),
-        "frames": np.concatenate([p.frames for p in pieces]),
-        "valid": np.concatenate([p.valid for p in pieces if p.valid is not None]),
+        "start": np.cumsum([0, *(len(r.t) for r in recordings)]),
+        "t": np.concatenate([r.t for r in recordings]),
+        "frames": np.concatenate([r.frames for r in recordings]),
+        "valid": np.concatenate([r.valid for r in recordings if r.valid is not None]),
         "onset_s": np.array([onset for onset, _ in contacts]),
         "series_start": np.cumsum([0, *(len(s.t) for _, s in contacts)]),
         "series_t": np.concatenate([s.t for _, s in contacts]),
@@ -90,7 +90,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         "vectors": vectors,
     }
     if info.dof is not None:
-        arrays["joints"] = np.concatenate([p.joints for p in pieces if p.joints is not None])
+        arrays["joints"] = np.concatenate([r.joints for r in recordings if r.joints is not None])
     if info.decision_points_s:
         windows = info.decision_points_s
         early = np.array([[info.vector(s, window) for _, s in contacts] for window in windows])
@@ -100,5 +100,5 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     bounds = dict(BOUNDS)
     if not info.has_label_distances:
         del bounds["label_distances"]
-    meta = {"skin": pieces[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
+    meta = {"skin": recordings[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)

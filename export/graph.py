@@ -77,7 +77,7 @@ def _decide(
         nearest: names of the neighbours' squared distances (n, k) less a length, of their rows
             (n, k), and of that length (n, 1).
         units: of the distances, for each decision point.
-        off: name of what was cut off (n, 1).
+        off: name of the excess over the limits (n, 1).
     """
     squares, rows, length = nearest
     roots = build.node("Sqrt", [build.node("Add", [squares, length])])

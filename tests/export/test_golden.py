@@ -1,4 +1,4 @@
-"""What a golden file is made of."""
+"""The contents of a golden file."""
 
 import numpy as np
 import pytest
