@@ -32,6 +32,13 @@ def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
     assert why.changes == (Change("force", 1, pytest.approx(1.8), pytest.approx(-1.8)),)
 
 
+def test_the_feature_that_has_to_change_least_comes_first():
+    # The label turns with z . (2, 1) = 3.5: by 0.875 units in each of force's samples, or 3.5.
+    space = BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]]))
+    why = explain(space, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
+    assert [change.feature for change in why.changes] == ["force", "area"]
+
+
 def test_features_and_coordinates_are_cut_off_as_in_the_graph(exported):
     model = Model(exported / "model.onnx")
     vector = np.load(exported / "golden.npz")["vectors"][0]

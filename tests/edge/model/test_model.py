@@ -147,6 +147,12 @@ REFUSED = {
     edited(
         lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
     ): r"no tensor\(int64\) mobility_label",
+    # Each pair of a rigid or soft category and one of four objects would need a label of its own.
+    edited(
+        lambda m: m["tasks"]["object"].update(
+            factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
+        )
+    ): "the factors of a task are impossible",
 }
 
 

@@ -59,6 +59,9 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
     wrong = math.floor(needed * 7 / 140)
     tail = sum(math.comb(needed, k) * 0.08**k * 0.92 ** (needed - k) for k in range(wrong + 1))
     assert 0.0025 < tail <= 0.05
+    # Chernoff's bound: the level over the divergence of the two shares.
+    divergence = 0.95 * math.log(0.95 / 0.92) + 0.05 * math.log(0.05 / 0.08)
+    assert needed == math.ceil(-math.log(TEST_SHARE * 0.1) / divergence)
 
 
 def test_a_refusal_asks_for_more_trials_than_there_were():
