@@ -61,7 +61,6 @@ class Joints:
         dof: int,
         names: Sequence[str] | None = None,
         now: Callable[[], float],
-        oldest_s: float = OLDEST_S,
     ) -> None:
         """Listen to a source.
 
@@ -71,11 +70,9 @@ class Joints:
             names: of the joints, in the order of the angles that `at` returns; a line's own names
                 are ignored where this is None.
             now: the loop's clock.
-            oldest_s: greatest age of a pose.
         """
         self._source, self._dof, self._now = source, dof, now
         self._names = None if names is None else tuple(names)
-        self._oldest = oldest_s
         self._rest = b""
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
         self._recent: deque[float] = deque(maxlen=RECENT)
@@ -90,7 +87,7 @@ class Joints:
         """Angles (dof,) at a time of the loop's clock, or None where unknown.
 
         They are interpolated between two lines; after the last line its angles hold for
-        `oldest_s`.
+        `OLDEST_S`.
         """
         self._take()
         if not self._poses:
@@ -100,14 +97,14 @@ class Joints:
         after: tuple[float, NDArray[np.float64]] | None = None
         for pose in reversed(self._poses):
             if pose[0] <= sent:
-                if after is not None and after[0] - pose[0] <= 2.0 * self._oldest:
+                if after is not None and after[0] - pose[0] <= 2.0 * OLDEST_S:
                     share = (sent - pose[0]) / (after[0] - pose[0])
                     # A sender may wrap its angles at +-pi. No joint turns half round between two
                     # lines, so that the shorter way is the right one.
                     turned = after[1] - pose[1]
                     turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
                     return pose[1] + share * turned
-                if sent - pose[0] <= self._oldest:
+                if sent - pose[0] <= OLDEST_S:
                     return pose[1]
                 break
             after = pose
