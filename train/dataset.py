@@ -165,7 +165,11 @@ class DataSet:
         )
 
     def with_kernels(self, window_s: float) -> DataSet:
-        """The same trials with the tables that features of kernels need, for a window."""
+        """The same trials with the tables that features of kernels need, for a window.
+
+        A model has one table, of its full window, for all its decision points: at half of the
+        window, tables of that window's own change the accuracy by less than its interval.
+        """
         every = -(-len(self.trials) // MOST_TOUCHES)
         felt = [trial.series.felt(window_s) for trial in self.trials[::every]]
         tables = {
