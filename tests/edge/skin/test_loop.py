@@ -1,5 +1,6 @@
 """Ticks that do not drift, periods counted in constant memory, a clean stop."""
 
+import gc
 import signal
 
 import numpy as np
@@ -53,6 +54,12 @@ def test_a_loop_ends_with_its_time_or_when_asked_after_the_frame_at_hand():
         for count, _ in enumerate(Loop(skin, stop=stop).frames(), 1):
             stop.asked = count == 7
     assert count == 7
+
+
+def test_garbage_collection_leaves_out_the_objects_made_before_the_loop():
+    with still(CODY) as skin:
+        frozen = [gc.get_freeze_count() > 10_000 for _ in Loop(skin, lasts_s=0.02).frames()]
+    assert (frozen, gc.get_freeze_count()) == ([True, True], 0)
 
 
 @pytest.fixture
