@@ -13,14 +13,13 @@ from edge.touch.arm import Chain
 def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Chain | None:
     """The recording's arm: its `meta.arm`, else `unnamed`, else Cody's where it has five angles.
 
-    None without joint angles.
+    None without joint angles, and where `meta.arm` is None.
     """
-    if recording.joints is None:
+    # With an arm of None, the joints are not those of an arm that carries the skin.
+    if recording.joints is None or recording.meta.get("arm", {}) is None:
         return None
     dof = recording.joints.shape[1]
     arm = recording.meta.get("arm")
-    if "arm" in recording.meta and arm is None:
-        return None  # the joints are not those of an arm that carries the skin
     if arm is not None:
         chain = Chain.from_dict(arm, where=f"{where}: meta.arm")
     elif unnamed is not None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from edge.config import parse_json
@@ -28,38 +27,31 @@ class Touch:
     """One contact on the map.
 
     Attributes:
-        position: (x, y, z) in the map's frame.
+        contact: its number in the run.
         onset_s: seconds on the run's clock.
+        position: (x, y, z) in the map's frame.
         labels: {task: label}, None where the model could not tell.
         confidence: {task: share of the votes}.
-        flags: of any of its decisions.
     """
 
-    position: tuple[float, float, float]
+    contact: int
     onset_s: float
-    labels: dict[str, str | None] = field(default_factory=dict)
-    confidence: dict[str, float] = field(default_factory=dict)
-    flags: tuple[str, ...] = ()
+    position: tuple[float, float, float]
+    labels: dict[str, str | None]
+    confidence: dict[str, float]
 
 
-def _head(name: str, number: int, entry: Mapping[str, Any], former: Head | None = None) -> Head:
-    """The head of a run, which must be in the frame of a former one, if there is one."""
-    try:
-        head = Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
-    except (KeyError, TypeError):
-        raise _no_line(name, number) from None
-    if entry.get("event") != "map":
-        raise _no_line(name, number)
-    if former is not None and head[:2] != former[:2]:
-        raise InputError(
-            f"{name}: line {number} begins a run in the frame {head.frame} ({head.unit}), another "
-            f"is in {former.frame} ({former.unit}); keep a map for each"
-        )
-    return head
-
-
-def _no_line(name: str, number: int) -> InputError:
-    return InputError(f"{name}: line {number} is not of a map; give a file that `run --map` wrote")
+def _parsed(entry: Mapping[str, Any]) -> Head | Touch:
+    """A line: the head of a run, or a contact with the one task that was decided."""
+    if entry["event"] == "map":
+        return Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
+    x, y, z = map(float, entry["place"])
+    onset_s, confidence = float(entry["onset_s"]), float(entry["confidence"])
+    if not all(map(math.isfinite, (x, y, z, onset_s, confidence))):
+        raise ValueError("not finite")
+    task, label = str(entry["task"]), None if entry["label"] is None else str(entry["label"])
+    contact = int(entry["contact"])
+    return Touch(contact, onset_s, (x, y, z), {task: label}, {task: confidence})
 
 
 class TouchMap:
@@ -72,20 +64,28 @@ class TouchMap:
             InputError: the file is missing, or is not a map.
         """
         self.path = os.fspath(path)
-        for number, entry in self._entries():
-            self.head = _head(self.path, number, entry)
-            return
-        raise InputError(f"{self.path}: {NOT_A_MAP}")
+        _, head = next(self._lines(), (0, None))
+        if not isinstance(head, Head):
+            raise InputError(f"{self.path}: {NOT_A_MAP}")
+        self.head = head
 
-    def _entries(self) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Number and object of each complete line."""
+    def _lines(self) -> Iterator[tuple[int, Head | Touch]]:
+        """Number and content of each complete line."""
         with open_regular(self.path, LARGEST_BYTES) as file:
-            lines = iter(lambda: file.readline(LONGEST_LINE), b"")
-            for number, line in enumerate(lines, 1):
-                with suppress(InputError):
+            for number, line in enumerate(iter(lambda: file.readline(LONGEST_LINE), b""), 1):
+                try:
                     entry = parse_json(line, self.path)
-                    if isinstance(entry, dict):
-                        yield number, entry
+                except InputError:
+                    continue  # cut short
+                if not isinstance(entry, dict):
+                    continue
+                try:
+                    yield number, _parsed(entry)
+                except (KeyError, TypeError, ValueError, OverflowError):
+                    raise InputError(
+                        f"{self.path}: line {number} is not of a map; give a file that "
+                        "`run --map` wrote"
+                    ) from None
 
     def __iter__(self) -> Iterator[Touch]:
         """The contacts with all tasks decided, in the order of their last decisions.
@@ -93,27 +93,21 @@ class TouchMap:
         Raises:
             InputError: a line is not of a map, or begins a run in another frame.
         """
-        tasks = self.head.tasks
+        head = self.head
         waiting: dict[tuple[int, float], Touch] = {}
-        for number, entry in self._entries():
-            if entry.get("event") == "map":
-                tasks, waiting = _head(self.path, number, entry, self.head).tasks, {}
+        for number, line in self._lines():
+            if isinstance(line, Head):
+                head, waiting = line, {}
+                if head[:2] != self.head[:2]:
+                    raise InputError(
+                        f"{self.path}: line {number} begins a run in the frame {head.frame} "
+                        f"({head.unit}), another is in {self.head.frame} ({self.head.unit}); keep "
+                        "a map for each"
+                    )
                 continue
-            try:
-                key = int(entry["contact"]), float(entry["onset_s"])
-                x, y, z = (float(v) for v in entry["place"])
-                touch = waiting.pop(key, Touch((x, y, z), key[1]))
-                task, label = str(entry["task"]), entry["label"]
-                confidence = float(entry["confidence"])
-                flags = [str(f) for f in entry.get("flags", ()) if f not in touch.flags]
-                if not all(map(math.isfinite, (x, y, z, key[1], confidence))):
-                    raise ValueError("not finite")
-            except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-                raise _no_line(self.path, number) from None
-            touch.labels[task] = None if label is None else str(label)
-            touch.confidence[task] = confidence
-            touch = replace(touch, flags=(*touch.flags, *flags))
-            if len(touch.labels) == len(tasks):
-                yield touch
-            else:
-                waiting[key] = touch
+            key = line.contact, line.onset_s
+            touch = waiting.setdefault(key, line)
+            touch.labels.update(line.labels)
+            touch.confidence.update(line.confidence)
+            if len(touch.labels) == len(head.tasks):
+                yield waiting.pop(key)

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         from train.touch_map import TouchMap
 
         info = None if model is None else model.info
-        picture.draw(TouchMap(first), out, first, arguments.task, info)
+        picture.draw(TouchMap(first), out, arguments.task, info)
     elif model is not None:
         from train.draw import explanation
 

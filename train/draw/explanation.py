@@ -18,7 +18,7 @@ from edge.recording import Recording, load
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from train.draw.comparison import contact_of
-from train.draw.recording import curves
+from train.draw.recording import curves, units
 from train.report.figures import STROKES, STYLE
 
 TOUCH, SAME, OTHER = STROKES[0], STROKES[2], STROKES[1]
@@ -49,9 +49,8 @@ class Case:
 def draw_case(canvas: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool) -> None:
     """Draw the three features of a case beside those of its nearest trials, and the pulls."""
     axes = canvas.subplots(*(4, 1) if phone else (2, 2)).ravel()
-    units = (layout.force_unit, "taxels", layout.length_unit)
     legend = {}
-    for axis, unit, name in zip(axes, units, curves(case.touch), strict=False):
+    for axis, (name, unit) in zip(axes, units(layout).items(), strict=False):
         stroke = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
         legend["this touch"] = axis.plot(*_within(case.touch, name, window_s), **stroke)[0]
         for place, (text, series, same) in enumerate(case.near, start=1):
@@ -84,16 +83,13 @@ def draw(recording: Recording, out: Path, model: Model, folder: Path, where: str
         InputError: the recording does not suit the model or holds no contact, or the folder holds
             none of the trials.
     """
-    info = model.info
-    lines = list(explanations(model, recording, where))
     touch = contact_of(where, recording)[1]
     known: dict[str, FeatureSeries | None] = {}
     cases = []
-    for line in lines:
+    for line in explanations(model, recording, where):
         rival = line["rival"] or {"label": "others"}
-        nearest = [*line["nearest"][:MOST_NEAR], *([line["rival"]] if line["rival"] else [])]
         near = []
-        for trial in nearest:
+        for trial in [*line["nearest"][:MOST_NEAR], *filter(None, [line["rival"]])]:
             name = trial["trial"]
             if name not in known:
                 known[name] = _trial(folder, name)
@@ -112,7 +108,7 @@ def draw(recording: Recording, out: Path, model: Model, folder: Path, where: str
         canvases = drawn.subfigures(len(cases), squeeze=False)[:, 0]
         for canvas, case in zip(canvases, cases, strict=True):
             canvas.suptitle(case.title, fontsize=10, weight="bold")
-            draw_case(canvas, case, recording.layout, info.window_s, False)
+            draw_case(canvas, case, recording.layout, model.info.window_s, False)
         with write_whole(out) as file:
             drawn.savefig(file, format="png", dpi=110)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +10,18 @@ import numpy as np
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.recording import Recording
-from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
 from train.arms import arm_of
+from train.dataset import with_thresholds
 from train.draw.sketch import draw_side, simulated
 
 FRAMES = 6
 HORIZON_S = 2.0
+UNITS = {"newton": "N", "metre": "m", "taxel": "taxels", "count": "counts"}
 
 
 def draw(
@@ -45,11 +45,7 @@ def draw(
     """
     from matplotlib.figure import Figure
 
-    layout = recording.layout
-    if threshold is not None:
-        layout = replace(
-            layout, threshold_counts=threshold, onset_counts=max(threshold, layout.onset)
-        )
+    layout = with_thresholds(recording.layout, threshold, None)
     chain = arm_of(recording, where)
     if chain is not None:
         recording = recording.for_joints(chain.names)
@@ -60,7 +56,8 @@ def draw(
     onset, series = contact or (float(recording.t[0]), None)
     heights = [1.7, 3.2, 4.0][: 3 if scene else 2]
     figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
-    figure.suptitle(_title(recording))
+    labels = ", ".join(f"{task}: {label}" for task, label in sorted(recording.labels.items()))
+    figure.suptitle(f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}")
     grid = figure.add_gridspec(len(heights), FRAMES, height_ratios=heights)
     _frames(figure, grid, recording, layout, onset)
     third = FRAMES // 3
@@ -75,16 +72,15 @@ def draw(
             axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
             axis.set_ylim(bottom=0.0)
     if scene and chain is not None:
-        side = figure.add_subplot(grid[2, : FRAMES // 2])
-        draw_side(side, recording, chain, layout, onset, drawn)
-        _push(figure.add_subplot(grid[2, FRAMES // 2 :]), recording, chain, layout, onset)
+        draw_side(figure.add_subplot(grid[2, 1:-1]), recording, chain, layout, onset, drawn)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
 
 
 def units(layout: SkinLayout) -> dict[str, str]:
-    """{feature: unit} of the paper's three features."""
-    return dict(zip(FEATURES, (layout.force_unit, "taxel", layout.length_unit), strict=True))
+    """{feature: unit} of the paper's three features, as on an axis."""
+    named = layout.force_unit, "taxel", layout.length_unit
+    return {feature: UNITS[unit] for feature, unit in zip(FEATURES, named, strict=True)}
 
 
 def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
@@ -96,14 +92,9 @@ def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
     }
 
 
-def _title(recording: Recording) -> str:
-    labels = ", ".join(f"{task}: {label}" for task, label in sorted(recording.labels.items()))
-    return f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
-
-
 def _frames(figure: Any, grid: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:
     """Draw a frame before the onset, and others spread over the window."""
-    t = recording.t
+    frames, t = list(recording), recording.t
     spread = np.linspace(0.0, min(WINDOW_S, float(t[-1]) - onset), FRAMES - 1)
     times = [max(onset - 0.05, float(t[0])), *(onset + spread)]
     shown = np.searchsorted(t, times).clip(0, len(t) - 1)
@@ -111,9 +102,7 @@ def _frames(figure: Any, grid: Any, recording: Recording, layout: SkinLayout, on
     top = max(int(recording.frames[shown].max()), 1) / scale
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
     for axis, k in zip(axes, shown, strict=True):
-        counts, valid = recording.frames[k], recording.valid
-        if valid is not None and valid.ndim == 3:
-            valid = valid[k]
+        counts, valid = frames[k].counts, frames[k].valid
         force = np.ma.masked_array(counts / scale, mask=False if valid is None else ~valid)
         image = axis.imshow(force, vmin=0.0, vmax=top, cmap="viridis", aspect="equal")
         region = largest_region(counts, layout.threshold_counts, valid=valid, wraps=layout.wraps)
@@ -127,20 +116,4 @@ def _frames(figure: Any, grid: Any, recording: Recording, layout: SkinLayout, on
         axis.set(xlabel="column (around)", ylabel="row, from elbow")
         axis.label_outer()
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
-    bar.set_label(f"{layout.force_unit} per taxel")
-
-
-def _push(axis: Any, recording: Recording, chain: Chain, layout: SkinLayout, onset: float) -> None:
-    """Draw the push and the joint angles over time."""
-    t = recording.t - onset
-    scale = layout.counts_per_newton or 1.0
-    push = recording.frames.reshape(len(t), -1).sum(axis=1, dtype=np.int64) / scale
-    axis.plot(t, push, color="black", lw=2)
-    axis.set_ylabel(f"sum of all taxels, {layout.force_unit} (black)")
-    axis.set(xlabel="seconds from onset", title="push and joint angles")
-    if recording.joints is not None:
-        other = axis.twinx()
-        turned = np.degrees(recording.joints - recording.joints[0])
-        other.plot(t, turned, lw=1, label=recording.joint_names or chain.names)
-        other.set_ylabel("joint angles from their start, degrees")
-        other.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=5)
+    bar.set_label(f"{UNITS[layout.force_unit]} per taxel")

@@ -79,7 +79,7 @@ def draw_side(
         axis.plot(*points[:, [0, 2]].T, line, marker="o", color=style, label=text, markersize=4)
         if layout.radius_m is not None:
             axis.fill(*skin_outline(chain.pose(joints[k]), layout).T, facecolor=style, alpha=0.35)
-        last = _last_contact(recording, chain, layout, k)
+        last = _last_contact(recording, joints, chain, layout, k)
         if last is None:
             continue
         since, place = last
@@ -111,11 +111,9 @@ def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
 
 
 def _last_contact(
-    recording: Recording, chain: Chain, layout: SkinLayout, k: int
+    recording: Recording, joints: np.ndarray, chain: Chain, layout: SkinLayout, k: int
 ) -> tuple[float, Place] | None:
     """Seconds from the last contact to frame k, and the place of that contact."""
-    joints = recording.joints
-    assert joints is not None
     for i in range(k, -1, -1):
         region = largest_region(recording.frames[i], layout.threshold_counts, wraps=layout.wraps)
         if region is not None:
@@ -124,12 +122,6 @@ def _last_contact(
             normal, above = pose[:3, :2] @ position[:2], region.centroid[0] * layout.pitch[0]
             return float(recording.t[k] - recording.t[i]), (place, normal, above)
     return None
-
-
-def _turned(outline: np.ndarray, angle: float) -> np.ndarray:
-    """Points (n, 2) turned clockwise about the origin."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.asarray(outline @ np.array([[c, -s], [s, c]]))
 
 
 def _object(
@@ -176,28 +168,13 @@ def _object(
         fallen = since > LOST_S
         lean = 0.5 * math.pi if fallen else min(slid / height, 0.5 * math.pi)
         edge = np.array([depth, floor])
-        outline = _turned(outline - edge, lean) + edge
+        c, s = math.cos(lean), math.sin(lean)
+        outline = (outline - edge) @ np.array([[c, -s], [s, c]]) + edge
         motion = ", has fallen over" if fallen else f", leans by {math.degrees(lean):.0f} degrees"
     else:
         outline[:, 0] += slid
         if "turning" in effects and aside is not None and foot is not None:
             angle = slid * aside / max((foot / 3.0) ** 2 + aside**2, 1e-12)
-            _from_above(axis, foot, aside, slid, angle, **style)
             motion = f", turns by {math.degrees(angle):.0f} degrees" if slid else ""
     axis.fill(*(start + outline * [ahead, 1.0]).T, alpha=0.25, **style)
     return motion
-
-
-def _from_above(
-    side: Any, foot: float, aside: float, moved: float, angle: float, **style: Any
-) -> None:
-    """Draw an object from above in a corner, pushed to the right and turned about the contact."""
-    if not side.child_axes:
-        corner = side.inset_axes([0.69, 0.6, 0.3, 0.38])
-        corner.set_xlabel("from above", fontsize=8, labelpad=2)
-        corner.set_aspect("equal", adjustable="datalim")
-        corner.set(xticks=[], yticks=[])
-    corner = side.child_axes[0]
-    corners = np.array([[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]]) * foot - [0.0, aside]
-    corner.fill(*(_turned(corners, angle) + np.array([moved, 0.0])).T, alpha=0.25, **style)
-    corner.plot(moved, 0.0, "*", color=style["color"])

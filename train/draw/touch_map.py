@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.info import ModelInfo
+from train.draw.recording import UNITS
 from train.draw.sketch import link_positions
+from train.report.section import counted
 from train.touch_map import TouchMap
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
@@ -28,19 +30,15 @@ def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
         middle = [0.0 if limit is None else sum(limit) / 2.0 for limit in chain.limits]
         return "the arm, its joints mid-range", [link_positions(chain, middle)]
     rows, cols = layout.shape
-    round_it = np.linspace(0.0, cols if layout.wraps else cols - 1, 4 * cols)
-    ends = [np.array([layout.position(row, col) for col in round_it]) for row in (0, rows - 1)]
-    sides = np.linspace(0.0, cols if layout.wraps else cols - 1, 5)
-    return "the skin", [
-        *ends,
-        *(np.array([layout.position(row, col) for row in (0, rows - 1)]) for col in sides),
-    ]
+    around = np.linspace(0.0, cols if layout.wraps else cols - 1, 4 * cols + 1).tolist()
+    lines = [[(row, col) for col in around] for row in (0, rows - 1)]
+    lines += [[(0, col), (rows - 1, col)] for col in around[::cols]]
+    return "the skin", [np.array([layout.position(*place) for place in line]) for line in lines]
 
 
 def draw(
     contacts: TouchMap,
     out: Path,
-    where: str,
     task: str | None = None,
     info: ModelInfo | None = None,
 ) -> None:
@@ -54,11 +52,11 @@ def draw(
     """
     touches = list(contacts)
     if not touches:
-        raise InputError(f"{where}: no contact is on this map yet")
+        raise InputError(f"{contacts.path}: no contact is on this map yet")
     tasks = sorted({task for touch in touches for task in touch.labels})
     chosen = task or ("category" if "category" in tasks else tasks[0])
     if chosen not in tasks:
-        raise InputError(f"{where}: has no task {chosen!r}; it has {', '.join(tasks)}")
+        raise InputError(f"{contacts.path}: has no task {chosen!r}; it has {', '.join(tasks)}")
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
     positions = np.array([touch.position for touch in touches])
@@ -76,16 +74,14 @@ def draw(
             style |= {"marker": MARKERS[i % len(MARKERS)], "alpha": 0.35 + 0.65 * sure[those]}
             text = f"{label} ({int(those.sum())})"
             axis.scatter(*positions[those][:, [across, up]].T, **style, label=text)
-        unit = "m" if contacts.head.unit == "metre" else contacts.head.unit
+        unit = UNITS.get(contacts.head.unit, contacts.head.unit)
         axis.set(xlabel=f"{'xyz'[across]} ({unit})", ylabel=f"{'xyz'[up]} ({unit})", title=view)
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(0.15)
         axis.locator_params(nbins=6)
         axis.grid(alpha=0.3)
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, title=chosen, loc="outside right upper")
-    count = len(touches)
+    figure.legend(*axes[0].get_legend_handles_labels(), title=chosen, loc="outside right upper")
     frame = "the skin" if contacts.head.frame == "skin" else contacts.head.frame
-    figure.suptitle(f"{count} contact{'s' * (count != 1)} in the frame of {frame}")
+    figure.suptitle(f"{counted(len(touches), 'contact')} in the frame of {frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.recording import Recording
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.dataset import DataSet
 from train.evaluate import Labels
@@ -35,11 +34,6 @@ class Context:
         """{task: (n,) labels} of the tasks that have more than one class."""
         every = {task: self.dataset.labels(task) for task in self.dataset.tasks}
         return {task: labels for task, labels in every.items() if len(set(labels)) > 1}
-
-    @property
-    def recordings(self) -> list[Recording]:
-        """The recording of each trial."""
-        return [trial.recording for trial in self.dataset.trials]
 
     def vectors(
         self, window_s: float = WINDOW_S, names: Sequence[str] = FEATURES

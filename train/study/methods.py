@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.crossval import MAX_COMPONENTS, MAX_K
@@ -38,13 +39,9 @@ Answers = Mapping[str, Result]
 
 def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> Answers:
     """Extra trees on X (n, taxels over time), a widely used method."""
-    right = dict.fromkeys(y, 0)
-    for task, labels in y.items():
-        for fold in range(int(folds.max()) + 1):
-            tested = folds == fold
-            trees = ExtraTreesClassifier(TREES, random_state=0).fit(X[~tested], labels[~tested])
-            right[task] += int((trees.predict(X[tested]) == labels[tested]).sum())
-    return {task: Result(right[task], len(labels)) for task, labels in y.items()}
+    trees, split = ExtraTreesClassifier(TREES, random_state=0), PredefinedSplit(folds)
+    said = {task: cross_val_predict(trees, X, labels, cv=split) for task, labels in y.items()}
+    return {task: Result(int((said[task] == y[task]).sum()), len(X)) for task in y}
 
 
 def taxels(context: Context) -> NDArray[np.float64]:
@@ -55,8 +52,8 @@ def taxels(context: Context) -> NDArray[np.float64]:
     for trial in context.dataset.trials:
         t = trial.recording.t - trial.onset_s
         at = np.clip(np.searchsorted(t, wanted, side="right") - 1, 0, len(t) - 1)
-        rows.append(trial.recording.frames.reshape(len(t), -1)[at][:, alive].astype(np.float64))
-    return np.stack(rows).reshape(len(rows), -1)
+        rows.append(trial.recording.frames[at].reshape(TIMES, -1)[:, alive].ravel())
+    return np.stack(rows).astype(np.float64)
 
 
 def methods(context: Context) -> dict[str, Callable[..., Answers]]:
@@ -67,7 +64,7 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
     }
     for name, projection in OURS:
         taken = data.of(SETS[name])
-        compared[f"`{name}` ({len(SETS[name])} features), {projection.upper()} + k-NN"] = partial(
+        compared[f"{name} ({len(SETS[name])} features), {projection.upper()} + k-NN"] = partial(
             nested,
             taken.features(WINDOW_S, SAMPLES // 2),
             grid=SearchGrid("IV", projection),
@@ -86,10 +83,10 @@ def section(context: Context) -> Section:
     """Every method's accuracy, on trials and on whole objects left out."""
     y = context.labels
     others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
-    compared = methods(context)
-    cases = [(method, y, stratified_folds(y[finest(y)])) for method in compared.values()]
+    compared, splits = methods(context), [(y, stratified_folds(y[finest(y)]))]
     if GROUP_TASK in y and others:
-        cases += [(method, others, group_folds(y[GROUP_TASK])) for method in compared.values()]
+        splits.append((others, group_folds(y[GROUP_TASK])))
+    cases = [(method, *split) for split in splits for method in compared.values()]
     answers = context.workers.map("methods", _answers, cases)
     known = dict(zip(compared, answers, strict=False))
     unseen = dict(zip(compared, answers[len(compared) :], strict=False))
@@ -97,12 +94,12 @@ def section(context: Context) -> Section:
     known[SEARCHED] = grid_search(context.vectors(), y)
     known[GUESS] = {task: majority(labels) for task, labels in y.items()}
     never = {
-        task: {method: percent(unseen[method][task].accuracy) for method in unseen}
-        for task in (others if unseen else ())
+        task: {m: percent(result[task].accuracy) for m, result in unseen.items() if task in result}
+        for task in y
     }
     rows: list[Row] = [
         {"task": task, "method": method, "accuracy %": 0.0}
-        | {"objects never met %": never.get(task, {}).get(method, "")}
+        | {"objects never met %": never[task].get(method, "")}
         | score(result[task])
         for task in y
         for method, result in known.items()
@@ -117,19 +114,15 @@ def section(context: Context) -> Section:
             "trials, fixed and movable; the paper's claim is about such objects.",
             "The paper's way is its three features, unscaled, with PCA and k-NN. The best of its "
             "grid is the score that its search maximised, by leave-one-out, which flatters. "
-            "Feature sets are those of `train/feature_sets.py`. Extra trees take their usual "
-            "settings. `make export` chooses among the feature sets by itself.",
+            "Feature sets are those of `train/feature_sets.py`. Extra trees have usual settings.",
         ],
         [Table("methods", title, rows)],
         [
             figures.bars(
                 "methods", f"{title}; diamonds are objects never met",
-                [name.replace("`", "") for name in known],
+                list(known),
                 {task: [result[task] for result in known.values()] for task in y},
-                marks={
-                    task: {method.replace("`", ""): share for method, share in shares.items()}
-                    for task, shares in never.items()
-                },
+                marks=never,
                 mark="never met",
             )
         ],
@@ -139,18 +132,11 @@ def section(context: Context) -> Section:
 def sentence(task: str, known: Mapping[str, Answers], unseen: Mapping[str, Answers]) -> str:
     """The accuracy of the paper's way and of the best method, each beside objects never met."""
 
-    def never(method: str) -> Result | None:
-        return unseen.get(method, {}).get(task)
-
     def share(method: str) -> str:
-        result, new = known[method][task], never(method)
+        result, new = known[method][task], unseen.get(method, {}).get(task)
         beside = "" if new is None else f", and {100 * new.accuracy:.0f} % for objects never met"
         return f"{100 * result.accuracy:.0f} % ({interval(result)}{beside})"
 
-    def rank(method: str) -> tuple[float, float]:
-        new = never(method)
-        return known[method][task].accuracy, 0.0 if new is None else new.accuracy
-
-    best = max(known, key=rank)
+    best = max(known, key=lambda method: known[method][task].accuracy)
     better = "No method here does better" if best == PAPER else f"The best is {best}: {share(best)}"
     return f"{task}: the paper's way is right in {share(PAPER)}. {better}."

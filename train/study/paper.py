@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import rankdata, spearmanr
 
 from edge.statistics import wilson
@@ -33,7 +34,6 @@ class Entry:
         setting: taxels, scaling or features, as the study names them.
         task: category, mobility or object.
         percent: leave-one-out accuracy.
-        k, components: of the best model where the paper gives them, else "".
     """
 
     place: str
@@ -41,8 +41,6 @@ class Entry:
     setting: str
     task: str
     percent: float
-    k: str
-    components: str
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -130,16 +128,15 @@ def right_despite_the_object(numbers: Numbers) -> float:
     Args:
         numbers: percent, with category and object of each setting.
     """
-    pairs = [
-        (category, numbers[table, setting, "object"])
-        for (table, setting, task), category in numbers.items()
-        if task == "category" and (table, setting, "object") in numbers
-    ]
-    shares = [100.0 * (a - b) / (100.0 - b) for a, b in pairs if b < 100.0]
+    shares = []
+    for (table, setting, task), percent in numbers.items():
+        named = numbers.get((table, setting, "object"), 100.0)
+        if task == "category" and named < 100.0:
+            shares.append(100.0 * (percent - named) / (100.0 - named))
     return float(np.mean(shares)) if shares else np.nan
 
 
-def rank_correlation(theirs: Sequence[float], ours: Sequence[float]) -> float | None:
+def rank_correlation(theirs: ArrayLike, ours: ArrayLike) -> float | None:
     """Spearman's rank correlation; None where all values of one side are equal."""
     if np.ptp(theirs) == 0.0 or np.ptp(ours) == 0.0:
         return None
@@ -154,26 +151,14 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
         tested: number of trials behind their mean.
     """
     mean = mean_of(data_sets)
-    known = [entry for entry in entries() if entry.key in mean]
-    rows: list[Row] = []
+    known = {
+        entry: _beside(entry, mean[entry.key], tested) for entry in entries() if entry.key in mean
+    }
+    rows = list(known.values())
+    by_task: dict[tuple[str, str], list[Entry]] = {}
     for entry in known:
-        ours = mean[entry.key]
-        low, high = difference(entry.percent, ours, tested)
-        rows.append(
-            {
-                "place": entry.place,
-                "task": entry.task,
-                "paper %": entry.percent,
-                "ours %": round(ours, 2),
-                "difference": round(ours - entry.percent, 2),
-                "from": low,
-                "to": high,
-                "headline": "yes" if entry.headline else "",
-                "within": "yes" if low <= 0.0 <= high else "no",
-            }
-        )
-    pairs = dict.fromkeys((entry.table, entry.task) for entry in known)
-    ranks = [_ranks(*pair, known, rows, mean, data_sets, tested) for pair in pairs]
+        by_task.setdefault((entry.table, entry.task), []).append(entry)
+    ranks = [_ranks(settings, known, data_sets, tested) for settings in by_task.values()]
     inside = [row for row in rows if row["within"] == "yes"]
     others = [row for row in rows if not row["headline"]]
     others_inside = sum(not row["headline"] for row in inside)
@@ -187,9 +172,11 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             "accuracies of section IV-A, which the free values of the scene were chosen to meet, "
             f"so there the scene predicts nothing. Of the other {len(others)}, {others_inside} lie "
             "within. The paper's trials and ours are of different objects; the interval covers the "
-            "chance in both. The head of the scene's file says what the simulation was fitted to "
-            "and what it predicts. Nothing was changed to meet the other numbers.",
-            *_disagreements(rows, ranks),
+            "chance in both. Nothing was changed to meet the other numbers.",
+            _disagreements([row for row in rows if row["within"] == "no"]),
+            "A negative rank correlation means that the simulation gives no support to the paper's "
+            "order of these settings. Two columns count the data sets in which it is positive and "
+            "the perfect copies that would have a negative one by chance.",
             *_wrong_objects({e.key: e.percent for e in known}, mean),
         ],
         [
@@ -201,32 +188,42 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
                 narrow=5,
             ),
         ],
-        [_against(known, rows, title)],
+        [_against(known, title)],
     )
 
 
-def _ranks(
-    table: str,
-    task: str,
-    known: Sequence[Entry],
-    rows: Sequence[Row],
-    mean: Numbers,
-    data_sets: Sequence[Numbers],
-    tested: int,
-) -> Row:
-    """The row of one task in one of the paper's tables."""
-    settings = [entry for entry in known if (entry.table, entry.task) == (table, task)]
-    theirs = [entry.percent for entry in settings]
-    rank = rank_correlation(theirs, [mean[entry.key] for entry in settings])
-    of_each = [rank_correlation(theirs, [n[entry.key] for entry in settings]) for n in data_sets]
-    within = [row["within"] for entry, row in zip(known, rows, strict=True) if entry in settings]
+def _beside(entry: Entry, ours: float, tested: int) -> Row:
+    """The row of one number, with ours in percent of the trials tested."""
+    low, high = difference(entry.percent, ours, tested)
     return {
-        "table": table,
-        "task": task,
+        "place": entry.place,
+        "task": entry.task,
+        "paper %": entry.percent,
+        "ours %": round(ours, 2),
+        "difference": round(ours - entry.percent, 2),
+        "from": low,
+        "to": high,
+        "headline": "yes" if entry.headline else "",
+        "within": "yes" if low <= 0.0 <= high else "no",
+    }
+
+
+def _ranks(
+    settings: Sequence[Entry], known: Mapping[Entry, Row], data_sets: Sequence[Numbers], tested: int
+) -> Row:
+    """The row of the settings of one task in one of the paper's tables."""
+    theirs = [entry.percent for entry in settings]
+    ours = [[numbers[entry.key] for entry in settings] for numbers in data_sets]
+    rank = rank_correlation(theirs, np.mean(ours, axis=0))
+    positive = sum((rank_correlation(theirs, percents) or 0.0) > 0.0 for percents in ours)
+    within = sum(known[entry]["within"] == "yes" for entry in settings)
+    return {
+        "table": settings[0].table,
+        "task": settings[0].task,
         "rank correlation": "all equal" if rank is None else round(rank, 2),
-        "positive in data sets": f"{sum((r or 0.0) > 0.0 for r in of_each)} of {len(data_sets)}",
+        "positive in data sets": f"{positive} of {len(data_sets)}",
         "perfect copies below zero %": negative_by_chance(theirs, tested),
-        "within interval": f"{within.count('yes')} of {len(settings)}",
+        "within interval": f"{within} of {len(settings)}",
     }
 
 
@@ -243,47 +240,31 @@ def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
     ]
 
 
-def _disagreements(side: Sequence[Row], ranks: Sequence[Row]) -> list[str]:
-    """Paragraphs on the numbers outside their interval and on orders against the paper's."""
-    outside = sorted(
-        (row for row in side if row["within"] == "no"), key=lambda row: -abs(row["difference"])
-    )
+def _disagreements(outside: Sequence[Row]) -> str:
+    """A paragraph on the numbers outside their interval."""
     if not outside:
-        return ["No number lies outside."]
-    listed = [f"{r['place']} ({r['task']}) {r['difference']:+.1f} points" for r in outside[:SHOWN]]
-    listed += ["and more in the table"] * (len(outside) > SHOWN)
+        return "No number lies outside."
+    largest = sorted(outside, key=lambda row: -abs(row["difference"]))[:SHOWN]
+    listed = [f"{r['place']} ({r['task']}) {r['difference']:+.1f} points" for r in largest]
     higher = sum(row["difference"] > 0 for row in outside)
-    text = [
+    return (
         f"{len(outside)} lie outside, {higher} of them higher here than in the paper. The largest "
         f"differences: {'; '.join(listed)}. A higher number means that the simulation gives "
         "information that the real skin did not; a lower one, that it lacks some. In Table II some "
         "of the paper's methods are one classifier, see the section on scaling."
-    ]
-    backwards = [
-        f"Table {r['table']}, {r['task']} ({r['rank correlation']:+.2f}; positive in "
-        f"{r['positive in data sets']} data sets; {r['perfect copies below zero %']:g} % of "
-        "perfect copies would be negative)"
-        for r in ranks
-        if isinstance(r["rank correlation"], float) and r["rank correlation"] < 0
-    ]
-    if backwards:
-        text.append(
-            f"Ordered against the paper: {'; '.join(backwards)}. There the simulation gives no "
-            "support to the paper's conclusion."
-        )
-    return text
+    )
 
 
-def _against(known: Sequence[Entry], side: Sequence[Row], title: str) -> Figure:
+def _against(known: Mapping[Entry, Row], title: str) -> Figure:
     """Ours against the paper's, a point a number; hollow where its bar misses the diagonal."""
     marks = dict(zip(dict.fromkeys(e.table for e in known), "os^", strict=False))
     strokes = dict(zip(sorted({e.task for e in known}), STROKES, strict=False))
-    ends = min(min(row["paper %"], row["ours %"]) for row in side) - 4.0, 102.0
+    ends = min(min(row["paper %"], row["ours %"]) for row in known.values()) - 4.0, 102.0
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
         axes.plot(ends, ends, color="0.4", lw=1, label="equal")
-        for entry, row in zip(known, side, strict=True):
+        for entry, row in known.items():
             colour, _, dashes = strokes[entry.task]
             face = colour if row["within"] == "yes" else "white"
             bar = [entry.percent + row["from"], entry.percent + row["to"]]

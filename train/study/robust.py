@@ -2,121 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from edge.errors import InputError
-from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
-from edge.touch.layout import SkinLayout
-from edge.touch.track import TrackSettings
+from train.dataset import DataSet
 from train.report import figures
 from train.report.score import grid_search, score, transfer
 from train.report.section import Section, Table
 from train.report.skins import follow, vectors
 from train.simulate.engine import run_physics
 from train.simulate.run import batches_of, file_name, recordings
-from train.simulate.scene_model import Scene, TrialSpec
+from train.simulate.scene_model import Scene
 from train.simulate.schema import EFFECTS
 from train.study.context import Context
 
 FACTORS = (0.5, 2.0)
 SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
 """Effects that change what is read, never what happens."""
-UNCHANGED = "as recorded"
 HOW = "trained and tested with it", "trained without it, tested with it"
-BATCHES = 2
-"""Parts of a scene that are simulated anew one by one; more cost more time in all."""
 
 
-def variants(scene: Scene) -> list[dict[str, Scene]]:
-    """{name: the scene with one thing changed}; all changes of the sensor are the last group."""
-    changed: dict[str, Scene] = {}
+def variants(scene: Scene) -> dict[str, Scene]:
+    """{name: the scene with one thing changed}: the speed, the arm, or an effect of the sensor."""
+    changed = {}
     for factor in FACTORS:
         # The equilibrium point travels the same distance.
-        changed[f"speed x {factor:g}"] = replace(
-            scene, rate=tuple(r * factor for r in scene.rate), travel_s=scene.travel_s / factor
-        )
-        changed[f"arm stiffness x {factor:g}"] = replace(
-            scene, stiffness=tuple(k * factor for k in scene.stiffness)
-        )
-    sensor: dict[str, Scene] = {}
+        rate, stiffness = (tuple(factor * x for x in xs) for xs in (scene.rate, scene.stiffness))
+        faster = replace(scene, rate=rate, travel_s=scene.travel_s / factor)
+        changed[f"speed x {factor:g}"] = faster
+        changed[f"arm stiffness x {factor:g}"] = replace(scene, stiffness=stiffness)
     for name in SENSOR:
+        others = tuple(effect for effect in scene.add if effect != name)
         if name in scene.add:
-            others = tuple(effect for effect in scene.add if effect != name)
-            sensor[f"without {name}"] = replace(scene, add=others)
+            changed[f"without {name}"] = replace(scene, add=others)
         else:
-            sensor[f"with {name}"] = replace(scene, add=(*scene.add, name))
-    return [*({name: changed[name]} for name in changed), sensor]
+            changed[f"with {name}"] = replace(scene, add=(*others, name))
+    return changed
 
 
-def measured(
-    scenes: Mapping[str, Scene],
-    trials: tuple[TrialSpec, ...],
-    wanted: Collection[str],
-    layout: SkinLayout,
-    tracking: TrackSettings,
-    chain: Chain | None,
-) -> dict[str, dict[str, FeatureSeries | None]]:
-    """{name: {file name: contact or None}} of some trials, as each scene's sensor shows them.
-
-    Args:
-        scenes: {name: scene} that differ in their sensor alone.
-        trials: as they were drawn.
-        wanted: file names of the trials to follow.
-        layout: the skin, with its thresholds.
-        tracking: how contacts are followed.
-        chain: the arm, or None.
-    """
-    # Without any effect of the sensor, frames would be kept in whole counts.
-    physics = run_physics(max(scenes.values(), key=lambda scene: len(scene.add)), trials)
-    contacts: dict[str, dict[str, FeatureSeries | None]] = {}
-    for name, scene in scenes.items():
-        sensed = recordings(physics, scene=scene)
-        kept = {file: recording for file, recording in sensed if file in wanted}
-        followed = follow(list(kept.values()), layout, tracking, chain)
-        contacts[name] = dict(zip(kept, followed, strict=True))
-    return contacts
-
-
-def anew(
-    context: Context, groups: Sequence[Mapping[str, Scene]]
-) -> dict[str, list[FeatureSeries | None]]:
-    """{name: contacts of the data set's trials, in its order, simulated again from each scene}.
-
-    The scenes of a group differ in their sensor alone, so that they share one simulation.
+def anew(scene: Scene, data: DataSet) -> list[FeatureSeries | None]:
+    """The contacts of a data set's trials, in its order, simulated again from a scene.
 
     A trial has the same random draws in every scene, those with which it met its label when it was
-    recorded. A weaker arm that no longer moves an object does not change its label.
-
-    Raises:
-        InputError: a scene has no trial of a recording's name.
+    recorded. A weaker arm that no longer moves an object does not change its label. A trial that
+    the scene does not have counts as one without contact.
     """
-    data = context.dataset
-    wanted = [trial.path.name for trial in data.trials]
-    redrawn = {
-        file: int(recording.meta.get("simulation", {}).get("redrawn", 0))
-        for file, recording in zip(wanted, context.recordings, strict=True)
+    attempts = {
+        trial.path.name: trial.recording.meta.get("simulation", {}).get("redrawn", 0)
+        for trial in data.trials
     }
-    cases = []
-    for group in groups:
-        shown = next(iter(group.values()))
-        for trials in batches_of(shown, jobs=BATCHES):
-            drawn = tuple(replace(t, attempt=redrawn.get(file_name(shown, t), 0)) for t in trials)
-            cases.append((group, drawn, set(wanted), data.layout, data.tracking, data.chain))
-    merged: dict[str, dict[str, FeatureSeries | None]] = {n: {} for group in groups for n in group}
-    for answer in context.workers.map("simulated again", measured, cases):
-        for name, contacts in answer.items():
-            merged[name] |= contacts
-    strange = [file for file in wanted if any(file not in contacts for contacts in merged.values())]
-    if strange:
-        raise InputError(
-            f"{strange[0]}: the scene has no such trial; give the scene that the recordings were "
-            "simulated from, or no scene"
-        )
-    return {name: [contacts[file] for file in wanted] for name, contacts in merged.items()}
+    specs = tuple(
+        replace(spec, attempt=int(attempts.get(file_name(scene, spec), 0)))
+        for batch in batches_of(scene)
+        for spec in batch
+    )
+    files, sensed = zip(*recordings(run_physics(scene, specs)), strict=True)
+    contacts = dict(zip(files, follow(sensed, data.layout, data.tracking, data.chain), strict=True))
+    return [contacts.get(file) for file in attempts]
 
 
 def section(context: Context) -> Section | None:
@@ -124,33 +69,32 @@ def section(context: Context) -> Section | None:
     scene = context.scene
     if scene is None:
         return None
-    series = anew(context, [{UNCHANGED: scene}, *variants(scene)])
-    X, y = context.vectors(), context.labels
-    if not np.array_equal(vectors(series.pop(UNCHANGED)), X):
+    changes, X, y = variants(scene), context.vectors(), context.labels
+    again = [(changed, context.dataset) for changed in (scene, *changes.values())]
+    unchanged, *series = context.workers.map("simulated again", anew, again)
+    if not np.array_equal(vectors(unchanged), X):
         raise InputError(
-            f"the scene {scene.name} gives other trials than these recordings; simulate it again, "
-            "or study them without a scene"
+            f"the scene {scene.name} gives other trials than these recordings; give the scene that "
+            "they were simulated from, simulate it again, or study them without a scene"
         )
-    changed = [vectors(contacts) for contacts in series.values()]
-    retrained = context.workers.map("their accuracy", grid_search, [(x, y) for x in changed])
+    changed = [vectors(contacts) for contacts in series]
     plain = grid_search(X, y)
+    retrained = context.workers.map("their accuracy", grid_search, [(x, y) for x in changed])
     transferred = context.workers.map("trained here", transfer, [(X, y, plain, x) for x in changed])
+    results = dict(zip(HOW, (retrained, transferred), strict=True))
     rows = [
         {"change": name, "task": task, "trained and tested": how, **score(result)}
-        | {"without contact": sum(contact is None for contact in series[name])}
-        for name, *sets in zip(series, retrained, transferred, strict=True)
-        for how, results in zip(HOW, sets, strict=True)
-        for task, result in results.items()
+        | {"without contact": series[i].count(None)}
+        for i, name in enumerate(changes)
+        for how, answers in results.items()
+        for task, result in answers[i].items()
     ]
     pictures = [
         figures.bars(
             f"robustness_{task}",
             f"{task}: accuracy after a change",
-            list(series),
-            {
-                how: [result[task] for result in results]
-                for how, results in zip(HOW, (retrained, transferred), strict=True)
-            },
+            list(changes),
+            {how: [answer[task] for answer in answers] for how, answers in results.items()},
             reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
         )
         for task in y

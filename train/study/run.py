@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -65,7 +63,6 @@ def study(
     Raises:
         InputError: the data set cannot be used, or there is no scheduler.
     """
-    began = time.perf_counter()
     for option, value in (("--seeds", seeds), ("--jobs", jobs)):
         if value < 1:
             raise InputError(f"{option} must be at least 1, not {value}")
@@ -86,19 +83,13 @@ def study(
     with nullcontext() if address is None else on_cluster(address):
         # The last first: it notices when the recordings are of another scene.
         sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
-        numbers = [_numbers(sections)]
+        shown = [section for section in sections if section]
         if source is not None:
+            numbers = [_numbers(shown)]
             numbers += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
-    findings, *others = sections
-    comparison = None
-    if source is not None:
-        comparison = paper.comparison(numbers, len(numbers) * len(dataset.trials))
-    shown = [section for section in (findings, comparison, *others) if section]
+            shown.insert(1, paper.comparison(numbers, seeds * len(dataset.trials)))
     name = source.name if source is not None else Path(data[0]).name
-    written = write(out, f"What a touch reveals: {name}", _lead(context, constant), shown)
-    took = time.perf_counter() - began
-    print(f"study: {len(shown)} sections in {took:.0f} s", file=sys.stderr)
-    return written
+    return write(out, f"What a touch reveals: {name}", _lead(context, constant), shown)
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
@@ -122,8 +113,8 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     return lead
 
 
-def _numbers(sections: Sequence[Section | None]) -> Numbers:
-    return {key: x for section in sections if section for key, x in section.numbers.items()}
+def _numbers(sections: Sequence[Section]) -> Numbers:
+    return {key: percent for section in sections for key, percent in section.numbers.items()}
 
 
 def _again(context: Context, scene: Scene, i: int) -> Numbers:

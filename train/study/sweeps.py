@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import chain, combinations
+from itertools import combinations
 from typing import Any
-
-import numpy as np
 
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
-from train.evaluate import Result
+from train.evaluate import Labels, Result
 from train.report import figures
 from train.report.score import grid_search, percent, score
 from train.report.section import Numbers, Row, Section, Table
@@ -59,20 +55,14 @@ def rows(column: str, results: Results, table: str = "") -> list[Row]:
 def confusion(context: Context) -> Section:
     """What each thing touched is taken for (Figs. 6 to 8)."""
     best: list[Row] = []
-    cells: list[Row] = []
     pictures = []
     for task, result in grid_search(context.vectors(), context.labels).items():
         truth = context.labels[task]
         assert result.said is not None
-        counts = {"task": task, "classes": len(set(truth)), "trials": result.total}
-        best.append(counts | score(result))
+        size = {"task": task, "classes": len(set(truth)), "trials": result.total}
+        best.append(size | score(result))
         title = f"{task}: answers to each thing touched"
         pictures.append(figures.confusion(f"confusion_{task}", title, truth, result.said))
-        pairs = Counter(zip(truth.tolist(), result.said.tolist(), strict=True))
-        cells += [
-            {"task": task, "touched": touched, "answer": answer, "trials": count}
-            for (touched, answer), count in sorted(pairs.items())
-        ]
     return Section(
         "Classification (Figs. 6 to 8)",
         [
@@ -81,10 +71,7 @@ def confusion(context: Context) -> Section:
             "models it takes the smallest. The score is the one that the search maximised, so it "
             "flatters."
         ],
-        [
-            Table("classification", "The best components and k of each task", best),
-            Table("confusion", "Answers to each thing touched", cells),
-        ],
+        [Table("classification", "The best components and k of each task", best)],
         pictures,
     )
 
@@ -97,11 +84,9 @@ def window(context: Context) -> Section:
     text = ["Each feature is sampled 40 times, whatever the window, as in the paper."]
     for task in context.labels:
         at = {seconds: result[task].accuracy for seconds, result in results.items()}
-        short = [seconds for seconds in WINDOWS_S if at[seconds] < at[1.2] - 0.02]
         text.append(
             f"{task}: {at[0.8]:.1%} of the decisions are right after 0.8 s, {at[1.2]:.1%} after "
-            f"1.2 s and {at[2.0]:.1%} after 2 s. "
-            + (f"Up to {short[-1]} s more than two points are missing." if short else "")
+            f"1.2 s and {at[2.0]:.1%} after 2 s."
         )
     if "category" in context.labels and context.scene is not None:
         text.append(
@@ -148,49 +133,35 @@ def _compared(
     context: Context, column: str, title: str, table: str, results: Results, text: str
 ) -> Section:
     """Accuracies beside those of one of the paper's tables, whose settings have names."""
-
-    def short(setting: str) -> str:
-        return setting.replace("contact_", "").replace("max_", "").replace(" ", " + ")
-
-    theirs = {
-        task: {short(setting): share for setting, share in papers(table, task).items()}
-        for task in context.labels
-    }
-    png = figures.bars(
-        column, title, list(map(short, results)), by_task(results),
-        marks=theirs if context.scene else None,
-    )  # fmt: skip
+    theirs = {task: papers(table, task) for task in context.labels} if context.scene else None
+    png = figures.bars(column, title, list(results), by_task(results), marks=theirs)
     cells = Table(column, f"Accuracy with each choice of {column}", rows(column, results, table))
     return Section(title, [text], [cells], [png], numbers=numbers(table, results))
 
 
-def _through_coarser(
-    recordings: Sequence[Recording],
+def _through(
     layout: SkinLayout,
+    recordings: Sequence[Recording],
     tracking: TrackSettings,
     arm: Chain | None,
-) -> list[list[FeatureSeries | None]]:
-    """The recordings' contacts through each coarser skin."""
-    return [follow(changed, skin, tracking, arm) for skin, changed in coarser(layout, recordings)]
+    labels: Labels,
+) -> tuple[Mapping[str, Result], int]:
+    """Each task's accuracy through a skin, and the number of trials without contact."""
+    contacts = follow(recordings, layout, tracking, arm)
+    return grid_search(vectors(contacts), labels), contacts.count(None)
 
 
 def resolution(context: Context) -> Section:
     """Accuracy with larger taxels (Table I, Fig. 9)."""
     data, labels = context.dataset, context.labels
-    chunks = np.array_split(np.arange(len(data.trials)), 8 * context.workers.jobs)
-    cases = [
-        ([context.recordings[i] for i in chunk], data.layout, data.tracking, data.chain)
-        for chunk in chunks
-        if chunk.size
-    ]
-    answers = context.workers.map("taxel resolution", _through_coarser, cases)
-    series = [list(chain.from_iterable(chunk)) for chunk in zip(*answers, strict=True)]
-    skins = data.layout, *(skin for skin, _ in coarser(data.layout, []))
-    taxels = [skin.rows * skin.cols for skin in skins]
-    X = [context.vectors(), *map(vectors, series)]
-    searched = context.workers.map("its accuracy", grid_search, [(x, labels) for x in X])
-    results = dict(zip(taxels, searched, strict=True))
-    lost = dict(zip(taxels, [0, *(s.count(None) for s in series)], strict=True))
+    recordings = [trial.recording for trial in data.trials]
+    skins = [(data.layout, recordings), *coarser(data.layout, recordings)]
+    cases = [(*skin, data.tracking, data.chain, labels) for skin in skins]
+    answers = context.workers.map("taxel resolution", _through, cases)
+    taxels = [layout.rows * layout.cols for layout, _ in skins]
+    results, lost = (
+        dict(zip(taxels, values, strict=True)) for values in zip(*answers, strict=True)
+    )
     title = "Effect of taxel resolution (Table I, Fig. 9)"
     theirs = {task: {float(n): p for n, p in papers("I", task).items()} for task in labels}
     png = figures.lines(

@@ -171,7 +171,7 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
         "confidence": 0.5,
         "flags": ["tie"],
     }
-    others = [{**event, "task": t, "label": t, "flags": ["short"]} for t in ("category", "object")]
+    others = [{**event, "task": t, "label": t} for t in ("category", "object")]
     onset = {"event": "onset", "contact": 1, "onset_s": 0.5}
     write(path, info, [onset, event])
     assert not list(TouchMap(path))  # two tasks are still open
@@ -184,7 +184,6 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     assert first == second
     assert first.position == (0.1, 0.2, 0.3)
     assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
-    assert first.flags == ("tie", "short")
     assert "\n\n" not in path.read_text()
 
 

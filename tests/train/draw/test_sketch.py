@@ -44,21 +44,12 @@ def test_an_object_that_tips_stands_on_its_edge_until_it_lies():
     assert np.ptp(outline(lying)[:, 1]) == pytest.approx(0.1)
 
 
-def test_an_object_that_turns_is_seen_from_above_turned_about_where_it_is_pushed():
+def test_the_title_says_by_how_much_an_object_turns():
     values = {"aside_m": 0.05, "foot_m": 0.3}
-    axis, says = sketch(["sliding", "turning"], 0.1, **values)
     angle = 0.1 * 0.05 / (0.1**2 + 0.05**2)
-    assert says == f", turns by {np.degrees(angle):.0f} degrees"
-    (corner,) = axis.child_axes
-    shown = outline(corner)
-    pushed = np.array([0.1, 0.0])
-    assert corner.lines[0].get_xdata()[0] == pytest.approx(pushed[0])
-    # Its face runs through the place where it is pushed; pushed on the left, it turns right.
-    along = shown[3] - shown[0]
-    assert np.arctan2(along[0], along[1]) == pytest.approx(angle)
-    off = pushed - shown[0]
-    assert along[0] * off[1] - along[1] * off[0] == pytest.approx(0.0, abs=1e-12)
-    assert np.linalg.norm(along) == pytest.approx(0.3)
+    motion = sketch(["sliding", "turning"], 0.1, **values)[1]
+    assert motion == f", turns by {np.degrees(angle):.0f} degrees"
+    assert sketch(["sliding", "turning"], 0.0, **values)[1] == ""
 
 
 def test_a_plants_stems_bend_to_where_the_forearm_is():
