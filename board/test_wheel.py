@@ -15,7 +15,7 @@ import pytest
 import edge
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-LARGEST = 250_000
+LARGEST = 240_000
 
 
 @pytest.fixture(scope="session")
