@@ -37,7 +37,7 @@ help:
 	@echo "  make matched       four touches in MuJoCo and in our simulator, beside theory"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
-	@echo "  make stopping      deciding when sure beside fixed windows, and beside TEASER if aeon is there"
+	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
 	@echo "  make soak          ten minutes of the loop in virtual time: memory and schedule"
 	@echo "  make soak-day      24 hours of the same, with decisions, map and UDP"
 	@echo "Thorough tests"
