@@ -160,10 +160,12 @@ def write_whole(
 
     Raises:
         NameTaken: `path` exists and `overwrite` is False.
-        InputError: the folder cannot be written, or the disk is full.
+        InputError: the name is impossible, the folder cannot be written, or the disk is full.
     """
     target = Path(path)
     folder = target.parent
+    if "\0" in target.name:
+        raise InputError(f"{target}: a file's name cannot hold a null character; choose another")
     taken = NameTaken(f"{target}: exists already; choose another name or remove it")
     if not overwrite and target.exists():
         raise taken

@@ -141,3 +141,12 @@ def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
     for folder, reason in {**reasons, "/proc/none": "No such file"}.items():
         with pytest.raises(InputError, match=f"cannot be written: {reason}"):
             check_writable(folder)
+
+
+def test_a_name_with_a_null_character_is_refused_in_a_sentence(tmp_path):
+    with (
+        pytest.raises(InputError, match="cannot hold a null character"),
+        write_whole(tmp_path / "a\0b"),
+    ):
+        pass
+    assert list(tmp_path.iterdir()) == []
