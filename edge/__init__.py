@@ -7,8 +7,8 @@ Only the names below are public; everything else may move. Each is loaded at its
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # type checkers read it as true; to load typing would take longer than edge
 if TYPE_CHECKING:
     from edge.classifier import Classifier as Classifier
     from edge.errors import EdgeError as EdgeError
@@ -43,7 +43,7 @@ _PUBLIC = {
 __all__ = sorted(name for names in _PUBLIC.values() for name in names)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     for module, names in _PUBLIC.items():
         if name in names:
             return getattr(import_module(module), name)

@@ -34,7 +34,7 @@ def test_the_model_says_what_it_measures_and_in_which_units(six):
 def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six):
     vector = np.zeros(110)
     vector[105] = np.nan
-    with pytest.raises(InputError, match="value 5 of contact_area_rate@10 is not finite"):
+    with pytest.raises(InputError, match="value 105 .*, of contact_area_rate@10, is not finite"):
         Model(six / "model.onnx").decide(vector)
 
 

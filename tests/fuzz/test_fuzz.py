@@ -111,7 +111,7 @@ BROKE = {
     "mcap-short.mcap": "unpack requires a buffer of 8 bytes; copy it again",
     "mcap-utf8.mcap": "it is not UTF-8 text; copy it again",
     "mcap-zstd.mcap": "Data corruption detected; copy it again",
-    "model-gather.onnx": "must be within the inclusive range [-6,5]); copy or export it again",
+    "model-gather.onnx": "indices element out of data bounds, idx=99 must be",
     "recording-token.npz": "('EOF in multi-line statement', (2, 0)); copy or record it again",
     "rosbag-header.bag": "Header field could not be parsed.; copy it again",
     "rosbag-size.bag": "Declared field size is too large for header.; copy it again",

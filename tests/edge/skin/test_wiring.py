@@ -29,7 +29,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("rows = 4", "rows = 0", "skin: 0 x 6 taxels"),
+        ("rows = 4", "rows = 0", "skin.rows must be a whole number from 1 to 1024, not 0"),
         ("device = 1", "", "bus 0: device must be the number of a bus or its path"),
         ("device = 1", "device = 1\nclock_hz = 1000000", "a TCA9548A carries at most 400000"),
         ('kind = "ad7147"', 'kind = "adxl"', "bus 0: kind must be one of ad7147"),
