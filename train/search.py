@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.neighbors import NearestNeighbors
 
 from train.pipeline import Choice
 from train.projection import Spectrum
@@ -15,6 +14,8 @@ from train.projection import Spectrum
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
+BLOCK = 1 << 20
+"""Distances in memory at once."""
 
 
 @dataclass(frozen=True)
@@ -68,15 +69,21 @@ class SearchGrid:
 def _nearest(known: NDArray[np.float64], tested: NDArray[np.float64], k: int) -> NDArray[np.int64]:
     """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in their order.
 
-    Which of several equal ones is the last of the k is left open. The distances of whole numbers
-    are exact. They are taken in blocks, so that (m, n) of them are never in memory.
+    Which of several equal ones is the last of the k is left open. The coordinates are whole
+    numbers whose squared distances, here less |tested|^2, are exact. They are taken in blocks, so
+    that (m, n) of them are never in memory.
     """
     if not known.shape[1]:
         return np.tile(np.arange(k), (len(tested), 1))
-    search = NearestNeighbors(n_neighbors=k, algorithm="brute", metric="sqeuclidean").fit(known)
-    squares, rows = search.kneighbors(tested)
-    order = np.lexsort((rows, squares), axis=1)
-    return np.take_along_axis(rows, order, axis=1)
+    lengths = np.einsum("ij,ij->i", known, known)
+    places = np.empty((len(tested), k), dtype=np.int64)
+    step = max(BLOCK // len(known), 1)
+    for begin in range(0, len(tested), step):
+        squares = lengths - 2.0 * (tested[begin : begin + step] @ known.T)
+        rows = np.argpartition(squares, k - 1, axis=1)[:, :k]
+        order = np.lexsort((rows, np.take_along_axis(squares, rows, axis=1)), axis=1)
+        places[begin : begin + step] = np.take_along_axis(rows, order, axis=1)
+    return places
 
 
 def _rounded(
