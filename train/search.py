@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.neighbors import NearestNeighbors
 
 from train.pipeline import Choice
 from train.projection import Spectrum
@@ -14,8 +15,8 @@ from train.projection import Spectrum
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 NEIGHBOURS = (1, 2, 3, 4, 5, 7, 9)
-BLOCK = 1 << 20
-"""Distances in memory at once."""
+MANY = 1 << 17
+"""Distances from which on scikit-learn is faster."""
 
 
 @dataclass(frozen=True)
@@ -70,20 +71,20 @@ def _nearest(known: NDArray[np.float64], tested: NDArray[np.float64], k: int) ->
     """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in their order.
 
     Which of several equal ones is the last of the k is left open. The coordinates are whole
-    numbers whose squared distances, here less |tested|^2, are exact. They are taken in blocks, so
-    that (m, n) of them are never in memory.
+    numbers, whose squared distances are exact. scikit-learn never holds all (m, n) of them and is
+    fast for many, but it checks its input for longer than a few take.
     """
     if not known.shape[1]:
         return np.tile(np.arange(k), (len(tested), 1))
-    lengths = np.einsum("ij,ij->i", known, known)
-    places = np.empty((len(tested), k), dtype=np.int64)
-    step = max(BLOCK // len(known), 1)
-    for begin in range(0, len(tested), step):
-        squares = lengths - 2.0 * (tested[begin : begin + step] @ known.T)
+    if len(known) * len(tested) > MANY:
+        search = NearestNeighbors(n_neighbors=k, algorithm="brute", metric="sqeuclidean").fit(known)
+        squares, rows = search.kneighbors(tested)
+    else:
+        squares = np.einsum("ij,ij->i", known, known) - 2.0 * (tested @ known.T)
         rows = np.argpartition(squares, k - 1, axis=1)[:, :k]
-        order = np.lexsort((rows, np.take_along_axis(squares, rows, axis=1)), axis=1)
-        places[begin : begin + step] = np.take_along_axis(rows, order, axis=1)
-    return places
+        squares = np.take_along_axis(squares, rows, axis=1)
+    order = np.lexsort((rows, squares), axis=1)
+    return np.take_along_axis(rows, order, axis=1)
 
 
 def _rounded(

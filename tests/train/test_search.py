@@ -1,8 +1,9 @@
 """Neighbours of every setting of a grid, against a sort of all distances."""
 
 import numpy as np
+import pytest
 
-from train.search import Decomposition, SearchGrid
+from train.search import MANY, Decomposition, SearchGrid, _nearest
 
 ROWS = np.array([[0.0, 2.0], [0.0, -2.0], [3.0, 0.0], [-3.0, 0.0], [3.0, 0.0], [-3.0, 0.0]])
 LABELS = {"t": np.array([0, 0, 1, 2, 1, 2])}
@@ -33,3 +34,15 @@ def test_a_trial_that_counts_twice_is_found_once():
         ROWS[twice], ROWS[:1], {"t": LABELS["t"][twice]}, np.arange(0, 12, 2)
     ).neighbours(grid, "t")
     assert near.tolist() == [[[0, 2, 3, 4, 5, 1]]]
+
+
+@pytest.mark.parametrize("n", [20, MANY // 30 + 1])
+def test_few_and_many_trials_have_the_neighbours_of_a_sort(n):
+    rng = np.random.default_rng(0)
+    known, tested = rng.permutation(10 * n)[: 2 * n].reshape(n, 2), rng.integers(0, n, (30, 2))
+    squares = ((tested[:, None] - known) ** 2).sum(axis=2)
+    near = _nearest(known.astype(float), tested.astype(float), 4)
+    nearest = np.take_along_axis(squares, near, axis=1)
+    np.testing.assert_array_equal(nearest, np.sort(squares, axis=1)[:, :4])
+    ties = nearest[:, 1:] == nearest[:, :-1]
+    assert (near[:, 1:] > near[:, :-1])[ties].all()
