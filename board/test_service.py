@@ -49,7 +49,7 @@ class Machine:
         return subprocess.run(inside, capture_output=True, text=True, check=False).stdout
 
     def once(self, look, wanted, seconds=60.0):
-        """What is seen once it is as wanted, or the last that is seen."""
+        """The first observation that is as wanted, or else the last one."""
         ends = time.monotonic() + seconds
         while not wanted(seen := look()) and time.monotonic() < ends:
             assert self.process.poll() is None, "systemd did not start"

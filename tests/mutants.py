@@ -3,7 +3,7 @@
 mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that reach the
 changed function; `[tool.mutmut]` in pyproject.toml names the files and the tests. A run tries
 `--count` mutants drawn by `--seed` until `--minutes` are over, and prints the difference of each
-mutant that no test noticed. Results are kept in `mutants/`: what was tried is not tried again.
+mutant that no test noticed. Results are kept in `mutants/`, and no mutant is tried twice.
 """
 
 from __future__ import annotations

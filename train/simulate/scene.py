@@ -268,7 +268,7 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
     for key, default in schema.keys_of(family).items():
         default = 0.0 if key in differs else default
         if table.has(key) or default is not None:
-            if OBJECT[key].whole:  # a family has drawn from its range by now
+            if OBJECT[key].integer:  # a family has drawn from its range by now
                 table.field(key, OBJECT[key])
             values[key] = table.value(key, OBJECT[key], default)
     needed: list[str] = []
@@ -344,7 +344,7 @@ def draw_family(
         else:
             wanted = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", wanted)
-        counts = {key: round(value) for key, value in drawn.items() if OBJECT[key].whole}
+        counts = {key: round(value) for key, value in drawn.items() if OBJECT[key].integer}
         yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **counts}
 
 

@@ -30,7 +30,7 @@ class SceneTable(ConfigTable):
     def field(self, key: str, field: Field, default: float | None = None) -> float:
         """The number of a field; `default` replaces the field's own."""
         value = field.default if default is None else default
-        if field.whole:
+        if field.integer:
             allowed = range(int(field.low), int(field.high) + 1)
             return float(self.whole(key, value, allowed))
         return self.number(key, value, field.low, field.high, open_low=field.open_low)

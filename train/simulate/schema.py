@@ -13,7 +13,8 @@ class Field:
     says: str
     open_low: bool = False
     """Whether the lower limit itself is excluded."""
-    whole: bool = False
+    integer: bool = False
+    """Whether it must be a whole number."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Effect:
 CONDITIONS = ("fixed", "movable")
 
 TRIALS = {
-    "count": Field(1, 1_000_000, 5, "trials of each object in each condition", whole=True),
+    "count": Field(1, 1_000_000, 5, "trials of each object in each condition", integer=True),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
     "tolerance": Field(1e-5, 0.5, 0.01, "error allowed to the step, as a part of the peak force"),
@@ -82,7 +83,7 @@ OBJECT = {
     "depth_m": Field(0.0, 10.0, 0.10, "of the elastic foundation", open_low=True),
     "relax_ratio": Field(0.0, 100.0, 0.6, "k1 / k_inf of the standard linear solid"),
     "relax_s": Field(0.0, 1e6, 0.5, "its time", open_low=True),
-    "stem_count": Field(1, 200, 12, "stems the forearm can meet", whole=True),
+    "stem_count": Field(1, 200, 12, "stems the forearm can meet", integer=True),
     "stem_n_m": Field(0.0, 1e12, 15.0, "stiffness of a stem, 3 E I / L^3", open_low=True),
     "stem_spread_m": Field(0.0, 1.0, 0.06, "depth over which the stems stand"),
     "stem_slip_m": Field(0.0, 10.0, 0.12, "bend at which a stem slips off", open_low=True),
@@ -169,7 +170,7 @@ EFFECTS: dict[str, Effect] = {
         "sensor",
         {
             "part": Field(0.0, 1.0, 0.01, "of all taxels"),
-            "known": Field(0, 1, 1, "1: marked invalid; 0: they read zero", whole=True),
+            "known": Field(0, 1, 1, "1: marked invalid; 0: they read zero", integer=True),
         },
     ),
     "jitter": Effect("clock", {"s": Field(0.0, 1.0, 0.001, "deviation, cut at 0.45 of a frame")}),

@@ -1,4 +1,4 @@
-"""The live page: what it shows of frames, contacts and decisions, and what it does with trials."""
+"""The live page shows frames, contacts and decisions, and relabels and deletes trials."""
 
 from contextlib import closing
 

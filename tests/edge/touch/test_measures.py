@@ -32,7 +32,7 @@ ALL = names()
 
 
 def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[int]:
-    """What is measured in a zone, by plain sums; the best of all cuts of a turn."""
+    """The measures of a zone, by plain sums; the best of all cuts of a turn."""
     candidates = []
     for cut in range(turn or 1):
         moved = {(r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()}
