@@ -389,7 +389,7 @@ def find(paths: list[str]) -> list[Path]:
     files: list[Path] = []
     for path in map(Path, paths):
         inside = [path]
-        if path.is_dir():
+        if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
             inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
                 right.append(line["expected"] == event.label)
             output.event(line)
         if not output.as_json:
-            output.text(picture(recording) + "\n")
+            print(picture(recording) + "\n", flush=True)
     score = f"{sum(right)} of {len(right)} decisions are right"
     if output.as_json:
         LOG.info(score)

@@ -45,7 +45,8 @@ class Output:
         return "\n".join(map(printable, lines))
 
     def text(self, text: str) -> None:
-        """Write text that no program reads, such as a picture; to stderr if stdout is for JSON."""
+        """Write text that no program reads; to stderr if stdout is for JSON."""
+        text = "\n".join(map(printable, text.split("\n")))
         print(text, file=sys.stderr if self.as_json else sys.stdout, flush=True)
 
 

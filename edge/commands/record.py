@@ -147,7 +147,8 @@ def trial_path(out: str, labels: dict[str, str]) -> Path:
         return path
     # A listing of the folder omits names that begin with a dot.
     stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
-    taken = {p.name for p in path.glob(f"{stem}-*.npz")}
+    with refusing(f"{path}: cannot be written"):
+        taken = {p.name for p in path.glob(f"{stem}-*.npz")}
     names = (f"{stem}-{number:03}.npz" for number in count(1))
     return path / next(name for name in names if name not in taken)
 

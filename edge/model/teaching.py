@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.errors import InputError
+from edge.errors import InputError, printable
 from edge.files import parsing
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY
@@ -131,10 +131,11 @@ def taught(
                 for key, table in label_tables(all_labels, len(entry.labels)).items():
                     changed[f"{key} of {task}"] = table
     digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
+    trials = tuple(printable(Path(name).stem) for name in names)
     after = replace(
         info,
         rows=info.rows + len(names),
-        trials=(*info.trials, *(Path(name).stem for name in names)) if info.trials else (),
+        trials=(*info.trials, *trials) if info.trials else (),
         taught=info.taught + len(names),
         data_digest=digest,
     )

@@ -186,6 +186,13 @@ def test_a_folder_without_recordings_is_named(tmp_path):
         find([str(tmp_path)])
 
 
+def test_a_name_too_long_to_be_looked_up_is_left_to_the_reader(tmp_path):
+    name = str(tmp_path / f"{'n' * 300}.npz")
+    assert [str(path) for path in find([name])] == [name]
+    with pytest.raises(InputError, match="n.npz: cannot be read: File name too long"):
+        load(name)
+
+
 def test_a_header_that_claims_more_than_the_file_holds_takes_no_memory(tmp_path):
     path = tmp_path / "huge.npz"
     for kind, shape in (("<u2", (10**9, 16, 24)), ("<u2", (1 << 30,)), ("<U500000000", (1,))):

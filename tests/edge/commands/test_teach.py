@@ -51,6 +51,13 @@ def test_a_taught_trial_is_known_again_and_the_new_files_agree(
     assert edge("verify", "--model", after.path, "--golden", golden)[0] == 0
 
 
+def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path):
+    save(tmp_path / "cup.npz", labelled(make_touch(seed=70), category="soft-fixed"))
+    (tmp_path / "cup.npz").rename(tmp_path / "c\udcff.npz")
+    assert teach(tmp_path / "c\udcff.npz")[0] == 0
+    assert Model(tmp_path / "taught" / "model.onnx").info.trials[-1] == r"c\udcff"
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
