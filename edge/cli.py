@@ -17,6 +17,7 @@ from importlib import import_module
 
 from edge import __version__
 from edge.errors import EdgeError, InputError
+from edge.interrupt import delayed
 
 COMMANDS = tuple(
     "check scan calibrate record label teach run view replay explain info verify bench fake "
@@ -57,7 +58,8 @@ def add_commands(
     """
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in names:
-        module = import_module(f"{package}.{name}")
+        with delayed():
+            module = import_module(f"{package}.{name}")
         headline, _, description = (module.__doc__ or name).partition("\n\n")
         brief = headline[0].lower() + headline[1:].rstrip(".")
         command = commands.add_parser(name.rstrip("_"), help=brief, description=description)
@@ -73,6 +75,7 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     are printed to stderr, one line each. A shell that asks for
     completions gets them, if argcomplete is installed.
     """
+    _open_missing_streams()
     if "_ARGCOMPLETE" in os.environ:
         with suppress(ImportError):
             import argcomplete
@@ -144,7 +147,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 for success, 1 if a check failed, 2 for bad usage or input, 3 for a device that fails.
     """
-    _open_missing_streams()
     words = list(sys.argv[1:] if argv is None else argv)
     wanted = [word for word in words[:1] if word in COMMANDS]
     top = parser(wanted or COMMANDS)

@@ -13,7 +13,7 @@ from edge import cli
 from edge.i2c import bus
 from edge.recording import Recording, load, save
 from edge.skin import file as skinfile
-from export.__main__ import parser as export_parser
+from export.cli import parser as export_parser
 from train.__main__ import main as train
 from train.importers import sdh2
 

@@ -25,7 +25,10 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
-    return dispatch(parser(), argv)
+    try:
+        return dispatch(parser(), argv)
+    except KeyboardInterrupt:  # while the commands were being loaded
+        return 130
 
 
 if __name__ == "__main__":

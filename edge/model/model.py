@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from edge.errors import EdgeError, InputError
 from edge.files import read_bytes
+from edge.interrupt import delayed
 from edge.model import onnx_file
 from edge.model.agreement import agreed
 from edge.model.info import METADATA_KEY, ModelInfo
@@ -263,7 +264,8 @@ def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
 def _onnxruntime() -> Any:
     """onnxruntime, imported where a model is first needed: it is most of the start-up time."""
     try:
-        import onnxruntime
+        with delayed():
+            import onnxruntime
     except ImportError as error:
         raise EdgeError(f"onnxruntime cannot be imported ({error}); install it with pip") from None
     return onnxruntime

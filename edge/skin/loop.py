@@ -116,14 +116,15 @@ class Schedule:
 def stop_on(*signals: int) -> Iterator[Stop]:
     """Let a signal end the loop after the current frame; a second one terminates at once."""
     stop = Stop()
-    handlers: dict[int, Any] = {}
+    # All of them before any changes: a signal may come in between.
+    handlers: dict[int, Any] = {number: signal.getsignal(number) for number in signals}
 
     def ask(number: int, _: FrameType | None) -> None:
         stop.asked = True
         signal.signal(number, handlers[number])
 
     for number in signals:
-        handlers[number] = signal.signal(number, ask)
+        signal.signal(number, ask)
     try:
         yield stop
     finally:

@@ -15,6 +15,8 @@ from edge.__main__ import main as start
 from edge.errors import InputError
 from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
+from export.__main__ import main as export
+from train.__main__ import main as train
 
 ROOT = Path(__file__).parents[2]
 
@@ -112,6 +114,14 @@ def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(capsys, m
     monkeypatch.setattr(cli, "import_module", raising(KeyboardInterrupt()))
     monkeypatch.setattr("sys.argv", ["edge-classify", "check", "skin.toml"])
     assert start() == 130
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("main", [train, export])
+def test_ctrl_c_while_a_program_of_the_workstation_is_loaded(main, capsys, monkeypatch):
+    for module in ("edge.cli", "edge.__main__"):
+        monkeypatch.setattr(f"{module}.import_module", raising(KeyboardInterrupt()))
+    assert main([]) == 130
     assert capsys.readouterr().err == ""
 
 

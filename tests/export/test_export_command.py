@@ -10,6 +10,12 @@ from export.__main__ import main
 from tests.conftest import PAPER
 
 
+def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert main(["--data", str(tmp_path / "missing"), "--out", str(tmp_path / "file")]) == 2
+    assert capsys.readouterr().err == f"export: {tmp_path}/file: cannot be written: File exists\n"
+
+
 def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     command = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1", "--quick"]
     assert main(command) == 0
@@ -75,7 +81,7 @@ def test_options_that_make_no_sense_are_one_sentence(options, word, recordings, 
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith("export: ")
     assert word in last
-    assert not out.exists()
+    assert not any(out.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ train/importers/__init__.py.
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -49,8 +50,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings."""
     arm = open_arm(arguments)
-    if not arguments.file.exists():
+    if not os.path.exists(arguments.file):  # Path.exists raises for a name that is too long
         raise InputError(f"{arguments.file}: no such file or folder")
+    if arguments.file.name in ("", ".."):  # a bag is a folder, perhaps the current one
+        arguments.file = arguments.file.resolve()
     importer = arguments.importer
     options = (arguments,) if hasattr(importer, "add_options") else ()
     trials = importer.trials(arguments.file, arm, *options)

@@ -9,6 +9,8 @@ import argparse
 import os
 from pathlib import Path
 
+from edge.files import check_writable
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -34,6 +36,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
     from train.study.run import study
+
+    check_writable(arguments.out)  # before the work
 
     given = {name: getattr(arguments, name) for name in ("scene", "jobs", "address", "seeds")}
     print(study(arguments.data, arguments.out, **given))

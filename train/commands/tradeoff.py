@@ -12,6 +12,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from edge.files import check_writable
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -52,6 +54,8 @@ def cost(text: str) -> tuple[float, float]:
 def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
     from train.tradeoff.run import tradeoff
+
+    check_writable(arguments.out)  # before the work
 
     report = tradeoff(
         arguments.data,

@@ -66,7 +66,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class _Table:
-    """Named columns of texts or numbers, (n, columns), and the skin's shape where it is known."""
+    """Named columns of texts or numbers, (n, columns), and the skin's shape where it is known.
+
+    Texts are objects: where numpy converts texts of its own type, it swallows Ctrl-C.
+    """
 
     path: Path
     names: list[str]
@@ -205,10 +208,10 @@ def _table(path: Path) -> _Table:
             return _of_arrays(path, data)
         rows = _rows(path, data)
     if all(map(_is_number, rows[0])):
-        return _Table(path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows))
+        return _Table(path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows, object))
     if len(rows) == 1:
         raise InputError(f"{path}: {EMPTY}")
-    return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:]))
+    return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:], object))
 
 
 def _rows(path: Path, data: bytes) -> list[list[str]]:

@@ -79,6 +79,20 @@ def test_a_signal_asks_once_and_is_itself_again_afterwards(interruptible):
     assert signal.getsignal(signal.SIGINT) is interruptible
 
 
+def test_a_signal_may_come_as_soon_as_it_is_handled(interruptible, monkeypatch):
+    handle = signal.signal
+
+    def interrupted(number, handler):
+        former = handle(number, handler)
+        if handler is not interruptible:
+            signal.raise_signal(number)
+        return former
+
+    monkeypatch.setattr("edge.skin.loop.signal.signal", interrupted)
+    with stop_on(signal.SIGINT) as stop:
+        assert stop.asked
+
+
 def test_joints_are_asked_for_at_the_frames_own_time():
     class Source:
         def at(self, t):

@@ -9,6 +9,7 @@ from scipy.io import savemat
 
 from edge.recording import load
 from train.__main__ import main
+from train.importers.csv import _table
 
 T = np.array([0.0, 0.02, 0.05, 0.06])
 FRAMES = np.arange(24).reshape(4, 2, 3)
@@ -121,6 +122,12 @@ def test_the_first_frame_of_a_folder_is_the_earliest(folder):
     _, recordings = imported(folder, "--frames")
     assert (recordings["cup"].frames == FRAMES[1::-1]).all()
     assert recordings["cup"].t.tolist() == [0.0, 1.0]
+
+
+def test_texts_are_objects_as_numpy_swallows_ctrl_c_in_texts_of_its_own(folder):
+    wide_with_a_header(folder)
+    (file,) = folder.iterdir()
+    assert _table(file).values.dtype == object
 
 
 def test_trials_may_be_numbered_in_an_array(folder):

@@ -186,6 +186,13 @@ def test_a_bag_of_arrays_takes_the_shape_from_the_layout_or_from_beside(tmp_path
     assert differences(imported(tmp_path, "rosbag", path), joints=False) == []
 
 
+def test_a_bag_may_be_the_current_folder(tmp_path, monkeypatch):
+    messages = [array(STORES[2], f) for f in FRAMES]
+    monkeypatch.chdir(write_bag(tmp_path / "grasp", 2, messages, joints=False))
+    imported(tmp_path, "rosbag", ".")
+    assert (tmp_path / "out" / "grasp.npz").exists()
+
+
 def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
     messages = [array(STORES[2], f) for f in FRAMES]
     path = write_bag(tmp_path / "grasp", 2, messages, topics=("/left", "/right"))

@@ -1,0 +1,193 @@
+"""The command line of `python -m export`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from joblib import cpu_count
+
+from edge.cli import dispatch
+from edge.commands.options import add_arm, open_arm, within
+from edge.errors import InputError
+from edge.files import check_writable
+from edge.model.model import Model
+from edge.touch import measures
+from edge.touch.features import SAMPLES, WINDOW_S
+from export.api import measure, save
+from train.choose import LEAVE_OUT, TRIAL
+from train.dataset import read
+from train.feature_sets import SETS
+from train.fitting import MOST_TRIALS, fit
+from train.projection import KINDS
+from train.report.summary import summary
+from train.scaling import SCALINGS
+from train.stopping import FEWEST
+from train.tradeoff import front as fronts
+
+FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
+"""Options that would make another model than the one that a point was measured with."""
+FORWARDED = tuple(
+    "features projection scaling components k samples tasks leave_out threshold onset jobs".split()
+)
+"""Options that `fit` takes as they are."""
+DECISION_POINTS = "0.2:1.2:0.1"
+LONGEST_S = 60.0
+"""Longest window."""
+count = within(int, 1, 1_000_000)
+"""The type of an option that takes a number of things."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    top = argparse.ArgumentParser(
+        prog="export",
+        description="Fits a model for every task that the recordings' labels share, and writes "
+        "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The others are chosen "
+        "for each task: the smallest model within one standard error of the best in "
+        "cross-validation.",
+    )
+    option = top.add_argument
+    option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
+    option("--out", type=Path, default=Path("build"), help="folder (default: %(default)s)")
+    option("--name", help="of the model (default: that of the folder of the recordings)")
+    option("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
+    option(
+        "--features",
+        nargs="+",
+        metavar="NAME",
+        help=f"the features to measure, instead of a choice: sets ({', '.join(SETS)}) and "
+        f"single features, ZONE_QUANTITY of {', '.join(measures.ZONES)} and "
+        f"{', '.join(measures.QUANTITIES)}, or {', '.join(measures.ALONE)}",
+    )
+    text = "fix the projection: principal components or discriminants"
+    option("--projection", choices=KINDS, help=text)
+    text = "values of each feature (default: %(default)s)"
+    option("--samples", type=within(int, 2, 1000), default=SAMPLES, help=text)
+    option("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
+    option("--components", type=count, help="fix the number of principal components")
+    option("-k", "--k", type=count, help="fix the number of neighbours")
+    option(
+        "--leave-out",
+        default=LEAVE_OUT,
+        metavar="KEY",
+        help="choose and score a task with entire groups of this label left out, if each of its "
+        f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out single trials",
+    )
+    option("--quick", action="store_true", help="for a first look: few candidates, five folds")
+    option(
+        "--window",
+        type=within(float, 0.01, LONGEST_S),
+        help=f"seconds from onset that a decision is based on (default: {WINDOW_S:g}, or more if "
+        "touches last longer and a longer window is much more accurate)",
+    )
+    option(
+        "--decision-points",
+        metavar="A:B:STEP",
+        help="calibrate decisions before the full window (edge-classify run --error), at these "
+        f"seconds from onset, or at a list a,b,c, or `none` (default: {DECISION_POINTS} with "
+        f"{FEWEST} to {MOST_TRIALS} trials, and fewer points if the model would exceed 1 MB)",
+    )
+    counts = within(int, 0, 65534)
+    option("--threshold", type=counts, help="counts above which a taxel is in contact")
+    option("--onset", type=counts, help="counts above which a contact begins")
+    option(
+        "--front",
+        metavar="WHAT",
+        help="the quick choice at the window of a point of `make tradeoff`: fast, balanced, "
+        "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
+    )
+    option(
+        "--fronts",
+        type=Path,
+        metavar="front.json",
+        default=Path("build/tradeoff/front.json"),
+        help="the file with the points (default: %(default)s)",
+    )
+    add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
+    text = "also write OUT/report.html, as `make export` does"
+    option("--report", action="store_true", help=text)
+    option("--jobs", type=count, default=cpu_count(), help="processes (default: all cores)")
+    top.set_defaults(run=run)
+    return top
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fit, write and report."""
+    check_writable(arguments.out)  # before the work, which may take an hour
+    window_s, quick = arguments.window, arguments.quick
+    if arguments.front is not None:
+        window_s, quick = _of_front(arguments).window_s, True
+    points = arguments.decision_points
+    if window_s is None and points not in (None, "none"):
+        window_s = WINDOW_S
+    early = None if points is None else parse_decision_points(points, window_s or WINDOW_S)
+    fitted = fit(
+        arguments.data,
+        **{name: getattr(arguments, name) for name in FORWARDED},
+        window_s=window_s,
+        decision_points_s=early,
+        arm=open_arm(arguments),
+        quick=quick,
+        progress=True,
+    )
+    path = arguments.out / "model.onnx"
+    size = save(path, fitted, arguments.name)
+    prices = measure(fitted)
+    print(summary(fitted, prices), file=sys.stderr)
+    print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+    if arguments.report:
+        from train.report.model import write  # loads matplotlib
+
+        print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
+    return 0
+
+
+def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
+    """The operating point that was asked for."""
+    given = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
+    if given:
+        raise InputError(f"--front makes the model that was measured; leave out {', '.join(given)}")
+    front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
+    point = front.pick(arguments.front)
+    print(
+        f"{arguments.front}: a window of {point.window_s:g} s, {front.task} {point.accuracy:.1%} "
+        f"({100 * point.low:.0f} to {100 * point.high:.0f}) in {point.milliseconds:.0f} ms",
+        file=sys.stderr,
+    )
+    return point
+
+
+def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:
+    """Decision points in seconds, from `a:b:step`, `a,b,c` or `none`; the full window comes last.
+
+    Raises:
+        InputError: the text has another form, or a decision point is not above 0.
+    """
+    if text == "none":
+        return ()
+    wrong = InputError(
+        f"--decision-points must be like {DECISION_POINTS} or 0.3,0.6,1.2 (seconds above 0) "
+        f"or none, not {text!r}"
+    )
+    try:
+        if ":" in text:
+            first, last, step = map(float, text.split(":"))
+            if not (0.0 < first <= last <= LONGEST_S and step >= 0.01):
+                raise wrong
+            count = int((last - first) / step + 1e-9) + 1
+            decision_points = {round(first + i * step, 9) for i in range(count)}
+        else:
+            decision_points = {float(part) for part in text.split(",")}
+    except ValueError:
+        raise wrong from None
+    if not all(0.0 < point <= LONGEST_S for point in decision_points):
+        raise wrong
+    return (*sorted(point for point in decision_points if point < window_s), window_s)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns 0 for success, 2 for bad usage or input."""
+    return dispatch(parser(), argv)

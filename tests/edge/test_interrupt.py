@@ -1,0 +1,60 @@
+"""Ctrl-C during an import waits for its end."""
+
+import signal
+import threading
+
+import pytest
+
+from edge.interrupt import delayed
+
+
+@pytest.fixture
+def interruptible():
+    """A shell that runs the tests in the background lets them ignore SIGINT."""
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield signal.default_int_handler
+    signal.signal(signal.SIGINT, inherited)
+
+
+def test_ctrl_c_comes_at_the_end_of_the_block(interruptible):
+    done = []
+
+    @delayed()
+    def load():
+        signal.raise_signal(signal.SIGINT)
+        done.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        load()
+    assert done == ["all of it"]
+    assert signal.getsignal(signal.SIGINT) is interruptible
+
+
+def test_ctrl_c_comes_instead_of_an_error_that_it_may_have_caused(interruptible):
+    @delayed()
+    def load():
+        signal.raise_signal(signal.SIGINT)
+        raise ImportError
+
+    with pytest.raises(KeyboardInterrupt):
+        load()
+
+
+def test_a_program_that_ignores_ctrl_c_still_does(interruptible):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with delayed():
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_a_thread_imports_without_it(interruptible):
+    entered = []
+
+    def enter():
+        with delayed():
+            entered.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=enter)
+    thread.start()
+    thread.join()
+    assert entered == [interruptible]
