@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
-from train.dataset import DataSet
+from train.dataset import DataSet, Trial
 from train.report import figures
 from train.report.score import grid_search, score, transfer
 from train.report.section import Section, Table
@@ -17,12 +18,13 @@ from train.simulate.engine import run_physics
 from train.simulate.run import batches_of, file_name, recordings
 from train.simulate.scene_model import Scene
 from train.simulate.schema import EFFECTS
+from train.simulate.truth import REDRAWS
 from train.study.context import Context
 
 FACTORS = (0.5, 2.0)
-SENSOR = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
-"""Effects that change what is read, never what happens."""
-HOW = "trained and tested with it", "trained without it, tested with it"
+SENSOR_EFFECTS = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
+"""Effects that change the readings and leave the contact as it is."""
+TRAINING = "trained with the change", "trained without it"
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -34,7 +36,7 @@ def variants(scene: Scene) -> dict[str, Scene]:
         faster = replace(scene, rate=rate, travel_s=scene.travel_s / factor)
         changed[f"speed x {factor:g}"] = faster
         changed[f"arm stiffness x {factor:g}"] = replace(scene, stiffness=stiffness)
-    for name in SENSOR:
+    for name in SENSOR_EFFECTS:
         others = tuple(effect for effect in scene.add if effect != name)
         if name in scene.add:
             changed[f"without {name}"] = replace(scene, add=others)
@@ -43,19 +45,30 @@ def variants(scene: Scene) -> dict[str, Scene]:
     return changed
 
 
-def anew(scene: Scene, data: DataSet) -> list[FeatureSeries | None]:
+def attempt_of(trial: Trial) -> int:
+    """How often a trial was drawn again until it fitted its label; 0 where the file has no count.
+
+    Raises:
+        InputError: `meta.simulation` is damaged; the sentence names the file.
+    """
+    given = trial.recording.meta.get("simulation", {})
+    table = ConfigTable(given, str(trial.path), "meta.simulation.")
+    return table.whole("redrawn", 0, range(REDRAWS))
+
+
+def simulated_again(scene: Scene, data: DataSet) -> list[FeatureSeries | None]:
     """The contacts of a data set's trials, in its order, simulated again from a scene.
 
-    A trial has the same random draws in every scene, those with which it met its label when it was
-    recorded. A weaker arm that no longer moves an object does not change its label. A trial that
-    the scene does not have counts as one without contact.
+    A trial has the same random draws in every scene: those with which it fitted its label when it
+    was recorded. A weaker arm that no longer moves an object does not change its label. A trial
+    that the scene does not have counts as one without contact.
+
+    Raises:
+        InputError: `meta.simulation` of a trial is damaged.
     """
-    attempts = {
-        trial.path.name: trial.recording.meta.get("simulation", {}).get("redrawn", 0)
-        for trial in data.trials
-    }
+    attempts = {trial.path.name: attempt_of(trial) for trial in data.trials}
     specs = tuple(
-        replace(spec, attempt=int(attempts.get(file_name(scene, spec), 0)))
+        replace(spec, attempt=attempts.get(file_name(scene, spec), 0))
         for batch in batches_of(scene)
         for spec in batch
     )
@@ -70,8 +83,8 @@ def section(context: Context) -> Section | None:
     if scene is None:
         return None
     changes, X, y = variants(scene), context.vectors(), context.labels
-    again = [(changed, context.dataset) for changed in (scene, *changes.values())]
-    unchanged, *series = context.workers.map("simulated again", anew, again)
+    cases = [(changed, context.dataset) for changed in (scene, *changes.values())]
+    unchanged, *series = context.workers.map("simulated again", simulated_again, cases)
     if not np.array_equal(vectors(unchanged), X):
         raise InputError(
             f"the scene {scene.name} gives other trials than these recordings; give the scene that "
@@ -79,14 +92,16 @@ def section(context: Context) -> Section | None:
         )
     changed = [vectors(contacts) for contacts in series]
     plain = grid_search(X, y)
-    retrained = context.workers.map("their accuracy", grid_search, [(x, y) for x in changed])
-    transferred = context.workers.map("trained here", transfer, [(X, y, plain, x) for x in changed])
-    results = dict(zip(HOW, (retrained, transferred), strict=True))
+    retrained = context.workers.map("trained with", grid_search, [(x, y) for x in changed])
+    transferred = context.workers.map(
+        "trained without", transfer, [(X, y, plain, x) for x in changed]
+    )
+    results = dict(zip(TRAINING, (retrained, transferred), strict=True))
     rows = [
-        {"change": name, "task": task, "trained and tested": how, **score(result)}
+        {"change": name, "task": task, "training": training, **score(result)}
         | {"without contact": series[i].count(None)}
         for i, name in enumerate(changes)
-        for how, answers in results.items()
+        for training, answers in results.items()
         for task, result in answers[i].items()
     ]
     pictures = [
@@ -94,23 +109,23 @@ def section(context: Context) -> Section | None:
             f"robustness_{task}",
             f"{task}: accuracy after a change",
             list(changes),
-            {how: [answer[task] for answer in answers] for how, answers in results.items()},
+            {name: [answer[task] for answer in answers] for name, answers in results.items()},
             reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
         )
         for task in y
     ]
-    title = "Another speed, arm or sensor; trained with it or without it"
     return Section(
-        "Another speed, another arm, each effect of the sensor",
+        "Another speed, arm or sensor",
         [
-            "Each row simulates the scene again with one thing changed and the same random draws: "
-            "the equilibrium point's speed (over the same distance), all joint stiffnesses, and "
-            "each effect of the sensor at its default size, added or, where the scene has it, left "
-            "out.",
-            "The first bar is trained with the change, the second meets it for the first time. The "
+            "Each row simulates the scene again with one change and the same random draws. The "
+            "changes are half and twice the speed of the equilibrium point over the same distance, "
+            "half and twice the stiffness of all joints, and each effect of the sensor at its "
+            "default size. An effect that the scene has is left out instead.",
+            "All tests are on changed trials. The first bar is a classifier that was trained on "
+            "changed trials too; the second was trained on the trials as they were recorded. The "
             "gap between them is the cost for a robot that was not trained for the change. The "
             "unchanged version of a test trial is never in the training set.",
         ],
-        [Table("robustness", title, rows)],
+        [Table("robustness", "Accuracy after each change", rows)],
         pictures,
     )

@@ -13,7 +13,7 @@ from train.simulate import scene as scenes
 from train.simulate.run import simulate, write
 from train.study import robust
 from train.study.context import Context
-from train.study.robust import anew, variants
+from train.study.robust import simulated_again, variants
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 THINGS = ("plastic bin", "bed pillow")
@@ -21,11 +21,11 @@ THINGS = ("plastic bin", "bed pillow")
 
 @pytest.fixture(scope="module")
 def scene():
-    whole = scenes.load(SCENE, count=2)
+    cody = scenes.load(SCENE, count=2)
     return replace(
-        whole,
-        objects=tuple(o for o in whole.objects if o.name in THINGS),
-        trials={**whole.trials, "after_s": 1.7},
+        cody,
+        objects=tuple(o for o in cody.objects if o.name in THINGS),
+        trials={**cody.trials, "after_s": 1.7},
     )
 
 
@@ -55,7 +55,7 @@ def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
 
 def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene):
     """A light pillow gives way: it is felt a fifth of a second after a bin is."""
-    assert (vectors(anew(scene, context.dataset)) == context.vectors()).all()
+    assert (vectors(simulated_again(scene, context.dataset)) == context.vectors()).all()
     onsets = [trial.onset_s for trial in context.dataset.trials]
     assert max(onsets) - min(onsets) > 0.15
 
@@ -66,7 +66,7 @@ def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(context
     trials = dict(simulate(changed))
     asked = [trials[trial.path.name] for trial in data.trials]
     expected = vectors(follow(asked, data.layout, data.tracking, data.chain))
-    assert (vectors(anew(changed, data)) == expected).all()
+    assert (vectors(simulated_again(changed, data)) == expected).all()
     assert (expected != context.vectors()).any()
 
 
@@ -87,4 +87,21 @@ def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_
         list(simulate(weak))
     folder = tmp_path / "crates"
     write(alone, folder)
-    assert None not in anew(weak, load_trials([folder]))
+    assert None not in simulated_again(weak, load_trials([folder]))
+
+
+@pytest.mark.parametrize(
+    ("simulation", "sentence"),
+    [
+        ({"redrawn": "often"}, "redrawn must be a whole number from 0 to 39, not 'often'"),
+        ({"redrawn": -1}, "redrawn must be a whole number from 0 to 39, not -1"),
+        ([], r"must be a table, not \[\]"),
+    ],
+)
+def test_a_damaged_count_of_draws_is_one_sentence(context, scene, simulation, sentence):
+    first, *others = context.dataset.trials
+    meta = {**first.recording.meta, "simulation": simulation}
+    damaged = replace(first, recording=replace(first.recording, meta=meta))
+    data = replace(context.dataset, trials=(damaged, *others))
+    with pytest.raises(InputError, match=rf"{first.path.name}: meta\.simulation.*{sentence}"):
+        simulated_again(scene, data)
