@@ -29,7 +29,7 @@ def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     ]
     assert sum(row.count("*") for row in rows) == 2  # one a task
     answers = [line for line in lines if line.startswith(("category:", "object:"))]
-    assert all("% (" in line and "of 16 trials, nested" in line for line in answers)
+    assert all("of 16 trials are classified correctly (95 % interval " in line for line in answers)
     info = Model(tmp_path / "model.onnx").info
     assert f"{info.tasks['category'].accuracy:.1%}" in answers[0]
     assert set(info.features) == {f for task in info.tasks.values() for f in task.features}

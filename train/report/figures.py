@@ -1,4 +1,4 @@
-"""The reports' pictures, as PNG: each is drawn for a page, and again for a phone."""
+"""The reports' pictures as PNG, each drawn once for a page and once for a phone."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
+from sklearn.metrics import confusion_matrix
 
 from train.evaluate import Result
 from train.report.section import Figure
@@ -23,9 +24,9 @@ STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#8a6d1d", "v", (0, (6, 1, 1, 1, 1, 1))),
     ("#444444", "P", (0, (3, 1, 1, 3))),
 )
-"""Colour, marker and dashes of each series, so that none differs by hue alone."""
+"""Colour, marker and dashes of each series, so that no two differ by hue alone."""
 HATCHES = ("", "///", "...", "xxx", "|||", "---")
-"""Likewise, of bars."""
+"""The hatch of each series of bars."""
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -36,9 +37,9 @@ STYLE: dict[Any, Any] = {
     "hatch.linewidth": 0.6,
 }
 WIDE, PHONE = 7.6, 3.6
-"""Inches across."""
+"""Inches."""
 MATRIX_TEXT = 20
-"""Classes up to which a confusion matrix shows its numbers."""
+"""A confusion matrix of more classes does not show its numbers."""
 
 
 def picture(
@@ -49,19 +50,19 @@ def picture(
     width: float = WIDE,
     style: Mapping[Any, Any] | None = None,
 ) -> Figure:
-    """A picture by `draw(canvas, phone)`; the same numbers give the same bytes.
+    """The picture that a function draws; the same numbers give the same bytes.
 
     Args:
         name: of its file.
         title: its caption.
-        draw: draws on an empty canvas, which is a phone's where `phone` is true.
+        draw: function of an empty canvas, and of whether that is for a phone.
         heights: inches on a page and on a phone.
         width: inches on a page.
-        style: of matplotlib.
+        style: further settings of matplotlib.
     """
     pngs = []
     for phone in (False, True):
-        # A phone's pixels are finer.
+        # A phone shows the picture smaller, on a finer screen.
         size, text, dpi = (PHONE, 8.0, 200) if phone else (width, 9.0, 110)
         with mpl.rc_context({**STYLE, "font.size": text, **(style or {})}):
             canvas = Canvas(figsize=(size, heights[phone]), layout="constrained")
@@ -73,14 +74,14 @@ def picture(
 
 
 def legend(canvas: Any, axes: Any, columns: int) -> None:
-    """A legend above the axes, where it hides nothing."""
+    """Add a legend above the axes, where it hides nothing; none for a single series."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) > 1:
         canvas.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
 
 
 def spread(results: Sequence[Result]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n,) accuracies in percent, and (2, n) the lengths of their intervals' arms."""
+    """(n,) accuracies in percent, and (2, n) their distances to the ends of the intervals."""
     values = np.array([100 * result.accuracy for result in results])
     low, high = 100 * np.array([result.interval for result in results]).T
     return values, np.maximum([values - low, high - values], 0.0)
@@ -94,31 +95,36 @@ def curve(axes: Any, order: int, label: str, x: Sequence[float], results: Sequen
     axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
 
 
-def confusion(name: str, title: str, truth: NDArray[np.str_], said: NDArray[np.str_]) -> Figure:
-    """A row for each thing touched, a column for each answer; shares of the row's trials."""
-    classes = sorted(set(truth) | set(said))
+def confusion(name: str, title: str, truth: NDArray[np.str_], answers: NDArray[np.str_]) -> Figure:
+    """A confusion matrix, with a row for each label and a column for each answer.
+
+    Args:
+        name: of the picture's file.
+        title: its caption.
+        truth: (n,) labels.
+        answers: (n,) the model's.
+    """
+    classes = sorted(set(truth) | set(answers))
     n = len(classes)
-    counts = np.zeros((n, n))
-    for touched, answer in zip(truth, said, strict=True):
-        counts[classes.index(touched), classes.index(answer)] += 1
+    counts = confusion_matrix(truth, answers, labels=classes)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     numbered = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
         axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
-        small = {"fontsize": 6} if phone and n > 6 else {}
+        small = {"fontsize": 7} if phone and n > 6 else {}
         shown = range(0, n, -(-n // MATRIX_TEXT))
         axes.set_xticks(shown, [i + 1 for i in shown], **small)
         axes.set_yticks(range(n), numbered, **small)
-        axes.set(xlabel="answer, by number", ylabel="touched")
+        axes.set(xlabel="answer, as a row's number", ylabel="label")
         for i, j in zip(*np.nonzero(counts), strict=True) if n <= MATRIX_TEXT else ():
             text = f"{counts[i, j]:.0f}" + (f"\n{shares[i, j]:.0%}" if n <= 4 else "")
             colour = "white" if shares[i, j] > 0.55 else "black"
             axes.text(j, i, text, ha="center", va="center", color=colour, **small)
 
     height = 1.2 + 0.3 * n if n > 6 else 2.0 + 0.45 * n
-    heights = height, 0.9 + 0.13 * n if n > 6 else 2.8
+    heights = height, 0.9 + 0.16 * n if n > 6 else 2.8
     return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
 
 
@@ -132,7 +138,7 @@ def lines(
     paper: Mapping[str, Mapping[float, float]] | None = None,
     ticks: Sequence[str] = (),
 ) -> Figure:
-    """Accuracy against x, a line a task, with binomial intervals; the paper's points hollow.
+    """Accuracy against x, with a line and binomial intervals for each task.
 
     Args:
         name: of the picture's file.
@@ -140,8 +146,8 @@ def lines(
         x: (m,).
         results: {task: m results}.
         label: label of the x axis.
-        paper: {task: {x: percent}}.
-        ticks: texts at x, which then lie on a logarithmic axis.
+        paper: {task: {x: percent}} of hollow points.
+        ticks: labels of x, which then lie on a logarithmic axis.
     """
 
     def draw(canvas: Any, phone: bool) -> None:
@@ -173,34 +179,32 @@ def bars(
     mark: str = "paper",
     reference: Mapping[str, float] | None = None,
 ) -> Figure:
-    """Accuracy of each name, the bars of its groups side by side, with intervals.
+    """Bars of accuracy with intervals; those of a name's groups lie side by side.
 
     Args:
         name: of the picture's file.
         title: its caption.
-        names: along the axis.
-        groups: {group: results of the names}.
-        marks: {group: {name: percent}}, drawn as diamonds.
-        mark: the diamonds' name.
+        names: labels along the axis.
+        groups: {group: result for each name}.
+        marks: {group: {name: percent}} of diamonds.
+        mark: the diamonds' name in the legend.
         reference: {text: percent} of vertical lines.
     """
     m, g = len(names), len(groups)
     height = 0.8 / g
 
     def draw(canvas: Any, phone: bool) -> None:
-        axes = canvas.subplots()
-        diamonds = mark
+        axes, diamonds = canvas.subplots(), []
         for i, (stroke, (group, row)) in enumerate(zip(STROKES, groups.items(), strict=False)):
             y = np.arange(m) + (i - (g - 1) / 2) * height
             values, arms = spread(row)
             style = {"color": stroke[0], "alpha": 0.85, "hatch": HATCHES[i], "ec": "white", "lw": 0}
             error = {"xerr": arms, "error_kw": {"ecolor": "0.25", "elinewidth": 0.8}}
             axes.barh(y, values, height * 0.92, **style, **error, label=group)
-            beside = [(p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()]
-            if beside:
-                style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": diamonds}
-                axes.plot(*zip(*beside, strict=True), marker="D", **style)
-                diamonds = "_nolegend_"
+            diamonds += [(p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()]
+        if diamonds:
+            style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": mark}
+            axes.plot(*zip(*diamonds, strict=True), marker="D", **style)
         for text, at in (reference or {}).items():
             axes.axvline(at, color="0.35", lw=1, ls=":", label=text)
         axes.set_yticks(range(m), [textwrap.fill(n, 18 if phone else 40) for n in names])

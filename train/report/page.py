@@ -1,4 +1,4 @@
-"""The report as one HTML file, with every table as CSV and every plot as PNG beside it."""
+"""The report as one HTML file, with each table as CSV and each plot as PNG beside it."""
 
 from __future__ import annotations
 
@@ -16,31 +16,27 @@ from train.report.section import Figure, Section, Table
 
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 LONGEST = 20
-"""Rows that a table may have before it is folded."""
+"""A table with more rows is folded."""
 CODE = re.compile(r"`([^`]+)`")
-KEYS = 1
-"""First columns that are repeated beside timings, to tell the rows apart."""
 
 
 def table_csv(table: Table) -> dict[str, str]:
-    """{file name: CSV text} of the table; columns that a clock measured have their own file."""
+    """{file name: CSV text} of the table; columns measured by a clock have a file of their own."""
     columns = table.columns
     files = {table.name: [c for c in columns if c not in table.timed]}
     if table.timed:
-        files[f"{table.name}_timings"] = [
-            c for i, c in enumerate(columns) if i < KEYS or c in table.timed
-        ]
+        files[f"{table.name}_timings"] = [columns[0], *table.timed]
     texts = {}
     for name, shown in files.items():
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerows([shown, *([row[c] for c in shown] for row in table.rows)])
+        writer.writerows([shown, *([row.get(c, "") for c in shown] for row in table.rows)])
         texts[f"{name}.csv"] = text.getvalue()
     return texts
 
 
 def _text(text: str) -> str:
-    """The text escaped; words between backquotes become code."""
+    """The text as HTML; words between backquotes become code."""
     return CODE.sub(r"<code>\1</code>", html.escape(text, quote=False))
 
 
@@ -49,7 +45,7 @@ def _paragraphs(texts: Iterable[str]) -> list[str]:
 
 
 def _decimals(values: Sequence[Any]) -> int:
-    """The decimals, at most two, that a column of numbers needs."""
+    """The number of decimals that a column needs, at most two."""
     shown = (f"{value:.2f}".rstrip("0") for value in values if isinstance(value, float))
     return max((len(text) - text.index(".") - 1 for text in shown), default=0)
 
@@ -85,11 +81,10 @@ def _figure(figure: Figure) -> str:
     def source(png: bytes) -> str:
         return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
+    narrow = f'<source media="(max-width: 700px)" srcset="{source(figure.narrow)}">'
     image = f'<img alt="{html.escape(figure.title)}" src="{source(figure.png)}">'
-    if figure.narrow is not None:
-        media = f'<source media="(max-width: 700px)" srcset="{source(figure.narrow)}">'
-        image = f"<picture>{media}{image}</picture>"
-    return f"<figure><figcaption>{_text(figure.title)}</figcaption>{image}</figure>"
+    caption = f"<figcaption>{_text(figure.title)}</figcaption>"
+    return f"<figure>{caption}<picture>{narrow}{image}</picture></figure>"
 
 
 def _section(section: Section, folded: bool) -> str:
@@ -109,7 +104,7 @@ def _section(section: Section, folded: bool) -> str:
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
-    """The report as HTML: the first section open, the others folded, the images in the page."""
+    """The report as HTML; the first section is open, the others are folded."""
     return "\n".join(
         [
             "<!doctype html>",
@@ -125,7 +120,17 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
 
 
 def write(out: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> Path:
-    """Write report.html, PNGs and CSVs into a folder, each whole or not at all; the page's path."""
+    """Write report.html, PNGs and CSVs into a folder, each whole or not at all.
+
+    Args:
+        out: the folder.
+        title: of the page.
+        lead: paragraphs below the title.
+        sections: in their order.
+
+    Returns:
+        The path of report.html.
+    """
     files: dict[str, bytes] = {}
     for section in sections:
         files |= {f"{figure.name}.png": figure.png for figure in section.figures}

@@ -1,4 +1,4 @@
-"""Accuracies of the reports: nested, leave-one-out, transferred, and their columns."""
+"""The accuracies of the reports (nested, leave-one-out, transferred) and their columns."""
 
 from __future__ import annotations
 
@@ -26,25 +26,28 @@ def interval(result: Result) -> str:
     return f"{100 * low:.0f} to {100 * high:.0f}"
 
 
-def score(result: Result) -> dict[str, Any]:
-    """The columns of an accuracy: its 95 % interval, and the numbers that were searched."""
+def shares(result: Result) -> dict[str, Any]:
+    """The columns of an accuracy in percent and its 95 % interval."""
     low, high = result.interval
     return {
         "accuracy %": percent(result.accuracy),
         "from %": percent(low),
         "to %": percent(high),
-        "k": result.k or "",
-        "components": result.components or "",
     }
+
+
+def score(result: Result) -> dict[str, Any]:
+    """The columns of an accuracy, its 95 % interval, and the k and components that gave it."""
+    return {**shares(result), "k": result.k or "", "components": result.components or ""}
 
 
 def nested(
     X: NDArray[np.float64],
     y: Labels,
+    folds: NDArray[np.int64],
+    *,
     grid: SearchGrid,
     features: Sequence[str],
-    *,
-    folds: NDArray[np.int64],
     widths: Sequence[int] | None = None,
 ) -> dict[str, Result]:
     """Each task's nested accuracy over a grid; see `train.evaluate`.
@@ -52,9 +55,9 @@ def nested(
     Args:
         X: (n, p) feature vectors.
         y: {task: (n,) labels}.
+        folds: (n,) from 0.
         grid: the settings to choose from.
         features: names of the feature types in X.
-        folds: (n,) from 0.
         widths: columns of each; equal where None.
     """
     table = evaluate(X, y, folds, [grid], features=features, widths=widths)
@@ -62,7 +65,14 @@ def nested(
 
 
 def voted(rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int) -> Result:
-    """Votes of the neighbours (n, components, k) of trials with labels y (n,), among those."""
+    """The accuracy of a vote among each trial's nearest neighbours.
+
+    Args:
+        rows: (n, components, k) each trial's neighbours, for each number of components.
+        y: (n,) labels.
+        components: number of components.
+        k: number of neighbours that vote.
+    """
     classes, labels = np.unique(y, return_inverse=True)
     said = np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
     return Result(int((said == y).sum()), len(y), components, k, said)
@@ -93,10 +103,10 @@ def transfer(
     chosen: Mapping[str, Result],
     changed: NDArray[np.float64],
 ) -> dict[str, Result]:
-    """Each task's accuracy when trained on trials as they are and tested on changed ones.
+    """Each task's accuracy when a classifier is trained on trials and tested on changed ones.
 
-    The changed version of a trial shares its random draws, so it would be recognised by itself:
-    as in leave-one-out, the training set is always without it.
+    A trial and its changed version have the same random draws, so one would recognise the other.
+    As in leave-one-out, the training set never has the test trial's own version.
 
     Args:
         X: (n, p) training trials.
@@ -115,18 +125,18 @@ def majority(y: NDArray[np.str_]) -> Result:
 
 
 def paired(before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """The change of accuracy on the same trials in points, and its 95 % interval.
+    """The change of accuracy on the same trials in percentage points, and its 95 % interval.
 
-    Agresti and Min's: Wald's, after half a trial is added to each cell of the two by two table
-    (Simple improved confidence intervals for comparing matched proportions, 2005).
+    The interval is Wald's after half a trial is added to each cell of the two-by-two table (Agresti
+    and Min, Simple improved confidence intervals for comparing matched proportions, 2005).
     """
     gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
     total = len(before) + 2.0
     gap = (gained - lost) / total
-    reach = 1.96 * np.sqrt(((gained + lost + 1.0) / total - gap**2) / total)
-    return tuple(100.0 * x for x in ((gained - lost) / len(before), gap - reach, gap + reach))  # type: ignore[return-value]
+    reach = 1.96 * float(np.sqrt(((gained + lost + 1.0) / total - gap**2) / total))
+    return 100.0 * (gained - lost) / len(before), 100.0 * (gap - reach), 100.0 * (gap + reach)
 
 
 def points(gain: tuple[float, float, float]) -> str:
-    """A paired difference in words, as in `+3 (-1 to +7)`."""
+    """A paired difference as text, as in `+3 (-1 to +7)`."""
     return "{:+d} ({:+d} to {:+d})".format(*map(round, gain))

@@ -1,4 +1,4 @@
-"""The elements of a report: sections of text, tables and figures, with their numbers."""
+"""The elements of a report: sections with text, tables and figures."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import Any
 
 Row = dict[str, Any]
 """{column: cell} of a table."""
-Numbers = dict[tuple[str, str, str], float]
-"""{(table, setting, task): accuracy in percent}."""
 
 
 @dataclass
@@ -19,10 +17,10 @@ class Table:
     Attributes:
         name: name of its file.
         title: heading above it.
-        rows: its rows, all with the columns of the first, the most telling column first. A
+        rows: its rows, with the most important columns first. A cell that a row lacks is empty. A
             table without rows is left out of the report.
-        timed: columns that a clock measured, so that they differ from run to run; they go to a
-            CSV file of their own.
+        timed: columns measured by a clock, which differ from run to run; they go to a CSV file of
+            their own, beside the first column.
         narrow: number of columns, from the first, that a phone shows; the CSV has them all.
     """
 
@@ -34,13 +32,13 @@ class Table:
 
     @property
     def columns(self) -> list[str]:
-        """The headings."""
-        return list(self.rows[0]) if self.rows else []
+        """The headings, in the order in which the rows first have them."""
+        return list(dict.fromkeys(column for row in self.rows for column in row))
 
     @property
     def cells(self) -> list[list[Any]]:
         """The cells of each row, in the order of `columns`."""
-        return [[row[column] for column in self.columns] for row in self.rows]
+        return [[row.get(column, "") for column in self.columns] for row in self.rows]
 
 
 @dataclass
@@ -49,20 +47,20 @@ class Figure:
 
     Attributes:
         name: name of its file.
-        title: caption, and description for readers who cannot see it.
+        title: its caption, which also describes it to readers who cannot see it.
         png: its bytes.
-        narrow: the bytes of a version drawn for a phone, if there is one.
+        narrow: the bytes of a version drawn for a phone.
     """
 
     name: str
     title: str
     png: bytes
-    narrow: bytes | None = None
+    narrow: bytes
 
 
 @dataclass
 class Section:
-    """A heading with paragraphs, plots and tables, and the numbers behind them.
+    """A heading with paragraphs, plots and tables.
 
     Attributes:
         title: the heading.
@@ -70,7 +68,6 @@ class Section:
         tables: shown below the plots.
         figures: shown below the text.
         terms: {word: explanation} of a glossary.
-        numbers: accuracies that other sections draw conclusions from.
         widget: HTML with its own script, shown above the text.
     """
 
@@ -79,7 +76,6 @@ class Section:
     tables: Sequence[Table] = ()
     figures: Sequence[Figure] = ()
     terms: Mapping[str, str] = field(default_factory=dict)
-    numbers: Numbers = field(default_factory=dict)
     widget: str = ""
 
 

@@ -1,7 +1,8 @@
-"""The same recordings through skins of larger taxels."""
+"""The same recordings as skins with larger taxels would have made them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -23,7 +24,7 @@ def follow(
     tracking: TrackSettings,
     chain: Chain | None,
 ) -> list[FeatureSeries | None]:
-    """The first contact of each recording, or None."""
+    """The first contact of each recording, or None where there is none."""
     contacts: list[FeatureSeries | None] = []
     for recording in recordings:
         device = for_device(layout, recording.layout)
@@ -33,78 +34,61 @@ def follow(
     return contacts
 
 
-def vectors(
-    series: Sequence[FeatureSeries | None],
-) -> NDArray[np.float64]:
+def vectors(series: Sequence[FeatureSeries | None]) -> NDArray[np.float64]:
     """(n, width) vectors of the paper's features; zeros for trials without contact."""
     nothing = np.zeros(len(FEATURES) * SAMPLES)
     return np.stack([nothing if c is None else feature_vector(c, WINDOW_S) for c in series])
 
 
 def pooled_layout(layout: SkinLayout) -> SkinLayout:
-    """The skin whose taxels each cover 2 x 2 of this one's; an odd last row or column stays single.
+    """The skin with taxels that each cover 2 x 2 of this one's.
 
-    A larger taxel's centre lies midway between the taxels that it covers. The threshold stays the
-    same, as it is a force.
+    The centre of a larger taxel lies midway between the taxels that it covers. An odd last row or
+    column stays as it is. The threshold stays the same, because it is a force.
     """
-    rows, cols = (layout.rows + 1) // 2, (layout.cols + 1) // 2
-    pitch = layout.pitch_m
-    angles = layout.column_angles_deg
-    if layout.radius_m is not None and angles is None:
-        angles = tuple(360.0 * col / layout.cols for col in range(layout.cols))
-    if angles is not None:
-        others = [angles[min(2 * col + 1, layout.cols - 1)] for col in range(cols)]
-        angles = tuple(
-            a + ((b - a + 180.0) % 360.0 - 180.0) / 2.0
-            for a, b in zip(angles[::2], others, strict=True)
-        )
-    along, around = pitch if isinstance(pitch, tuple) else (pitch, pitch)
-    wider, z = None, layout.row0_z_m
-    if along is not None and around is not None:
-        wider = (2.0 * along, 2.0 * around)
-        z -= 0.5 * along
-    alive = layout.alive.astype(np.uint8)
-    dead = np.flatnonzero(pool(alive[None], np.maximum)[0] == 0)
+    (rows, cols), (along, around), angles = pool(layout.alive).shape, layout.pitch, None
+    if layout.radius_m is not None:
+        middles = (min(2 * col + 0.5, layout.cols - 1.0) for col in range(cols))
+        places = (layout.position(0, middle) for middle in middles)
+        angles = tuple(math.degrees(math.atan2(y, x)) for x, y, _ in places)
     return replace(
         layout,
         rows=rows,
         cols=cols,
-        pitch_m=wider,
-        row0_z_m=z,
+        pitch_m=None if layout.pitch_m is None else (2.0 * along, 2.0 * around),
+        row0_z_m=layout.row0_z_m - 0.5 * along,
         column_angles_deg=angles,
-        dead=tuple(dead.tolist()),
+        dead=tuple(np.flatnonzero(~pool(layout.alive, np.logical_or)).tolist()),
     )
 
 
 def pool(frames: NDArray[Any], by: np.ufunc = np.add) -> NDArray[Any]:
-    """(n, rows, cols) to (n, rows / 2, cols / 2), sums or maxima of 2 x 2."""
-    rows = by.reduceat(frames, np.arange(0, frames.shape[1], 2), axis=1)
-    return np.asarray(by.reduceat(rows, np.arange(0, rows.shape[2], 2), axis=2))
+    """2 x 2 taxels combined, by default summed: (..., rows, cols) to (..., rows / 2, cols / 2)."""
+    rows = by.reduceat(frames, np.arange(0, frames.shape[-2], 2), axis=-2)
+    return np.asarray(by.reduceat(rows, np.arange(0, rows.shape[-1], 2), axis=-1))
 
 
 def pooled(recording: Recording, layout: SkinLayout) -> Recording:
-    """The recording of a skin of larger taxels, each of which carries all the force on its area.
+    """The recording of a skin with larger taxels, each of which reads all the force on its area.
 
     Args:
-        recording: its invalid taxels count as zero.
-        layout: the skin of larger taxels.
+        recording: invalid taxels in it count as zero.
+        layout: the skin with larger taxels.
     """
     frames = recording.frames.astype(np.uint32)
     valid = recording.valid
-    wider: NDArray[np.bool_] | None = None
     if valid is not None:
         frames *= valid
-        pooled_valid = pool(valid.reshape(-1, *valid.shape[-2:]).astype(np.uint8), np.maximum) > 0
-        wider = pooled_valid if valid.ndim == 3 else pooled_valid[0]
+        valid = pool(valid, np.logical_or)
     counts = np.minimum(pool(frames), 65535).astype(np.uint16)
     meta = {**recording.meta, "skin": layout.to_dict()}
-    return replace(recording, frames=counts, valid=wider, meta=meta)
+    return replace(recording, frames=counts, valid=valid, meta=meta)
 
 
 def coarser(
     layout: SkinLayout, recordings: Sequence[Recording]
 ) -> Iterator[tuple[SkinLayout, list[Recording]]]:
-    """Skins of ever larger taxels, down to a single one, and what they would have recorded."""
+    """Skins with ever larger taxels, down to a single one, and the recordings they would make."""
     recordings = list(recordings)
     while layout.rows * layout.cols > 1:
         layout = pooled_layout(layout)

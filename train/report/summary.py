@@ -1,4 +1,4 @@
-"""A fit in words, for a person at a terminal: the candidates, the choices, and warnings."""
+"""A fit summed up for a terminal: the candidates, the choices, and warnings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
+from sklearn.neighbors import NearestNeighbors
 
 from edge.touch import measures
 from train.choose import TRIAL, Chosen
@@ -24,18 +24,17 @@ from train.report.score import interval
 from train.report.section import Row, Table, counted
 
 MISSING_SHARE = 0.02
-"""Recordings without a contact above which the thresholds deserve a warning."""
+"""Share of recordings without a contact above which the thresholds get a warning."""
 LEAK = 0.5
-"""Share of labels known before the touch, above which a model recognises the place, not the
-object."""
+"""Share of labels that the posture at onset tells, above which it gets a warning."""
 NAMED = 3
-"""Files that a sentence names; the rest are counted."""
+"""A sentence names so many files and counts the rest."""
 Prices = Sequence[tuple[float, float]]
-"""For each candidate: microseconds of a decision on this machine, and kilobytes."""
+"""Microseconds of a decision on this machine, and kilobytes, for each candidate."""
 
 
 def summary(fitted: Fitted, prices: Prices) -> str:
-    """The candidates, the choice of each task, notes and warnings, in lines."""
+    """The candidates, the choice for each task, notes and warnings, as lines of text."""
     table = candidates(fitted, prices)
     cells = [[str(cell) for cell in row] for row in (table.columns, *table.cells)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
@@ -45,7 +44,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
     ]
     lines += ["* chosen for the task", ""]
     for task, chosen in fitted.chosen.items():
-        lines += [f"{task}: {_accuracy(chosen)}", f"  {_described(chosen.choice, fitted)}"]
+        lines += [f"{task}: {accuracy(chosen)}", f"  {_described(chosen.choice, fitted)}"]
     units: dict[str, list[str]] = {}
     for name, unit in fitted.dataset.units.items():
         units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(name)
@@ -57,28 +56,30 @@ def summary(fitted: Fitted, prices: Prices) -> str:
 
 
 def candidates(fitted: Fitted, prices: Prices) -> Table:
-    """A row for each candidate: the nested accuracy of its own settings, and its price."""
+    """A row for each candidate, with the nested accuracy of its own settings and its price."""
     rows: list[Row] = []
     for i, candidate in enumerate(fitted.candidates):
         own = {(grid.features, grid.projection) for grid in candidate.grids}
-        row: Row = {"features": candidate.name, "how": candidate.projection}
+        row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
             star = "*" if (chosen.choice.features, chosen.choice.projection) in own else " "
             row[task] = _percent(chosen.candidates[i]) + star
         us, kilobytes = prices[i]
-        rows.append({**row, "us a decision": round(us, 1), "kB": round(kilobytes, 1)})
-    return Table("candidates", "Candidates", rows, ("us a decision",), narrow=3)
+        rows.append({**row, "us per decision": round(us, 1), "kB": round(kilobytes, 1)})
+    return Table("candidates", "Candidates", rows, ("us per decision",), narrow=3)
 
 
-def _accuracy(chosen: Chosen) -> str:
-    """The accuracy of a task in words."""
-    numbers = f"{_percent(chosen.accuracy)} of {chosen.accuracy.total} trials, nested"
-    if chosen.left_out == TRIAL:
-        return f"{numbers}, with the trial left out"
-    return (
-        f"{numbers}, with every trial of its {chosen.left_out} left out; "
-        f"{chosen.by_trial.accuracy:.1%} with the trial alone left out"
+def accuracy(chosen: Chosen) -> str:
+    """The nested accuracy of a task in words."""
+    numbers = (
+        f"{chosen.accuracy.accuracy:.1%} of {chosen.accuracy.total} trials are classified "
+        f"correctly (95 % interval {interval(chosen.accuracy)}), each by a model chosen and fitted "
+        "without "
     )
+    if chosen.left_out == TRIAL:
+        return f"{numbers}this trial"
+    alone = f"{chosen.by_trial.accuracy:.1%} if only the trial itself is left out"
+    return f"{numbers}any trial of the same {chosen.left_out}; {alone}"
 
 
 def _percent(result: Result) -> str:
@@ -86,22 +87,23 @@ def _percent(result: Result) -> str:
 
 
 def _described(choice: Choice, fitted: Fitted) -> str:
+    """The settings of a choice as text."""
     combinations = {grid.features: c.name for c in fitted.candidates[::-1] for grid in c.grids}
     name = combinations.get(choice.features, " ".join(choice.features))
     how = f"{choice.projection} of {name}, scaling {choice.scaling}"
     if choice.projection == "lda":
         how += f", shrinkage {choice.shrinkage:g}"
         if choice.targets:
-            how += f", with the discriminants of {', '.join(choice.targets)} side by side"
+            how += f", with the discriminants of {' and '.join(choice.targets)} side by side"
     return f"{how}, {counted(choice.components, 'component')}, k = {choice.k}"
 
 
 def warnings(fitted: Fitted) -> list[str]:
-    """Sentences on data that flatter or spoil a model."""
+    """Sentences on data that make a model worse, or make it look better than it is."""
     dataset, lines = fitted.dataset, []
     untouched = [path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()]
     if untouched:
-        line = f"without a contact above {dataset.layout.onset} counts, and counted as wrong: "
+        line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
         line += _files(untouched)
         if len(untouched) / (len(dataset.trials) + len(dataset.untouched)) > MISSING_SHARE:
             line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
@@ -114,14 +116,14 @@ def warnings(fitted: Fitted) -> list[str]:
         )
     if dataset.unused:
         lines.append(
-            "warning: only the first of several contacts is used of "
-            f"{_files(dataset.unused)}; `python -m train split` makes a recording of each"
+            f"warning: only the first of several contacts is used in {_files(dataset.unused)}; "
+            "`python -m train split` makes a recording of each contact"
         )
     longest = max(float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials)
     if fitted.window_s > longest + 1e-9:
         lines.append(
-            f"warning: the window of {fitted.window_s:g} s is longer than any recording goes on "
-            f"after its onset ({longest:.2f} s)"
+            f"warning: the window of {fitted.window_s:g} s is too long: every recording ends "
+            f"within {longest:.2f} s of the onset"
         )
     return [*lines, *(line for task in fitted.chosen for line in _task_warnings(fitted, task))]
 
@@ -135,7 +137,7 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
         lines.append(
             f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
             f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may recognise "
-            "places rather than objects; --features without posture measures touch alone"
+            "places instead of objects; leave posture out of --features to judge touch alone"
         )
     if choice.components > components and choice.projection == "pca":
         lines.append(
@@ -146,7 +148,7 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     equal = tied_across_labels(rows, classifier.labels_[task])
     if equal:
         lines.append(
-            f"warning: {task}: {equal} trials have the same coordinates as a trial of another "
+            f"warning: {task}: {equal} trials have the same coordinates as a trial with another "
             "label; the earlier trial counts as nearer, so their order decides the label"
         )
     projection = classifier.projections_[space]
@@ -154,8 +156,8 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     if steps < FEWEST_UNITS:
         farthest = dataset.trials[classifier.members_[space][place]].path
         lines.append(
-            f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps "
-            f"of another one, since {farthest} lies far outside all others; leave it out if its "
+            f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps from "
+            f"another trial, because {farthest} lies far outside all others; leave it out if the "
             "recording is wrong"
         )
     if projection.gap_ < CLOSE_EIGENVALUES:
@@ -167,7 +169,7 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
 
 
 def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
-    """How many rows (n, c) equal a row of another label (n,)."""
+    """The number of rows (n, c) that equal a row with another label (n,)."""
     _, group = np.unique(rows, axis=0, return_inverse=True)
     labels_of = np.zeros((len(rows), int(labels.max()) + 1), dtype=bool)
     labels_of[group.ravel(), labels] = True
@@ -175,15 +177,15 @@ def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> 
 
 
 def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
-    """How coarse a model's grid is for its trials, by at most a thousand of them.
+    """The coarseness of a model's grid for its trials, judged by at most a thousand of them.
 
     Args:
         rows: (n, c) projected trials.
         unit: of their coordinates.
 
     Returns:
-        The median distance, in units, from a trial to the nearest one that differs from it;
-        infinite where all are equal. And the number of the trial that lies farthest out.
+        The median distance, in units, from a trial to the nearest one that differs from it, or
+        infinity if all are equal; and the number of the trial that lies farthest out.
     """
     squares = squared_distances(rows[:: -(-len(rows) // 1000)], rows)
     squares[squares == 0.0] = np.inf
@@ -192,7 +194,7 @@ def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
 
 
 def posture_accuracy(dataset: DataSet, task: str) -> float:
-    """Leave-one-out accuracy of a task by the joint angles at onset alone, with one neighbour."""
+    """Leave-one-out accuracy of a task with the joint angles at onset alone and one neighbour."""
     at_onset = []
     for trial in dataset.trials:
         joints = trial.series.joints
@@ -201,15 +203,14 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
         at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
     labels = dataset.labels(task)
     angles, labels = np.array(at_onset)[labels != ""], labels[labels != ""]
-    squares = cdist(angles, angles, "sqeuclidean")
-    np.fill_diagonal(squares, np.inf)
-    return float((labels[squares.argmin(axis=1)] == labels).mean())
+    nearest = NearestNeighbors(n_neighbors=1).fit(angles).kneighbors(return_distance=False)[:, 0]
+    return float((labels[nearest] == labels).mean())
 
 
 def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
-    """The name of the folder of all recordings, and each trial's path in it without suffix.
+    """The name of the folder that holds all recordings, and each trial's path in it.
 
-    Trials of one recording are numbered from 1.
+    The paths have no suffix. If a recording has several trials, they are numbered from 1.
     """
     folder = Path(os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials]))
     paths = [t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials]
@@ -222,5 +223,6 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
 
 
 def _files(paths: Sequence[Path]) -> str:
+    """The first paths, and the number of the others."""
     rest = len(paths) - NAMED
     return ", ".join(map(str, paths[:NAMED])) + (f" and {rest} more" if rest > 0 else "")

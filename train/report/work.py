@@ -1,4 +1,4 @@
-"""Work shared out to several processes, with a progress bar."""
+"""Work shared among several processes, with a progress bar."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from train.progress import bar
 
 @dataclass(frozen=True)
 class Workers:
-    """The processes that a report is computed by.
+    """The processes that compute a report.
 
     Attributes:
         jobs: number of processes.
-        cluster: name of a joblib backend other than this machine's, if one is used.
+        cluster: name of the joblib backend to use in place of this machine's processes, if any.
         progress: show progress bars on stderr.
     """
 
@@ -27,15 +27,17 @@ class Workers:
     progress: bool = True
 
     def map(
-        self, what: str, function: Callable[..., Any], cases: Sequence[tuple[Any, ...]]
+        self, heading: str, function: Callable[..., Any], cases: Sequence[tuple[Any, ...]]
     ) -> list[Any]:
-        """function(*case) of each case, in their order; `what` is the heading of the bar."""
-        # Without memory maps, which would make arrays read-only files; these are small.
+        """The results of function(*case) in the order of the cases; the bar has the heading."""
+        # Memory maps would make arrays read-only files, which pays only for large ones.
         run = Parallel(
             n_jobs=self.jobs, backend=self.cluster, return_as="generator", max_nbytes=None
         )
         results = run(delayed(_single)(function, case) for case in cases)
-        return list(bar(results, total=len(cases), desc=f"{what:<22}", disable=not self.progress))
+        return list(
+            bar(results, total=len(cases), desc=f"{heading:<22}", disable=not self.progress)
+        )
 
 
 def _single(function: Callable[..., Any], case: tuple[Any, ...]) -> Any:

@@ -1,10 +1,11 @@
-"""The paper's 46 accuracies, with their places (Tables I to III), and ours beside them."""
+"""The paper's 46 accuracies in its Tables I to III, compared with ours."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +15,16 @@ from scipy.stats import rankdata, spearmanr
 
 from edge.statistics import wilson
 from train.report.figures import STROKES, legend, picture
-from train.report.section import Figure, Numbers, Row, Section, Table, counted
+from train.report.section import Figure, Row, Section, Table, counted
 
+Numbers = dict[tuple[str, str, str], float]
+"""{(table, setting, task): accuracy in percent}."""
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140
-COPIES = 4000
-"""Draws of the bootstrap that shows how a perfect copy would order the settings."""
-SHOWN = 12
-"""Most of the numbers outside the interval that the text lists."""
+REPLICATIONS = 4000
+"""Draws of the bootstrap that tells how a perfect replication would order the settings."""
+LISTED = 12
+"""The text lists at most so many of the numbers outside the interval."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +54,11 @@ class Entry:
     def headline(self) -> bool:
         """Whether it is one of the three accuracies of section IV-A.
 
-        Those are of all taxels, unscaled, with all features or with force and area alone: unscaled,
-        a motion in metres has no weight beside them.
+        They use all taxels without scaling. Table III repeats them for force and area alone,
+        because unscaled motion in metres has no weight beside these.
         """
-        form = {"I": "384", "II": "none", "III": "max_force contact_area"}
-        return self.setting == form[self.table]
+        settings = {"I": "384", "II": "none", "III": "max_force contact_area"}
+        return self.setting == settings[self.table]
 
 
 def entries() -> list[Entry]:
@@ -68,21 +71,21 @@ def entries() -> list[Entry]:
 
 
 def papers(table: str, task: str) -> dict[str, float]:
-    """{setting: percent} of one of the paper's tables."""
+    """{setting: the paper's percent} for a task in one of its tables."""
     return {e.setting: e.percent for e in entries() if (e.table, e.task) == (table, task)}
 
 
 def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
-    """95 % interval of ours less the paper's, in points: Newcombe's, of two samples.
+    """95 % interval of our accuracy minus the paper's, in percentage points.
 
-    Two studies of the same thing differ by the chance of both. An interval about one of them alone
-    would exclude a perfect copy one time in six (Newcombe, Statistics in Medicine 17, 1998,
-    method 10).
+    Two studies of the same thing differ by chance in both. An interval around one of them alone
+    would exclude a perfect replication one time in six (Newcombe, Statistics in Medicine 17, 1998,
+    method 10, for two samples).
 
     Args:
         paper: percent of `TRIALS`.
         ours: percent.
-        tested: number of trials behind ours.
+        tested: number of our trials.
     """
     (low_p, high_p), (low_o, high_o) = (
         100.0 * np.array(wilson(round(share * trials / 100.0), trials))
@@ -101,29 +104,29 @@ def mean_of(data_sets: Sequence[Numbers]) -> Numbers:
 
 
 def negative_by_chance(percents: Sequence[float], tested: int) -> float:
-    """Percent of perfect copies whose rank correlation with the paper would be below zero.
+    """Percent of perfect replications whose rank correlation with the paper would be negative.
 
-    A parametric bootstrap: the paper's percents are taken as true, and the trials of the paper and
-    of the copy are drawn anew, independently for each setting. The settings of a table share their
-    trials, so the result is rather too high than too low.
+    This is a parametric bootstrap. It takes the paper's percents as true, and draws the trials of
+    the paper and of the replication anew, independently for each setting. In fact the settings of a
+    table share their trials, so the result is more likely too high than too low.
 
     Args:
-        percents: of the settings.
-        tested: number of trials behind each of the copy's.
+        percents: the paper's, for each setting.
+        tested: number of the replication's trials.
     """
     rng = np.random.default_rng(0)
     truth = np.array(percents) / 100.0
-    size = (COPIES, len(truth))
+    size = (REPLICATIONS, len(truth))
     pair = rng.binomial(TRIALS, truth, size) / TRIALS, rng.binomial(tested, truth, size) / tested
-    paper, copy = (rankdata(x, axis=1) - (len(truth) + 1) / 2.0 for x in pair)
-    return round(100.0 * float(np.mean((paper * copy).sum(axis=1) < 0.0)), 1)
+    paper, ours = (rankdata(x, axis=1) - (len(truth) + 1) / 2.0 for x in pair)
+    return round(100.0 * float(np.mean((paper * ours).sum(axis=1) < 0.0)), 1)
 
 
 def right_despite_the_object(numbers: Numbers) -> float:
-    """Mean percent of the trials with a wrong object whose category is right.
+    """Percent of the trials with a wrong object whose category is right, as a mean over settings.
 
-    A right object implies the right category but for its other condition, so the amount by which
-    category exceeds object is of trials whose object was wrong.
+    The right object nearly implies the right category. So the trials by which the category's
+    accuracy exceeds the object's are trials with a wrong object.
 
     Args:
         numbers: percent, with category and object of each setting.
@@ -137,63 +140,65 @@ def right_despite_the_object(numbers: Numbers) -> float:
 
 
 def rank_correlation(theirs: ArrayLike, ours: ArrayLike) -> float | None:
-    """Spearman's rank correlation; None where all values of one side are equal."""
+    """Spearman's rank correlation; None if all values on one side are equal."""
     if np.ptp(theirs) == 0.0 or np.ptp(ours) == 0.0:
         return None
     return float(spearmanr(theirs, ours).statistic)
 
 
 def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
-    """Each of the paper's numbers beside ours, and the rank correlations.
+    """Each of the paper's accuracies beside ours, and the rank correlations.
 
     Args:
-        data_sets: percent, of each data set.
-        tested: number of trials behind their mean.
+        data_sets: our percents, for each data set.
+        tested: number of trials in all data sets together.
     """
     mean = mean_of(data_sets)
     known = {
         entry: _beside(entry, mean[entry.key], tested) for entry in entries() if entry.key in mean
     }
     rows = list(known.values())
-    by_task: dict[tuple[str, str], list[Entry]] = {}
-    for entry in known:
-        by_task.setdefault((entry.table, entry.task), []).append(entry)
-    ranks = [_ranks(settings, known, data_sets, tested) for settings in by_task.values()]
+    by_task = groupby(known, key=lambda entry: (entry.table, entry.task))
+    ranks = [_ranks(list(settings), known, data_sets, tested) for _, settings in by_task]
     inside = [row for row in rows if row["within"] == "yes"]
     others = [row for row in rows if not row["headline"]]
     others_inside = sum(not row["headline"] for row in inside)
-    title = f"{len(inside)} of the paper's {len(known)} numbers lie within the interval"
+    title = f"Our accuracies against the paper's: {len(inside)} of {len(known)} within the interval"
     return Section(
         "Ours beside the paper's",
         [
-            f"{len(inside)} of {len(rows)} numbers lie within the 95 % interval of the difference "
-            f"between {tested} trials here ({counted(len(data_sets), 'simulated data set')}) and "
-            f"the paper's {TRIALS}. {len(rows) - len(others)} of them repeat the three headline "
-            "accuracies of section IV-A, which the free values of the scene were chosen to meet, "
-            f"so there the scene predicts nothing. Of the other {len(others)}, {others_inside} lie "
-            "within. The paper's trials and ours are of different objects; the interval covers the "
-            "chance in both. Nothing was changed to meet the other numbers.",
+            f"The paper's Tables I to III give {len(rows)} accuracies. The simulation agrees with "
+            f"{len(inside)} of them: the 95 % interval of the difference contains zero. The "
+            f"interval allows for chance in the {tested} trials here "
+            f"({counted(len(data_sets), 'simulated data set')}) and in the paper's {TRIALS}. The "
+            "objects touched are not the same.",
+            f"{len(rows) - len(others)} of the {len(rows)} repeat the three headline accuracies of "
+            "the paper's section IV-A. The free values of the scene were chosen to meet these, so "
+            f"they are no predictions. Of the other {len(others)}, {others_inside} agree. Nothing "
+            "was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
-            "A negative rank correlation means that the simulation gives no support to the paper's "
-            "order of these settings. Two columns count the data sets in which it is positive and "
-            "the perfect copies that would have a negative one by chance.",
+            "A negative rank correlation means that the simulation does not support the order in "
+            "which the paper ranks these settings. Beside it stand the number of data sets in "
+            "which it is positive, and the share of perfect replications of the paper in which it "
+            "would be negative by chance.",
             *_wrong_objects({e.key: e.percent for e in known}, mean),
         ],
         [
-            Table("paper", "The paper's 46 numbers and ours", rows),
-            Table(
-                "paper_ranks",
-                "Spearman's rank correlation of the settings' order here and in the paper",
-                ranks,
-                narrow=5,
-            ),
+            Table("paper", "The paper's accuracies and ours", rows),
+            Table("paper_ranks", "Spearman's rank correlation with the paper", ranks, narrow=5),
         ],
         [_against(known, title)],
     )
 
 
 def _beside(entry: Entry, ours: float, tested: int) -> Row:
-    """The row of one number, with ours in percent of the trials tested."""
+    """The table's row for one of the paper's numbers.
+
+    Args:
+        entry: the paper's number.
+        ours: our percent.
+        tested: number of our trials.
+    """
     low, high = difference(entry.percent, ours, tested)
     return {
         "place": entry.place,
@@ -211,7 +216,14 @@ def _beside(entry: Entry, ours: float, tested: int) -> Row:
 def _ranks(
     settings: Sequence[Entry], known: Mapping[Entry, Row], data_sets: Sequence[Numbers], tested: int
 ) -> Row:
-    """The row of the settings of one task in one of the paper's tables."""
+    """The row of rank correlations for one task in one of the paper's tables.
+
+    Args:
+        settings: the paper's numbers for the task.
+        known: their rows beside ours.
+        data_sets: our percents, for each data set.
+        tested: number of our trials.
+    """
     theirs = [entry.percent for entry in settings]
     ours = [[numbers[entry.key] for entry in settings] for numbers in data_sets]
     rank = rank_correlation(theirs, np.mean(ours, axis=0))
@@ -222,48 +234,50 @@ def _ranks(
         "task": settings[0].task,
         "rank correlation": "all equal" if rank is None else round(rank, 2),
         "positive in data sets": f"{positive} of {len(data_sets)}",
-        "perfect copies below zero %": negative_by_chance(theirs, tested),
+        "negative by chance %": negative_by_chance(theirs, tested),
         "within interval": f"{within} of {len(settings)}",
     }
 
 
 def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
-    """A paragraph on the categories of trials whose object was wrong."""
+    """A paragraph on the category in trials with a wrong object; none if a task is missing."""
     paper, here = (right_despite_the_object({k: n[k] for k in theirs}) for n in (theirs, ours))
     if np.isnan(paper) or np.isnan(here):
         return []
     return [
-        "Over all settings that have both tasks, of the trials whose object was wrong, "
-        f"{paper:.0f} % have the right category in the paper and {here:.0f} % here; a guess among "
-        "four categories has 25 %. A higher share means that objects of one category feel more "
-        "alike: a skin too coarse to recognise the object still recognises its category."
+        "When the classifier names the wrong object, it still names the right category in "
+        f"{paper:.0f} % of the trials in the paper and in {here:.0f} % here, as a mean over the "
+        "settings that have both tasks; guessing among four categories gives 25 %. A higher share "
+        "means that the objects of a category feel more alike: a skin that is too coarse to "
+        "recognise the object still recognises its category."
     ]
 
 
 def _disagreements(outside: Sequence[Row]) -> str:
     """A paragraph on the numbers outside their interval."""
     if not outside:
-        return "No number lies outside."
-    largest = sorted(outside, key=lambda row: -abs(row["difference"]))[:SHOWN]
+        return "No accuracy disagrees."
+    largest = sorted(outside, key=lambda row: -abs(row["difference"]))[:LISTED]
     listed = [f"{r['place']} ({r['task']}) {r['difference']:+.1f} points" for r in largest]
     higher = sum(row["difference"] > 0 for row in outside)
     return (
-        f"{len(outside)} lie outside, {higher} of them higher here than in the paper. The largest "
-        f"differences: {'; '.join(listed)}. A higher number means that the simulation gives "
-        "information that the real skin did not; a lower one, that it lacks some. In Table II some "
-        "of the paper's methods are one classifier, see the section on scaling."
+        f"{len(outside)} disagree; {higher} of them are higher here than in the paper. The largest "
+        f"differences are {'; '.join(listed)}. A higher accuracy means that the simulated skin "
+        "gives information that the real skin did not give; a lower one means that it lacks some. "
+        "In Table II some of the paper's methods are the same classifier; see the section on "
+        "scaling."
     )
 
 
 def _against(known: Mapping[Entry, Row], title: str) -> Figure:
-    """Ours against the paper's, a point a number; hollow where its bar misses the diagonal."""
+    """Our accuracies against the paper's; a point is hollow if its interval misses the diagonal."""
     marks = dict(zip(dict.fromkeys(e.table for e in known), "os^", strict=False))
     strokes = dict(zip(sorted({e.task for e in known}), STROKES, strict=False))
     ends = min(min(row["paper %"], row["ours %"]) for row in known.values()) - 4.0, 102.0
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
-        axes.plot(ends, ends, color="0.4", lw=1, label="equal")
+        axes.plot(ends, ends, color="0.4", lw=1, label="equal accuracies")
         for entry, row in known.items():
             colour, _, dashes = strokes[entry.task]
             face = colour if row["within"] == "yes" else "white"
@@ -275,8 +289,8 @@ def _against(known: Mapping[Entry, Row], title: str) -> Figure:
             axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
         for table, mark in marks.items():
             axes.plot([], [], mark, color="0.3", label=f"Table {table}")
-        axes.plot([], [], "o", color="0.3", mfc="white", label="outside")
-        axes.set(xlim=ends, ylim=ends, xlabel="the paper's accuracy, %", ylabel="ours, %")
+        axes.plot([], [], "o", color="0.3", mfc="white", label="interval without zero")
+        axes.set(xlim=ends, ylim=ends, xlabel="the paper's accuracy, %", ylabel="our accuracy, %")
         legend(canvas, axes, 3 if phone else 4)
 
     return picture("paper", title, draw, (5.6, 4.4))

@@ -1,4 +1,4 @@
-"""The study: one data set in, one report out."""
+"""The study: every analysis of the paper, repeated on one data set and written as a report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from train.dataset import load_trials
 from train.feature_sets import expand
 from train.progress import bar
 from train.report.page import write
-from train.report.section import Numbers, Section, counted
+from train.report.section import Section, counted
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
@@ -23,7 +23,9 @@ from train.study import methods, paper, robust, sweeps
 from train.study.context import Context
 
 COMPARED = (sweeps.resolution, sweeps.scaling, sweeps.features)
-"""The analyses of which the paper has numbers."""
+"""The analyses for which the paper has numbers."""
+TABLES = {"resolution": "I", "scaling": "II", "features": "III"}
+"""{our table: the paper's table of the same settings}."""
 ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
     methods.section,
     sweeps.confusion,
@@ -33,10 +35,10 @@ ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
     sweeps.features,
     robust.section,
 )
-"""Each analyses the data set; None where it has nothing to say of it."""
+"""The report's analyses, in its order; one that does not apply to the data set gives None."""
 LONGEST_S = 2.0
 FEWEST = 20
-"""Trials below which a grid of 20 components makes no sense."""
+"""Smallest number of trials, because the grid has 20 components."""
 
 
 def study(
@@ -53,12 +55,12 @@ def study(
     Args:
         data: recordings and folders of them.
         out: folder of the report.
-        scene: the scene that they were simulated from; without it, analyses that simulate are
-            left out.
+        scene: the scene that the recordings were simulated from; without it, the analyses that
+            simulate again are left out.
         jobs: processes on this machine.
         address: address of a Dask scheduler that runs the sweeps instead.
-        seeds: number of data sets of the scene, these recordings among them, whose mean is
-            compared with the paper's numbers.
+        seeds: number of data sets of the scene, including these recordings, whose mean is compared
+            with the paper's numbers.
 
     Raises:
         InputError: the data set cannot be used, or there is no scheduler.
@@ -81,7 +83,7 @@ def study(
             "distinguish; give recordings of two classes or more"
         )
     with nullcontext() if address is None else on_cluster(address):
-        # The last first: it notices when the recordings are of another scene.
+        # The last comes first, because it notices when the recordings are of another scene.
         sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
         shown = [section for section in sections if section]
         if source is not None:
@@ -93,32 +95,39 @@ def study(
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
-    """The paragraphs below the title: the data set, and what is left out of it."""
+    """The paragraphs below the title: the data set, and the labels and recordings left out."""
     dataset, scene, layout = context.dataset, context.scene, context.dataset.layout
     tasks = ", ".join(f"{task} ({len(set(y))} classes)" for task, y in context.labels.items())
     frame = "skin" if dataset.chain is None else "world"
-    source = "Recorded, or simulated elsewhere."
+    source = "The trials were recorded, or simulated elsewhere."
     if scene is not None:
-        source = f"Simulated: scene {scene.name}, seed {scene.seed}."
+        source = f"The trials were simulated from the scene {scene.name} with seed {scene.seed}."
     lead = [
-        f"{counted(len(dataset.trials), 'trial')}, {layout.rows} x {layout.cols} taxels, tasks "
-        f"{tasks}; force in {layout.force_unit}s, motion in {layout.length_unit}s in the {frame}'s "
-        f"frame. {source} Accuracies below the findings are of leave-one-out cross-validation, "
-        "with 95 % binomial (Wilson) intervals."
+        f"{counted(len(dataset.trials), 'trial')} on {layout.rows} x {layout.cols} taxels, with "
+        f"the tasks {tasks}. Force is in {layout.force_unit}s; motion is in "
+        f"{layout.length_unit}s, in the frame of the {frame}. {source} Apart from the findings, "
+        "accuracies come from leave-one-out cross-validation, with 95 % binomial (Wilson) "
+        "intervals."
     ]
     if constant:
-        lead.append(f"Left out, as every trial has the same label: {', '.join(constant)}.")
+        lead.append(f"Left out, because every trial has the same label: {', '.join(constant)}.")
     if dataset.untouched:
         lead.append(f"Left out: {counted(len(dataset.untouched), 'recording')} without a contact.")
     return lead
 
 
-def _numbers(sections: Sequence[Section]) -> Numbers:
-    return {key: percent for section in sections for key, percent in section.numbers.items()}
+def _numbers(sections: Sequence[Section]) -> paper.Numbers:
+    """Our accuracies in percent, under the names of the paper's tables."""
+    tables = [table for section in sections for table in section.tables if table.name in TABLES]
+    return {
+        (TABLES[table.name], str(setting), task): accuracy
+        for table in tables
+        for setting, task, accuracy, *_ in table.cells
+    }
 
 
-def _again(context: Context, scene: Scene, i: int) -> Numbers:
-    """The numbers beside the paper's on the `i`-th further seed of the scene."""
+def _again(context: Context, scene: Scene, i: int) -> paper.Numbers:
+    """The accuracies to compare with the paper's, on the scene simulated with another seed."""
     with tempfile.TemporaryDirectory() as folder:
         simulate(replace(scene, seed=scene.seed + i), folder, jobs=context.workers.jobs)
         dataset = load_trials([folder], horizon_s=LONGEST_S)

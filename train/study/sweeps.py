@@ -13,8 +13,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import TrackSettings
 from train.evaluate import Labels, Result
 from train.report import figures
-from train.report.score import grid_search, percent, score
-from train.report.section import Numbers, Row, Section, Table
+from train.report.score import grid_search, score
+from train.report.section import Row, Section, Table
 from train.report.skins import coarser, follow, vectors
 from train.scaling import SCALINGS
 from train.study.context import Context
@@ -33,17 +33,8 @@ def by_task(results: Results) -> dict[str, list[Result]]:
     return {task: [result[task] for result in results.values()] for task in tasks}
 
 
-def numbers(table: str, results: Results) -> Numbers:
-    """The accuracies in percent, under the name of a table of the paper."""
-    return {
-        (table, str(setting), task): percent(result.accuracy)
-        for setting, tasks in results.items()
-        for task, result in tasks.items()
-    }
-
-
 def rows(column: str, results: Results, table: str = "") -> list[Row]:
-    """A row for each setting and task, with the accuracy of a table of the paper beside it."""
+    """A row for each setting and task, with the accuracy in a table of the paper, if given."""
     return [
         {column: setting, "task": task, **score(result)}
         | ({"paper %": papers(table, task).get(str(setting), "")} if table else {})
@@ -53,7 +44,7 @@ def rows(column: str, results: Results, table: str = "") -> list[Row]:
 
 
 def confusion(context: Context) -> Section:
-    """What each thing touched is taken for (Figs. 6 to 8)."""
+    """Confusion matrices of the paper's classifier (Figs. 6 to 8)."""
     best: list[Row] = []
     pictures = []
     for task, result in grid_search(context.vectors(), context.labels).items():
@@ -61,17 +52,17 @@ def confusion(context: Context) -> Section:
         assert result.said is not None
         size = {"task": task, "classes": len(set(truth)), "trials": result.total}
         best.append(size | score(result))
-        title = f"{task}: answers to each thing touched"
+        title = f"{task}: the label that each touch was given, by leave-one-out"
         pictures.append(figures.confusion(f"confusion_{task}", title, truth, result.said))
     return Section(
         "Classification (Figs. 6 to 8)",
         [
-            "The classifier takes the paper's three features over 1.2 s, unscaled. Leave-one-out "
-            "grid search chooses the number of components and k, 1 to 20 each; of equally accurate "
-            "models it takes the smallest. The score is the one that the search maximised, so it "
-            "flatters."
+            "The classifier uses the paper's three features over 1.2 s, unscaled. A grid search "
+            "with leave-one-out tries 1 to 20 components and k from 1 to 20, and takes the "
+            "smallest of equally accurate models. The accuracy shown is the one that the search "
+            "maximised, so it is too high."
         ],
-        [Table("classification", "The best components and k of each task", best)],
+        [Table("classification", "The best number of components and k for each task", best)],
         pictures,
     )
 
@@ -81,7 +72,7 @@ def window(context: Context) -> Section:
     cases = [(context.vectors(seconds), context.labels) for seconds in WINDOWS_S]
     answers = context.workers.map("time window", grid_search, cases)
     results = dict(zip(WINDOWS_S, answers, strict=True))
-    text = ["Each feature is sampled 40 times, whatever the window, as in the paper."]
+    text = ["As in the paper, each feature is sampled 40 times in every window."]
     for task in context.labels:
         at = {seconds: result[task].accuracy for seconds, result in results.items()}
         text.append(
@@ -90,8 +81,9 @@ def window(context: Context) -> Section:
         )
     if "category" in context.labels and context.scene is not None:
         text.append(
-            "In the paper accuracy falls substantially from 1.2 s to 0.8 s. Physics limits a short "
-            "window: an object cannot look movable before static friction breaks."
+            "In the paper, accuracy falls substantially when the window is shortened from 1.2 s to "
+            "0.8 s. Physics sets a limit: a movable object cannot be told from a fixed one before "
+            "static friction breaks."
         )
     title = "Effect of the time window (Fig. 10)"
     png = figures.lines(
@@ -103,50 +95,63 @@ def window(context: Context) -> Section:
 
 def scaling(context: Context) -> Section:
     """Accuracy with each scaling (Table II)."""
-    cases = [(context.vectors(), context.labels, method) for method in SCALINGS]
-    answers = context.workers.map("feature scaling", grid_search, cases)
     text = (
-        "Scaling follows Eqs. 1 to 5, with the statistics of a feature over all its samples in the "
-        "training trials of a fold. Methods I and II differ by a constant for each feature, and so "
-        "do Method III and no scaling. PCA's centring removes such a constant, so each pair is one "
-        "classifier and has equal accuracies here but for rounding. In the paper they differ by up "
-        "to 9.3 points (80 % and 75 %, 72.14 % and 62.86 %). Either its statistics were not single "
-        "numbers for a feature over all trials, or its PCA did not centre."
+        "Scaling follows the paper's Eqs. 1 to 5. The statistics of a feature are taken over all "
+        "of its samples in the training trials of a fold. Methods I and II differ only by a "
+        "constant for each feature, and so do Method III and no scaling. PCA subtracts the mean, "
+        "and the constant with it, so each pair is the same classifier and has the same accuracy "
+        "here, up to rounding. In the paper, the two methods of a pair differ by up to 9.3 points "
+        "(80 % and 75 %, 72.14 % and 62.86 %). Either its statistics were not taken over all "
+        "trials, or its PCA did not subtract the mean."
     )
-    results = dict(zip(SCALINGS, answers, strict=True))
-    return _compared(
-        context, "scaling", "Effect of feature scaling (Table II)", "II", results, text
-    )
+    cases = {method: (context.vectors(), context.labels, method) for method in SCALINGS}
+    return _compared(context, "scaling", "Effect of feature scaling (Table II)", "II", cases, text)
 
 
 def features(context: Context) -> Section:
     """Accuracy with each combination of features (Table III)."""
-    cases = [(context.vectors(names=names), context.labels, "none", names) for names in SUBSETS]
-    answers = context.workers.map("features", grid_search, cases)
-    results = {" ".join(names): result for names, result in zip(SUBSETS, answers, strict=True)}
-    text = "These are all single features, pairs, and all three, unscaled, over 1.2 s."
-    title = "Effect of the features (Table III)"
-    return _compared(context, "features", title, "III", results, text)
+    text = "Each feature alone, each pair, and all three together; unscaled, over 1.2 s."
+    cases = {
+        " ".join(names): (context.vectors(names=names), context.labels, "none", names)
+        for names in SUBSETS
+    }
+    return _compared(context, "features", "Effect of the features (Table III)", "III", cases, text)
 
 
 def _compared(
-    context: Context, column: str, title: str, table: str, results: Results, text: str
+    context: Context,
+    column: str,
+    title: str,
+    table: str,
+    cases: Mapping[str, tuple[Any, ...]],
+    text: str,
 ) -> Section:
-    """Accuracies beside those of one of the paper's tables, whose settings have names."""
+    """Our accuracies beside those of one of the paper's tables.
+
+    Args:
+        context: the data set.
+        column: heading of the settings.
+        title: of the section.
+        table: II or III.
+        cases: {setting: arguments of `grid_search`}.
+        text: the section's paragraph.
+    """
+    answers = context.workers.map(column, grid_search, list(cases.values()))
+    results = dict(zip(cases, answers, strict=True))
     theirs = {task: papers(table, task) for task in context.labels} if context.scene else None
     png = figures.bars(column, title, list(results), by_task(results), marks=theirs)
     cells = Table(column, f"Accuracy with each choice of {column}", rows(column, results, table))
-    return Section(title, [text], [cells], [png], numbers=numbers(table, results))
+    return Section(title, [text], [cells], [png])
 
 
-def _through(
+def _with_skin(
     layout: SkinLayout,
     recordings: Sequence[Recording],
     tracking: TrackSettings,
     arm: Chain | None,
     labels: Labels,
 ) -> tuple[Mapping[str, Result], int]:
-    """Each task's accuracy through a skin, and the number of trials without contact."""
+    """Each task's accuracy with a skin, and the number of trials without contact."""
     contacts = follow(recordings, layout, tracking, arm)
     return grid_search(vectors(contacts), labels), contacts.count(None)
 
@@ -157,7 +162,7 @@ def resolution(context: Context) -> Section:
     recordings = [trial.recording for trial in data.trials]
     skins = [(data.layout, recordings), *coarser(data.layout, recordings)]
     cases = [(*skin, data.tracking, data.chain, labels) for skin in skins]
-    answers = context.workers.map("taxel resolution", _through, cases)
+    answers = context.workers.map("taxel resolution", _with_skin, cases)
     taxels = [layout.rows * layout.cols for layout, _ in skins]
     results, lost = (
         dict(zip(taxels, values, strict=True)) for values in zip(*answers, strict=True)
@@ -172,12 +177,11 @@ def resolution(context: Context) -> Section:
     return Section(
         title,
         [
-            "A larger taxel carries all the force on its area, so its reading is the sum of the "
-            "taxels that it covers. The threshold in newtons stays the same. With one taxel, area "
-            "shows only whether there is contact, and motion is that of the skin's middle, which "
-            "the joint angles still give.",
+            "A larger taxel reads the whole force on its area, which is the sum over the taxels "
+            "that it replaces. The threshold in newtons stays the same. With a single taxel, the "
+            "contact area only tells whether there is contact, and the contact motion is that of "
+            "the skin's middle, which follows from the joint angles.",
         ],
         [Table("resolution", "Accuracy with larger taxels", cells)],
         [png],
-        numbers=numbers("I", results),
     )

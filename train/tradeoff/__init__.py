@@ -1,1 +1,1 @@
-"""What accuracy costs in time: waiting, the wire, arithmetic and the arm."""
+"""The time that accuracy costs: waiting, the wire, arithmetic and the arm."""

@@ -1,12 +1,11 @@
-"""The report's first section: how accurate a decision is after how long, and how to have it."""
+"""The sections on accuracy against time, with the command that exports each model."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from train.evaluate import Result
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
-from train.report.score import majority, percent, points, score
+from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
 from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S, unseen
@@ -14,51 +13,52 @@ from train.tradeoff.early import FOLDS, Certified, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
 
-SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-"""Windows of the tables."""
-TITLED_S = (0.4, 1.2)
-"""Windows whose accuracy stands above a panel."""
+TABLE_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
+"""Windows in the tables."""
+TITLE_S = (0.4, 1.2)
+"""Windows with their accuracy in a panel's title."""
 ACROSS = 3
-"""Most panels beside each other."""
+"""At most so many panels stand side by side."""
 EARLY = f"make export EXPORT='--quick --decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1'"
-"""The command that exports the model that decides early."""
+"""The command that exports a model for early decisions."""
 
 
 def answers(measured: Measured, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
-
-    def row(
-        how: str, seconds: float, result: Result, unmet: Result | None = None, command: str = ""
-    ) -> Row:
-        cells = {"how": how, "time s": round(seconds, 3), "accuracy %": 0.0}
-        cells["objects never met %"] = "" if unmet is None else percent(unmet.accuracy)
-        cells |= {key: score(result)[key] for key in ("accuracy %", "from %", "to %")}
-        return cells | {"command": command}
-
     after_s = measured.after_s
-    rows = [
-        row(f"after {window:g} s", window + after_s, tasks[task].by_trial, unseen(tasks[task]),
-            f"`make export EXPORT='--quick --window {window:g}'`")
-        for window, tasks in measured.points.items()
-        if window in SHOWN_S
-    ]  # fmt: skip
+    rows: list[Row] = []
+    for window, tasks in measured.points.items():
+        if window in TABLE_S:
+            unmet = unseen(tasks[task])
+            rows.append(
+                {"decision": f"after {window:g} s", "time s": round(window + after_s, 3)}
+                | shares(tasks[task].by_trial)
+                | {"objects never met %": "" if unmet is None else percent(unmet.accuracy)}
+                | {"command": f"`make export EXPORT='--quick --window {window:g}'`"}
+            )
     for rule in distinct(measured.comparisons[task]):
-        how = f"at most {100 * rule.asked:g} % wrong"
-        command = f"`{EARLY}`, then `edge-classify run --error {rule.asked:g}`"
-        rows.append(row(how, rule.mean_s + after_s, rule.result, command=command))
-    return [*rows, row("most frequent label", 0.0, majority(measured.y[task]))]
+        rows.append(
+            {
+                "decision": f"early, at most {rule.asked:.0%} wrong",
+                "time s": round(rule.mean_s + after_s, 3),
+            }
+            | shares(rule.result)
+            | {"command": f"`{EARLY}`, then `edge-classify run --error {rule.asked:g}`"}
+        )
+    guess = {"decision": "always the most frequent label", "time s": 0.0}
+    return [*rows, guess | shares(majority(measured.y[task]))]
 
 
 def distinct(compared: StoppingComparison) -> list[Certified]:
-    """The errors that most folds certify; a rule that serves two errors stands at the smaller."""
+    """The rules that most folds certify; one that serves two error rates stands at the smaller."""
     able = [certified for certified in compared.certified if certified.folds > FOLDS // 2]
     return list({(rule.mean_s, rule.wrong): rule for rule in reversed(able)}.values())[::-1]
 
 
 def section(measured: Measured) -> Section:
-    """The answer for each task, and the picture."""
+    """The accuracy of each task after each time, as tables, a picture and a slider."""
     return Section(
-        "The answer",
+        "Accuracy after each time",
         tables=[Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y],
         figures=[drawn(measured)],
         widget=slider(measured.points),
@@ -66,48 +66,47 @@ def section(measured: Measured) -> Section:
 
 
 def early(measured: Measured) -> Section:
-    """Deciding early in every task, beside waiting for the full window."""
+    """Early decisions of each task, compared with waiting for the full window."""
     board, count = measured.board, len(measured.points)
     decision_us = sum(board.stages_us[stage][0] for stage in ("features", "decision"))
     rows: list[Row] = [
         {
             "task": task,
-            "asked error %": percent(rule.asked),
+            "requested error %": percent(rule.asked),
             "right %": percent(1.0 - rule.wrong),
             "mean time s": round(rule.mean_s, 3),
-            "points beside waiting": points(rule.gain),
-            "names nothing %": percent(rule.unknown),
+            "points over waiting": points(rule.gain),
+            "no label %": percent(rule.unknown),
             "decided early %": percent(rule.early),
             "certified in folds": f"{rule.folds} of {FOLDS}",
             "contacts": len(rule.right),
         }
         for task, compared in measured.comparisons.items()
         for rule in compared.certified
-        if rule.folds
     ]
-    off = (f"{t} {100 * c.calibration_error:.1f}" for t, c in measured.comparisons.items())
+    gaps = (f"{t} {100 * c.calibration_error:.1f}" for t, c in measured.comparisons.items())
     return Section(
-        "As soon as it is sure",
+        "Early decisions",
         [
-            f"Each of {FOLDS} folds is held out once; the others choose, train and calibrate. An "
-            "error rate is certified where the calibration trials show, with 90 % confidence, that "
-            "decisions are wrong at most this often. A contact unlike all trained ones waits for "
-            f"the full window. No {finest(measured.y)} is named for it, which counts as wrong. "
-            "Rates that no fold certifies have no row. Some rates are certified in some folds "
-            "only, so their rows are of fewer contacts.",
-            f"Each decision point is one run of the same graph, {decision_us:.0f} us of features "
-            f"and decision on {board.name}. All {count} together take "
-            f"{1e-3 * count * decision_us:.1f} ms of arithmetic for a contact, while the program "
-            "waits anyway.",
-            f"Confidences differ from the share that is right by so many points on average: "
-            f"{', '.join(off)}.",
+            "With a requested error rate, the model decides as soon as it is sure enough. Each of "
+            f"{FOLDS} folds tests this once, with a model that was chosen, trained and calibrated "
+            "on the other folds. Error rates that no fold certifies have no row; those that only "
+            "some folds certify are tested on fewer contacts.",
+            "A contact unlike all trained ones waits for the full window. It gets no label of the "
+            f"task {finest(measured.y)}, which counts as wrong.",
+            f"The model runs once at each decision point, which takes {decision_us:.0f} us of "
+            f"features and decision on {board.name}. All {count} decision points together take "
+            f"{1e-3 * count * decision_us:.1f} ms for a contact, while the program waits for the "
+            "contact to unfold.",
+            "The confidence differs from the share of right decisions by this many percentage "
+            f"points on average: {', '.join(gaps)}.",
         ],
-        [Table("early", "Asked for an error rate", rows, narrow=4)],
+        [Table("early", "Decisions with a requested error rate", rows, narrow=4)],
     )
 
 
 def prices(measured: Measured) -> Section:
-    """The window that costs least, by the price of a wrong decision and of a second's wait."""
+    """The cheapest window, by the price of a wrong decision and of waiting for a second."""
     rows: list[Row] = []
     for task in measured.y:
         paid = {
@@ -123,71 +122,71 @@ def prices(measured: Measured) -> Section:
     return Section(
         "The price of a wrong decision",
         [
-            f"A wrong decision costs {measured.wrong:g} here, and a second {measured.second:g}. "
-            'Your own prices give other windows: `make tradeoff TRADEOFF="--cost '
-            'wrong=10,second=1"`. The best of several windows looks a little better than it is.'
+            "Waiting makes errors rarer, and costs time. In this table a wrong decision costs "
+            f"{measured.wrong:g}, and waiting for a second costs {measured.second:g}. Give your "
+            'own prices with `make tradeoff TRADEOFF="--cost wrong=10,second=1"`. The best of '
+            "several windows looks a little better than it is, because chance helped to choose it."
         ],
-        [Table("price", "The window at which a decision costs least on average", rows)],
+        [Table("price", "The window with the lowest mean price of a decision", rows)],
     )
 
 
 def reasons(measured: Measured) -> Section:
-    """Where the time goes, the physics behind it, and the commands."""
+    """The physical reason for the time, and the commands that export the models."""
     notes = [
-        f"Nearly all of the time is waiting. The last frame takes {1e3 * measured.wire_s:.1f} ms "
-        f"over the wire, and the arithmetic of a decision {1e3 * measured.board.arithmetic_s:.2f} "
-        f"ms on {measured.board.name}."
+        "Nearly all of the time is spent waiting for the contact to unfold. The last frame takes "
+        f"{1e3 * measured.wire_s:.1f} ms over the wire, and the arithmetic of a decision takes "
+        f"{1e3 * measured.board.arithmetic_s:.2f} ms on {measured.board.name}."
     ]
     slow = sorted(measured.breakaways.items(), key=lambda item: -item[1])
     if slow:
         notes.append(
-            "Physics sets the wait: until the arm pushes harder than friction holds, an object "
-            "that can move stands still and looks like one that cannot. The table gives that time, "
-            "mu_s m g / (k v), at the middle of each object's friction and mass."
+            "Physics sets a lower limit. A movable object stands still, and cannot be told from a "
+            "fixed one, until the arm pushes harder than static friction holds. The table gives "
+            "this time, mu_s m g / (k v), for the middle of each object's friction and mass."
         )
     notes += [
-        "Every accuracy is that of the quick choice, `make export EXPORT=--quick`, made again at "
-        "each window. `make export FRONT=fast`, `FRONT=balanced` (a window of at most 0.9 s) or "
-        "`FRONT=accurate` exports the very model whose accuracy stands here, `FRONT=500` the most "
-        "accurate one within 500 ms, and `FRONT=0.8` the fastest one that reaches 80 %.",
-        f"Early decisions are those of `{EARLY}`. With it `edge-classify run --error 0.1` decides "
-        "as soon as it is sure that at most one decision in ten is wrong. It refuses an error rate "
-        "that the trials cannot certify, and names the smallest one that they can. Leave a margin "
-        "above that. Early decisions were not measured on objects never met.",
+        "All accuracies belong to the quick choice, `make export EXPORT=--quick`, made at each "
+        "window. To export one of the measured models, use `make export FRONT=fast`, "
+        "`FRONT=balanced` (a window of at most 0.9 s) or `FRONT=accurate`. `FRONT=500` exports the "
+        "most accurate one within 500 ms, and `FRONT=0.8` the fastest one that reaches 80 %.",
+        f"For early decisions, export a model with `{EARLY}`. With this model, `edge-classify run "
+        "--error 0.1` decides as soon as it may while at most one decision in ten is wrong. It "
+        "refuses an error rate that the trials cannot certify, and names the smallest rate that "
+        "they can. Leave a margin above that rate. Early decisions were not measured on objects "
+        "never met.",
     ]
     rows: list[Row] = [{"object": name, "time until it moves s": round(at, 2)} for name, at in slow]
-    table = Table("breakaway", "When each object that can move does", rows)
-    return Section("Why, and how to have it", notes, [table])
-
-
-def glossary(measured: Measured) -> Section:
-    """The words of the report."""
-    return Section("Words", terms=GLOSSARY)
+    table = Table("breakaway", "Time until each movable object moves", rows)
+    return Section("Reasons and commands", notes, [table])
 
 
 GLOSSARY = {
-    "accuracy": "The share of held-out contacts whose label is right. A held-out contact took no "
-    "part in fitting the model, nor in choosing its features, projection or number of neighbours "
-    "(nested cross-validation).",
-    "from, to": "The 95 % interval of the exported model's accuracy on other contacts: Wilson's "
-    "binomial interval of half as many contacts, as that model differs from those of the folds. "
-    "`make risk` counts how often it holds. For early decisions it counts the contacts of those "
-    "folds alone that certified the error rate.",
-    "points": "Percents of the decisions that become right, less those that become wrong, on the "
-    "same held-out contacts. In brackets stands the 95 % interval of this paired difference.",
-    "objects never met": "Accuracy where all trials of an object are held out together.",
+    "accuracy": "The share of held-out contacts that get the right label. A held-out contact takes "
+    "no part in fitting the model, nor in choosing its features, projection and number of "
+    "neighbours (nested cross-validation).",
+    "from, to": "The 95 % interval for the exported model's accuracy on other contacts. It is "
+    "Wilson's binomial interval for half as many contacts, because the exported model differs from "
+    "those that were tested. `make risk` counts how often it holds. For early decisions, only the "
+    "contacts of the folds that certified the error rate count.",
+    "points": "The percentage of decisions that become right less the percentage that become "
+    "wrong, on the same held-out contacts. The brackets hold the 95 % interval of this paired "
+    "difference.",
+    "objects never met": "The accuracy if all trials of an object are held out together.",
     "confidence": "The calibrated probability that the label is right.",
-    "certified": "Shown by the exact binomial test on calibration trials, with 90 % confidence: "
-    "decisions on contacts like the trained ones are wrong at most this often (learn-then-test).",
+    "certified": "An error rate is certified if an exact binomial test on calibration trials "
+    "shows, with 90 % confidence, that decisions on contacts like the trained ones are wrong at "
+    "most this often (learn-then-test).",
     "onset": "The first frame of a contact.",
-    "window": "The time from onset that a decision looks at.",
-    "wire": "On average half a frame's period until the next frame, and that frame's time on I2C.",
-    "arithmetic": "Tracking the last frame, computing the features, and deciding.",
+    "window": "The time from onset that a decision is based on.",
+    "wire": "The time until the last frame has been read: on average half a frame's period until "
+    "it begins, and its time on I2C.",
+    "arithmetic": "The time to track the last frame, compute the features, and decide.",
 }
 
 
 def drawn(measured: Measured) -> Figure:
-    """Accuracy against time, a panel a task; below, where the time goes."""
+    """The picture: accuracy against time in a panel for each task, and the parts of the time."""
     compared, m = measured.comparisons, len(measured.comparisons)
     wide = m if m <= ACROSS else -(-m // 2)
     heights = 3.0 * -(-m // wide) + 2.2, 2.6 * m + 2.2
@@ -206,12 +205,12 @@ def drawn(measured: Measured) -> Figure:
         legend(upper, fullest, 2 if phone else 3)
         _split(lower, measured)
 
-    title = "Accuracy against time to decision, a panel a task; below, where the time goes"
+    title = "Accuracy against the time of the decision, for each task; below, the parts of the time"
     return picture("tradeoff", title, draw, heights, max(PHONE * wide, PHONE + 2.0))
 
 
 def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measured) -> None:
-    """Draw a task's accuracy after fixed windows, and as soon as it is sure."""
+    """Draw a task's accuracy after fixed windows and with early decisions."""
     results, after_s = measured.results(task), measured.after_s
     chance = 100 * majority(measured.y[task]).accuracy
     axes.axhline(chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label")
@@ -222,16 +221,16 @@ def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measure
         share, arms = spread([rule.result for rule in rules])
         axes.errorbar(
             [rule.mean_s + after_s for rule in rules], share, arms, color=colour, marker=marker,
-            ls=dashes, ms=4, elinewidth=0.8, label="as soon as sure (mean time)",
+            ls=dashes, ms=4, elinewidth=0.8, label="early decision, mean time",
         )  # fmt: skip
-    named = [f"{100 * results[w].accuracy:.0f} % after {w:g} s" for w in TITLED_S if w in results]
+    named = [f"{100 * results[w].accuracy:.0f} % after {w:g} s" for w in TITLE_S if w in results]
     axes.set(xlim=(0, compared.decision_points_s[-1] + 0.08), ylim=(0, 103))
     axes.set(yticks=range(0, 101, 20), xlabel="seconds from first contact")
     axes.set_title(f"{task}: {', '.join(named)}", fontsize="medium")
 
 
 def _split(figure: Any, measured: Measured) -> None:
-    """Draw the time of a decision after the full window, and its end magnified."""
+    """Draw the parts of the time until a decision after the full window, and the end magnified."""
     window, after_ms = max(measured.points), 1e3 * measured.after_s
     wire_ms, arithmetic_ms = 1e3 * measured.wire_s, 1e3 * measured.board.arithmetic_s
     stages = [

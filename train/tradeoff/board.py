@@ -1,4 +1,4 @@
-"""board.json of `edge-classify bench`: what arithmetic costs on a machine."""
+"""The time and memory that a decision takes on a machine, read from its board.json."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from train.report.section import Section, Table
 
 STAGES = ("track", "features", "decision")
 INSTRUCTIONS = {"a frame in contact": 219_768, "the frame that decides": 1_708_087}
-"""On aarch64, for the model of `edge-classify demo`, counted by `make board-test`."""
+"""Instructions on aarch64 for the model of `edge-classify demo`, counted by `make board-test`."""
 ESTIMATED = {"Raspberry Pi Zero 2 W": 1.0, "Raspberry Pi 4": 1.5, "Raspberry Pi 5": 2.4}
-"""Boards by the clock of one core in GHz."""
+"""{board: clock of one core in GHz}."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Board:
         digest: SHA-256 over the recordings that the model was fitted on.
         stages_us: {stage: (median, 99th percentile) in microseconds}.
         memory_mb: the largest resident size.
-        cold_start_ms: from starting Python to a model that is ready.
+        cold_start_ms: from the start of Python until the model is ready.
         model: SHA-256 of the model file.
     """
 
@@ -38,7 +38,7 @@ class Board:
 
     @property
     def arithmetic_s(self) -> float:
-        """Seconds from the window's last frame to the decision, of the benched model."""
+        """Seconds from the window's last frame to the decision, for the measured model."""
         return sum(self.stages_us[stage][0] for stage in STAGES) / 1e6
 
 
@@ -68,7 +68,7 @@ def read(path: str | os.PathLike[str]) -> Board:
 
 
 def estimated_s(board: str, step: str = "the frame that decides") -> float:
-    """Estimate of a step's seconds on one of `ESTIMATED`, at one instruction a cycle."""
+    """Estimated seconds of a step on a board of `ESTIMATED`, at one instruction a cycle."""
     return INSTRUCTIONS[step] / (1e9 * ESTIMATED[board])
 
 
@@ -76,7 +76,10 @@ FORMAT = ("format", "decision us", "size kB", "other labels %", "other distances
 
 
 def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
-    """What each number format of a model costs and gives, by `python -m export.arithmetic`.
+    """Size, time and deviations of a model in each number format.
+
+    Args:
+        path: file that `python -m export.arithmetic` wrote.
 
     Raises:
         InputError: the file is missing or has other contents; the sentence names it.
@@ -91,7 +94,7 @@ def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
 
 
 def section(board: Board) -> Section:
-    """The figures of the board file, and estimates for boards that were not measured."""
+    """The figures in the board file, and estimates for boards that were not measured."""
     rows = [
         {"stage": name, "median us": median, "99th percentile us": p99}
         for name, (median, p99) in board.stages_us.items()
@@ -105,14 +108,17 @@ def section(board: Board) -> Section:
     return Section(
         "The board",
         [
-            f"These times are of {board.name}, by `edge-classify bench` with the model "
-            f"{board.model[:12]}. It takes {board.memory_mb:.0f} MB of memory, and "
-            f"{board.cold_start_ms:.0f} ms from starting Python to a model that is ready. The "
-            "arithmetic of a decision is the sum of the medians of track, features and decision.",
-            "No Raspberry Pi was measured. Their times are estimates: aarch64 instructions that "
-            "`make board-test` counts under an emulator, for the model of `edge-classify demo` "
-            f"with three features, at one instruction a cycle ({clocks}). `edge-classify bench` on "
-            "your board replaces them.",
+            "`edge-classify bench` measured these times with the model "
+            f"{board.model[:12]} on {board.name}. The program takes {board.memory_mb:.0f} MB of "
+            f"memory, and the model is ready {board.cold_start_ms:.0f} ms after the start of "
+            "Python. The stage `region` finds the contact in a frame; `track` does this and "
+            "measures the contact; `answer` is features and decision; `frame` and `last` are all "
+            "work for a frame in a contact, and for the frame that decides. The arithmetic of a "
+            "decision is the sum of the medians of track, features and decision.",
+            "No Raspberry Pi was measured. The times for Raspberry Pis are estimates: "
+            "`make board-test` counts the aarch64 instructions under an emulator, for the model of "
+            "`edge-classify demo` with three features, and the estimate assumes one instruction a "
+            f"cycle ({clocks}). Run `edge-classify bench` on your board for its own times.",
         ],
         [
             Table("board", "Stages", rows, timed=("median us", "99th percentile us")),
@@ -130,5 +136,5 @@ def check(board: Board, path: str, digest: str) -> None:
     if board.digest != digest:
         raise InputError(
             f"{path}: was made with a model of other recordings (digest {board.digest[:12]}, "
-            f"these have {digest[:12]}); bench the model that was exported from these"
+            f"these have {digest[:12]}); run `edge-classify bench` with a model of these"
         )

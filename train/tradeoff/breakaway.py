@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from train.simulate.arm import Kinematics
 from train.simulate.scene_model import Scene
 
 G = 9.80665
 
 
 def breakaway_times(scene: Scene) -> dict[str, float]:
-    """{object: seconds} until an object that can move does: mu_s m g / (k v).
+    """{object: seconds} until a movable object moves: mu_s m g / (k v).
 
-    A tall and narrow object tips before it slides: where its base over twice the contact's height
-    is less than mu_s, that ratio takes mu_s's place. Values are the middles of the scene's.
+    A tall and narrow object tips before it slides: if its base over twice the contact's height is
+    less than mu_s, that ratio takes the place of mu_s. All values are the middles of their ranges.
 
-    k is the arm's stiffness at the contact along its motion, v the speed of its equilibrium point
-    there; the spring between them is all that pushes. A soft cover only delays.
+    k is the arm's stiffness at the contact along its motion, and v the speed of the arm's
+    equilibrium point there; nothing else pushes than the spring between arm and equilibrium point.
+    A soft cover delays the motion further, which is left out.
     """
-    q = np.array(scene.start)
-
-    def position(q: NDArray[np.float64]) -> NDArray[np.float64]:
-        pose = scene.arm.pose(q)
-        return np.asarray(pose[:3, :3] @ [0.0, 0.0, scene.place_m] + pose[:3, 3])
-
-    step = 1e-6
-    jacobian = np.stack(
-        [(position(q + step * e) - position(q - step * e)) / (2 * step) for e in np.eye(len(q))],
-        axis=1,
-    )
+    pose = Kinematics(scene.arm).pose(np.array(scene.start)[:, None])
+    contact = pose.origin + scene.place_m * pose.rotation[2]
+    jacobian = np.cross(pose.axes, contact[:, None] - pose.origins, axis=0)[..., 0]
     velocity = jacobian @ np.array(scene.rate)
     speed = float(np.linalg.norm(velocity))
     pull = jacobian.T @ (velocity / speed)

@@ -1,4 +1,4 @@
-"""The quick choice of `make export`, made again at each window and for changed recordings."""
+"""The quick choice of `make export`, made at each window and for changed recordings."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ from train.feature_sets import expand
 from train.fitting import fit
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
-"""Windows of the report, and the decision points of its early decisions."""
+"""Windows of the report, which are also the decision points of its early decisions."""
 VARIANCE = 2.0
-"""Of the nested accuracy's difference from the exported model's on other trials, in binomial
-variances: the folds' models differ from it, and the best windows are shown. `make risk` counts."""
+"""Variance of the nested accuracy around the exported model's accuracy on other trials, in binomial
+variances. It is above 1 because the folds' models differ from the exported one, and because the
+report shows the best windows. `make risk` counts how often the interval holds."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
 
 
 @dataclass(frozen=True)
 class Promise(Result):
-    """A nested accuracy, with an interval of the exported model's accuracy on other trials."""
+    """A nested accuracy with an interval for the exported model's accuracy on other trials."""
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval: Wilson's of `VARIANCE` times fewer trials."""
+        """95 % interval: Wilson's for `VARIANCE` times fewer trials."""
         return wilson(self.right / VARIANCE, self.total / VARIANCE)
 
 
 def followed(
     raw: Recordings, features: Sequence[str] = (), *, quick: bool = True, progress: bool = False
 ) -> DataSet:
-    """The trials of some recordings, with the features of every candidate and those named."""
+    """The trials of recordings, with the features of all candidates and further ones by name."""
     drawn = kinds_of(raw.recordings) is not None
     tried = candidates({}, joints=raw.joints, drawn=drawn, quick=quick)
     sets = [name for candidate in tried for name in candidate.sets]
@@ -50,18 +51,18 @@ def followed(
 
 
 def trials_of(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
-    """The trials of these rows."""
+    """The data set with only the trials of these rows."""
     return replace(dataset, trials=tuple(dataset.trials[i] for i in rows))
 
 
 def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:
-    """Each task's choice, as `python -m export --quick --window` makes it; `given` is fixed."""
+    """Each task's choice, as `python -m export --quick --window` makes it with options `given`."""
     form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1, **given}
     return promised(fit(dataset, **form).chosen)
 
 
 def promised(choices: Mapping[str, Chosen]) -> dict[str, Chosen]:
-    """The choices, with the intervals that the report shows and `make export FRONT=` promises."""
+    """The choices with the intervals that the report shows and `make export FRONT=` promises."""
     return {
         task: replace(choice, by_trial=Promise(**vars(choice.by_trial)))
         for task, choice in choices.items()
@@ -69,5 +70,5 @@ def promised(choices: Mapping[str, Chosen]) -> dict[str, Chosen]:
 
 
 def unseen(choice: Chosen) -> Result | None:
-    """The accuracy on objects never met; None where no objects could be left out."""
+    """The accuracy on objects never met; None if no objects could be left out."""
     return None if choice.left_out == TRIAL else choice.accuracy

@@ -1,4 +1,4 @@
-"""What each thing that an owner can pay costs and gives, in one table."""
+"""The accuracy that each saving costs, in one table."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from edge.recording import Recording
 from edge.touch.features import WINDOW_S
 from train.choose import Chosen
 from train.dataset import DataSet, Recordings
-from train.evaluate import Result, stratified_folds
+from train.evaluate import stratified_folds
 from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser
@@ -23,7 +23,7 @@ from train.report.work import Workers
 from train.stopping import finest
 from train.tradeoff.board import ESTIMATED, estimated_s
 from train.tradeoff.choices import Points, chosen, followed, trials_of
-from train.tradeoff.measured import Measured, Saving
+from train.tradeoff.measured import Measured
 from train.tradeoff.wires import Wire, wires
 
 WAITS_S = (0.8, 0.6, 0.4)
@@ -32,7 +32,7 @@ EVERY = (2, 4)
 PARTS = (2, 4)
 """One n-th of the trials is kept, for each n."""
 FEWEST = 20
-"""Trials below which no choice is made."""
+"""Smallest number of trials for a choice."""
 TIME = "time on this machine"
 Hits = Mapping[tuple[Path, int], bool]
 """{(recording, number of its contact): whether the answer is right}."""
@@ -40,28 +40,26 @@ Hits = Mapping[tuple[Path, int], bool]
 
 @dataclass(frozen=True)
 class Change:
-    """One change, and the choice made with it.
+    """A change, and the options of the choice made with it.
 
     Attributes:
-        what: the change.
-        cost: what it saves or costs, other than accuracy.
-        source: the trials, or recordings that are followed again.
-        window_s: seconds from onset.
+        name: the change.
+        price: what it saves or costs other than accuracy.
+        source: the trials, or recordings to follow again.
         given: options of the choice.
         fewer: whether trials are left out on purpose; otherwise a contact that is no longer
             noticed counts as wrong.
     """
 
-    what: str
-    cost: str
+    name: str
+    price: str
     source: DataSet | Recordings
-    window_s: float = WINDOW_S
     given: Mapping[str, Any] = field(default_factory=dict)
     fewer: bool = False
 
 
 def every_nth(recording: Recording, n: int) -> Recording:
-    """The recording of a wire that carries every n-th frame only."""
+    """The recording as a wire that carries only every n-th frame would have made it."""
     joints = None if recording.joints is None else recording.joints[::n]
     valid = recording.valid
     return replace(
@@ -73,24 +71,29 @@ def every_nth(recording: Recording, n: int) -> Recording:
     )
 
 
-def changes(raw: Recordings, dataset: DataSet) -> list[Change]:
-    """Every change that is trained anew; windows are measured anyway."""
-    rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
+def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
+    """The changes for which a choice is made again; the shorter windows are measured anyway.
+
+    Args:
+        raw: the recordings.
+        dataset: their trials.
+        rate_hz: frames a second.
+    """
     # The longest first: it runs beside the others.
     cases = [
         Change("all candidates (`make export`)", "longer training", raw, given={"quick": False})
     ]
     for n in EVERY:
-        carried = [w.name for w in wires(dataset.layout) if w.every(rate) == n]
-        cost = f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
+        carried = [w.name for w in wires(dataset.layout) if w.every(rate_hz) == n]
+        price = f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
         source = replace(raw, recordings=tuple(every_nth(r, n) for r in raw.recordings))
-        cases.append(Change(f"{rate / n:.0f} frames a second", cost, source))
+        cases.append(Change(f"{rate_hz / n:.0f} frames a second", price, source))
     full = _slowest(wires(dataset.layout))
     for skin, recordings in coarser(dataset.layout, raw.recordings):
         saved = 1e3 * (full.frame_s - _slowest(wires(skin)).frame_s)
-        cost = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
-        what = counted(skin.rows * skin.cols, "taxel")
-        cases.append(Change(what, cost, replace(raw, recordings=tuple(recordings))))
+        price = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
+        name = counted(skin.rows * skin.cols, "taxel")
+        cases.append(Change(name, price, replace(raw, recordings=tuple(recordings))))
     cases.append(
         Change("the paper's features", "only 3 features", dataset, given={"features": ["paper"]})
     )
@@ -98,40 +101,40 @@ def changes(raw: Recordings, dataset: DataSet) -> list[Change]:
     for part in PARTS:
         rows = np.flatnonzero(stratified_folds(y[finest(y)], part) == 0)
         if len(rows) >= FEWEST:
-            what = f"{len(rows)} of {len(dataset.trials)} trials"
-            cost = f"{counted(len(dataset.trials) - len(rows), 'recording')} fewer"
-            cases.append(Change(what, cost, trials_of(dataset, rows), fewer=True))
+            name = f"{len(rows)} of {len(dataset.trials)} trials"
+            price = f"{counted(len(dataset.trials) - len(rows), 'recording')} fewer"
+            cases.append(Change(name, price, trials_of(dataset, rows), fewer=True))
     return cases
 
 
 def _slowest(choices: Sequence[Wire]) -> Wire:
-    """The slowest wiring, of fewest buses."""
+    """The slowest wiring of AD7147, which has the fewest buses."""
     return max((w for w in choices if w.name.startswith("AD7147")), key=lambda w: w.frame_s)
 
 
-def hits(dataset: DataSet, result: Result) -> Hits:
-    """Which trials are answered right."""
-    assert result.hits is not None
-    seen: Counter[Path] = Counter()
-    answered = {}
-    for trial, hit in zip(dataset.trials, result.hits.tolist(), strict=True):
-        answered[trial.path, seen[trial.path]] = hit
-        seen[trial.path] += 1
-    return answered
+def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
+    """{task: {(recording, number of its contact): whether the answer is right}}."""
+    contacts, numbers = [], Counter[Path]()
+    for trial in dataset.trials:
+        contacts.append((trial.path, numbers[trial.path]))
+        numbers[trial.path] += 1
+    return {
+        task: dict(zip(contacts, np.asarray(choice.by_trial.hits).tolist(), strict=True))
+        for task, choice in choices.items()
+    }
 
 
 def answered(change: Change) -> tuple[dict[str, Hits], float]:
-    """{task: the answers of the choice with a change}, and the seconds of one core it took."""
+    """{task: hits of the choice made with a change}, and the seconds of one core that it took."""
     began = time.process_time()
     source, quick = change.source, change.given.get("quick", True)
     dataset = source if isinstance(source, DataSet) else followed(source, quick=quick)
-    made = chosen(dataset, change.window_s, **change.given)
-    answers = {task: hits(dataset, choice.by_trial) for task, choice in made.items()}
-    return answers, time.process_time() - began
+    made = hits(dataset, chosen(dataset, **change.given))
+    return made, time.process_time() - began
 
 
 def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:
-    """The points gained by a change, and their 95 % interval, on the same trials."""
+    """The percentage points gained by a change on the same trials, and their 95 % interval."""
     trials = list(after if fewer else before)
     return paired(
         np.array([before[trial] for trial in trials]),
@@ -139,30 +142,31 @@ def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float,
     )
 
 
-def measure(raw: Recordings, dataset: DataSet, windows: Points, workers: Workers) -> list[Saving]:
-    """Every change beside the choice at `WINDOW_S` on the recordings as they are."""
+def measure(
+    raw: Recordings, dataset: DataSet, windows: Points, rate_hz: float, workers: Workers
+) -> list[Row]:
+    """A row for each change, beside the choice at `WINDOW_S` on the recordings as they are.
 
-    def of(tasks: Mapping[str, Chosen]) -> dict[str, Hits]:
-        return {task: hits(dataset, choice.by_trial) for task, choice in tasks.items()}
-
-    base = of(windows[WINDOW_S])
-    waits = [
-        Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset, w) for w in WAITS_S
-    ]
-    cases = changes(raw, dataset)
-    afters = [(of(windows[wait.window_s]), 0.0) for wait in waits]
+    Args:
+        raw: the recordings.
+        dataset: their trials.
+        windows: the choices at each window.
+        rate_hz: frames a second.
+        workers: the processes.
+    """
+    base = hits(dataset, windows[WINDOW_S])
+    waits = [Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset) for w in WAITS_S]
+    cases = changes(raw, dataset, rate_hz)
+    afters = [(hits(dataset, windows[w]), 0.0) for w in WAITS_S]
     afters += workers.map("costs", answered, [(case,) for case in cases])
     return [
-        Saving(
-            case.what,
-            case.cost,
-            {
-                task: difference(base[task], after[task], fewer=case.fewer)
-                for task in base
-                if task in after
-            },
-            seconds,
-        )
+        {"change": case.name, "saves or costs": case.price}
+        | {
+            f"{task}, points": points(difference(base[task], after[task], fewer=case.fewer))
+            for task in base
+            if task in after
+        }
+        | {TIME: f"{seconds:.1f} s to train" if seconds else ""}
         for case, (after, seconds) in zip([*waits, *cases], afters, strict=True)
     ]
 
@@ -170,48 +174,35 @@ def measure(raw: Recordings, dataset: DataSet, windows: Points, workers: Workers
 def section(measured: Measured) -> Section:
     """A row for each change, number format and board."""
     rows = [
-        _row(measured, saving.what, saving.cost, _training(saving.choice_s))
-        | {f"{task}, points": points(gain) for task, gain in saving.tasks.items()}
-        for saving in measured.costs
-    ]
-    rows += [
-        _row(
-            measured,
-            str(row["format"]),
-            f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the labels differ; "
-            f"{row['other distances alone %']:.0f} % of the distances depend on the batch",
-            f"{row['decision us']:.0f} us to decide",
-        )
-        for row in measured.formats
-    ]
-    rows += [
-        _row(measured, f"deciding on a {board}", f"about {1e3 * estimated_s(board):.1f} ms")
-        | dict.fromkeys((f"{task}, points" for task in measured.y), "the same bits")
-        for board in ESTIMATED
+        *measured.costs,
+        *(
+            {
+                "change": row["format"],
+                "saves or costs": f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the "
+                f"labels differ; {row['other distances alone %']:.0f} % of the distances depend on "
+                "the batch",
+                TIME: f"{row['decision us']:.0f} us to decide",
+            }
+            for row in measured.formats
+        ),
+        *(
+            {"change": f"deciding on a {board}"}
+            | {"saves or costs": f"about {1e3 * estimated_s(board):.1f} ms to decide"}
+            | dict.fromkeys((f"{task}, points" for task in measured.y), "the same bits")
+            for board in ESTIMATED
+        ),
     ]
     return Section(
-        "What each thing costs and gives",
+        "Savings, and the accuracy that they cost",
         [
-            f"Every row changes one thing of the quick choice at {WINDOW_S:g} s and chooses again, "
-            "with the features that it then takes. Points are percents of the decisions that "
-            "become right, less those that become wrong, on the same trials left out; in brackets "
-            "stands the 95 % interval of this difference. A larger taxel carries the sum of the "
-            "forces on its area.",
-            "Number formats are those of the graph that ships, by `python -m export.arithmetic` on "
-            "this machine. The labels that differ are counted on the model's golden vectors. A "
-            "distance depends on the batch where it has other bits if its vector is decided alone: "
-            "only whole numbers give the same bits in any order of summation, and so on every "
-            "machine. A board's time is an estimate, see the section on the board.",
+            f"Each row changes one thing of the quick choice at {WINDOW_S:g} s, and makes the "
+            "choice again with the features that suit the change. A larger taxel reads the sum of "
+            "the forces on its area. The last section explains points and intervals.",
+            "The rows of number formats are about the exported graph, measured with `python -m "
+            "export.arithmetic` on this machine. Labels are compared on the model's golden "
+            "vectors. A distance depends on the batch if it has other bits when its vector is "
+            "decided alone. Only whole numbers give the same bits in any order of summation, and "
+            "so on every machine. The boards' times are estimates; see the section on the board.",
         ],
-        [Table("costs", "Points of accuracy, and the price", rows, timed=(TIME,), narrow=3)],
+        [Table("costs", "Accuracy gained or lost by each change", rows, timed=(TIME,), narrow=3)],
     )
-
-
-def _training(seconds: float) -> str:
-    return f"{seconds:.1f} s to train" if seconds else ""
-
-
-def _row(measured: Measured, what: str, price: str, time: str = "") -> Row:
-    tasks = [f"{task}, points" for task in measured.y]
-    cells: Row = {"what": what, tasks[0]: "", "price": price}
-    return cells | dict.fromkeys(tasks[1:], "") | {TIME: time}

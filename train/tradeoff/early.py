@@ -1,4 +1,4 @@
-"""Deciding as soon as it is certain enough, beside fixed windows, on trials held out."""
+"""Early decisions compared with fixed windows, on held-out trials."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ BINS = 10
 
 @dataclass(frozen=True)
 class Certified:
-    """Decisions at one asked error, over the folds in which it was certified.
+    """Decisions with a requested error rate, over the folds in which it was certified.
 
     Attributes:
         asked: the error rate.
-        folds: number of the `FOLDS` folds that certified it.
-        right: (m,) whether each contact of these folds is decided right; one that names nothing,
-            as it is unlike all trained ones, is not.
-        waited: (m,) whether the same contact is decided right at the full window.
-        unknown: share of decisions that name nothing; NaN where no fold certified the error.
-        early: share of trials decided before the full window.
+        folds: number of folds, out of `FOLDS`, that certified it.
+        right: (m,) whether each contact of these folds is decided rightly. A contact unlike all
+            trained ones gets no label, which counts as wrong.
+        waited: (m,) whether the same contact is decided rightly at the full window.
+        unknown: share of decisions without a label.
+        early: share of contacts decided before the full window.
         mean_s: mean time to decision.
     """
 
@@ -55,25 +55,25 @@ class Certified:
 
     @property
     def wrong(self) -> float:
-        """Share of wrong decisions; NaN where no fold certified the error."""
-        return 1.0 - self.result.accuracy if self.folds else np.nan
+        """Share of wrong decisions."""
+        return 1.0 - self.result.accuracy
 
     @property
     def gain(self) -> tuple[float, float, float]:
-        """The points gained beside waiting for the full window, and their 95 % interval."""
+        """The points gained over waiting for the full window, and their 95 % interval."""
         return paired(self.waited, self.right)
 
 
 @dataclass(frozen=True)
 class StoppingComparison:
-    """Deciding early and waiting for a fixed window, on the same held-out trials.
+    """Early decisions and decisions after fixed windows, on the same held-out trials.
 
     Attributes:
-        decision_points_s: windows.
+        decision_points_s: the windows.
         right: (decision points, n) whether each fixed window's decision is right.
         confidence: (decision points, n) calibrated.
         unknown: (decision points, n) whether the contact is unlike all trained ones.
-        certified: one entry for each asked error.
+        certified: an entry for each requested error rate that a fold certified.
     """
 
     decision_points_s: tuple[float, ...]
@@ -84,7 +84,8 @@ class StoppingComparison:
 
     @property
     def calibration_error(self) -> float:
-        """Expected calibration error: mean gap of confidence and share right, in equal ranges."""
+        """Expected calibration error: the mean gap between confidence and share of right decisions,
+        in equal ranges of confidence."""
         confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
         ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
         gaps = np.bincount(ranges, confidence - right)
@@ -94,9 +95,15 @@ class StoppingComparison:
 def compare_stopping(
     dataset: DataSet, decision_points_s: Sequence[float], *, jobs: int = 1
 ) -> dict[str, StoppingComparison]:
-    """{task: comparison}. Folds are held out in turn; a quick export of the others answers them.
+    """{task: early decisions compared with fixed windows}.
 
-    The folds hold trials of things that the others know, so the export leaves out trials too.
+    Each fold is held out once, and a quick export of the other folds decides its trials. The other
+    folds have trials of the same objects, so the export leaves out single trials too.
+
+    Args:
+        dataset: the trials.
+        decision_points_s: the windows.
+        jobs: processes.
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
@@ -113,12 +120,9 @@ def compare_stopping(
             right[:, test], confidence[:, test] = hits[task], sure[task]
         rules = [(courses[task], model.stopping_[task]) for model, _, _, courses in held_out]
         certified = [
-            _certified(
-                error,
-                [(course, stopping.rule(error)) for course, stopping in rules],
-                decision_points_s,
-            )
+            _certified(error, allowed, decision_points_s)
             for error in ERRORS
+            if (allowed := [(c, rule) for c, stopping in rules if (rule := stopping.rule(error))])
         ]
         comparisons[task] = StoppingComparison(
             tuple(decision_points_s), right, confidence, unknown, certified
@@ -129,34 +133,30 @@ def compare_stopping(
 def _held_out(
     dataset: DataSet, test: NDArray[np.int64], decision_points_s: Sequence[float]
 ) -> tuple[Any, ...]:
-    """The model that was fitted without a fold, and what it answers to the fold (`judged`)."""
+    """The model that was fitted without a fold, and its answers to the fold's trials (`judged`)."""
     train = trials_of(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
     fitted = fit(train, quick=True, leave_out=TRIAL, decision_points_s=decision_points_s, jobs=1)
     model, others = fitted.sequential, trials_of(dataset, test)
     assert model is not None
-    names = fitted.dataset.names
-    new = np.stack([others.features(s, fitted.samples, names) for s in decision_points_s])
+    form = fitted.samples, fitted.dataset.names
+    new = np.stack([others.features(seconds, *form) for seconds in decision_points_s])
     truth = {task: others.labels(task) for task in model.choices}
     return (model, *model.judged(new, truth))
 
 
 def _certified(
     error: float,
-    folds: Sequence[tuple[Course, StoppingRule | None]],
+    folds: Sequence[tuple[Course, StoppingRule]],
     decision_points_s: Sequence[float],
 ) -> Certified:
-    """The decisions at one asked error, by the rule that each fold certified for it."""
+    """The decisions with a requested error rate, by the rule that each fold certified for it."""
     seconds = np.array(decision_points_s)
     waiting, _ = candidates(len(seconds))
     rows = []
     for course, rule in folds:
-        if rule is None:
-            continue
         (at, wrong), (_, late) = course.under(rule), course.under(waiting)
         unknown = course.unknown[at, np.arange(len(at))] & course.withheld
         rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])
-    decided, waited, *shares = (
-        map(np.concatenate, zip(*rows, strict=True)) if rows else np.empty((5, 0))
-    )
-    means = [float(share.mean()) for share in shares] if rows else [np.nan] * 3
+    decided, waited, *shares = map(np.concatenate, zip(*rows, strict=True))
+    means = [float(share.mean()) for share in shares]
     return Certified(error, len(rows), decided.astype(bool), waited.astype(bool), *means)

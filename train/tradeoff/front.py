@@ -1,4 +1,4 @@
-"""Points of `make export FRONT=`: windows, with the accuracy of the default choice at each."""
+"""The points of `make export FRONT=`: windows, with the accuracy of the quick choice at each."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ BALANCED_S = 0.9
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A window, and what the quick choice at that window reaches.
+    """A window, and the accuracy of the quick choice at that window.
 
     Attributes:
         window_s: seconds from onset that a decision waits for.
         milliseconds: from onset to decision.
-        accuracy: nested over the entire choice, trials left out; 0 to 1.
+        accuracy: nested accuracy of the entire choice on left-out trials, 0 to 1.
         low, high: 95 % interval of the exported model's accuracy.
     """
 
@@ -39,7 +39,7 @@ class ParetoFront:
     """Operating points of one task; no point beats another in both time and accuracy.
 
     Attributes:
-        task: whose accuracy it is.
+        task: the task whose accuracy the points have.
         points: the fastest first, each more accurate than those before it.
     """
 
@@ -51,8 +51,8 @@ class ParetoFront:
         """The windows that no other beats in both time and accuracy.
 
         Args:
-            points: the choices at each window, the shortest first, as `promised`.
-            task: whose accuracy counts.
+            points: the choices at each window, the shortest first, with `promised` intervals.
+            task: the task whose accuracy counts.
             after_s: seconds from the end of a window to the decision.
         """
         best: list[OperatingPoint] = []
@@ -64,7 +64,7 @@ class ParetoFront:
         return cls(task, tuple(best))
 
     def to_dict(self, digest: str) -> dict[str, Any]:
-        """The contents of the front.json of recordings with a digest."""
+        """The contents of front.json, for recordings with a digest."""
         points = [asdict(point) for point in self.points]
         return {"format": 2, "task": self.task, "data_digest": digest, "points": points}
 
@@ -74,10 +74,11 @@ class ParetoFront:
 
         Args:
             path: of the file.
-            digest: SHA-256 over the recordings that a point is wanted for.
+            digest: SHA-256 over the recordings to export a model of.
 
         Raises:
-            InputError: the file cannot be read, is not a front.json, or is of other recordings.
+            InputError: the file cannot be read, is not a front.json, or belongs to other
+                recordings.
         """
         mend = "make one with `make tradeoff`"
         with json_file(path, "a front.json", mend) as content:
@@ -96,24 +97,21 @@ class ParetoFront:
         return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)))
 
     def pick(self, wanted: str) -> OperatingPoint:
-        """The operating point that a user wishes for.
+        """The operating point that a user asks for.
 
         Args:
             wanted: `fast` (the fastest), `accurate` (the most accurate), `balanced` (the most
-                accurate of a window within `BALANCED_S`, or else the fastest), a number above 1
-                (the most accurate within so many milliseconds) or one of 0 to 1 (the fastest that
-                reaches that accuracy).
+                accurate with a window of at most `BALANCED_S`, or else the fastest), a number above
+                1 (the most accurate within so many milliseconds), or a number from 0 to 1 (the
+                fastest that reaches this accuracy).
 
         Raises:
-            InputError: `wanted` has another form, or no point is so fast or so accurate.
+            InputError: `wanted` has another form, or no point is as fast or as accurate.
         """
         first, last = self.points[0], self.points[-1]
-        if wanted == "fast":
-            return first
-        if wanted == "accurate":
-            return last
-        if wanted == "balanced":
-            return [first, *(p for p in self.points if p.window_s <= BALANCED_S)][-1]
+        balanced = [first, *(point for point in self.points if point.window_s <= BALANCED_S)][-1]
+        if wanted in NAMES:
+            return dict(zip(NAMES, (first, balanced, last), strict=True))[wanted]
         try:
             number = float(wanted)
         except ValueError:
@@ -124,15 +122,11 @@ class ParetoFront:
                 f"(0 to 1), not {wanted!r}"
             )
         if number > 1.0:
-            within = [point for point in self.points if point.milliseconds <= number]
-            if not within:
-                raise InputError(
-                    f"--front {wanted}: the fastest point takes {first.milliseconds:.0f} ms"
-                )
-            return within[-1]
-        reached = [point for point in self.points if point.accuracy >= number]
-        if not reached:
-            raise InputError(
-                f"--front {wanted}: the most accurate point reaches {last.accuracy:.3f}"
-            )
-        return reached[0]
+            able = [point for point in self.points[::-1] if point.milliseconds <= number]
+            limit = f"the fastest point takes {first.milliseconds:.0f} ms"
+        else:
+            able = [point for point in self.points if point.accuracy >= number]
+            limit = f"the most accurate point reaches {last.accuracy:.3f}"
+        if not able:
+            raise InputError(f"--front {wanted}: {limit}")
+        return able[0]

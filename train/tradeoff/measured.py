@@ -1,4 +1,4 @@
-"""The measurements that the trade-off's sections show."""
+"""The measurements that the sections of the trade-off show."""
 
 from __future__ import annotations
 
@@ -6,26 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from train.evaluate import Labels, Result
+from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.early import StoppingComparison
-
-
-@dataclass(frozen=True)
-class Saving:
-    """One change, and the accuracy that it costs.
-
-    Attributes:
-        what: the change.
-        cost: what it saves or costs, other than accuracy.
-        tasks: {task: points gained, and the ends of their 95 % interval, on the same trials}.
-        choice_s: seconds that one core took to choose and train; 0 where nothing was trained.
-    """
-
-    what: str
-    cost: str
-    tasks: Mapping[str, tuple[float, float, float]]
-    choice_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -38,10 +22,10 @@ class Measured:
         wire_s: from the end of the window until its last frame is read.
         breakaways: {object: seconds} until static friction breaks; empty without a scene.
         points: the quick choice at each window.
-        comparisons: {task: deciding early beside fixed windows}.
-        costs: changes beside the choice at the usual window.
-        wrong, second: an owner's price of a wrong decision and of a second's wait.
-        formats: what each number format costs and gives (`board.read_formats`); empty if unknown.
+        comparisons: {task: early decisions compared with fixed windows}.
+        costs: a row for each change of the choice at the usual window (`costs.measure`).
+        wrong, second: an owner's price of a wrong decision, and of waiting for a second.
+        formats: the number formats (`board.read_formats`); empty if unknown.
     """
 
     y: Labels
@@ -50,7 +34,7 @@ class Measured:
     breakaways: Mapping[str, float]
     points: Points
     comparisons: Mapping[str, StoppingComparison]
-    costs: Sequence[Saving]
+    costs: Sequence[Row]
     wrong: float = 10.0
     second: float = 1.0
     formats: Sequence[Mapping[str, str | float]] = ()
@@ -61,5 +45,5 @@ class Measured:
         return self.wire_s + self.board.arithmetic_s
 
     def results(self, task: str) -> dict[float, Result]:
-        """{window: accuracy of a task, trials left out}."""
+        """{window: accuracy of a task on left-out trials}."""
         return {window: tasks[task].by_trial for window, tasks in self.points.items()}

@@ -1,4 +1,4 @@
-"""The trade-off: recordings and a board's figures in; report and settings out."""
+"""The trade-off: its report and settings, from recordings and the figures of a board."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ SECTIONS: tuple[Callable[[Measured], Section], ...] = (
     answer.reasons,
     answer.early,
     lambda measured: boards.section(measured.board),
-    answer.glossary,
+    lambda measured: Section("Terms", terms=answer.GLOSSARY),
 )
-"""The report's sections in their order."""
+"""The report's sections, in its order."""
 FEWEST = 40
+"""Smallest number of trials."""
 
 
 def tradeoff(
@@ -48,17 +49,20 @@ def tradeoff(
     second: float = 1.0,
     formats_path: str | None = None,
 ) -> Path:
-    """Measure the quick choice at each window and with each change; write the report; its path.
+    """Measure the quick choice at each window and with each change, and write the report.
 
     Args:
         data: recordings and folders of them.
         out: folder of the report.
         board_path: board.json of a model that was fitted on these recordings.
-        scene_path: the scene that they were simulated from, for the physical limit.
+        scene_path: the scene that the recordings were simulated from, for the physical limit.
         jobs: processes.
-        main: the task of front.json; `category` where there is one.
-        wrong, second: an owner's price of a wrong decision and of a second's wait.
-        formats_path: what `python -m export.arithmetic` wrote of that model.
+        main: the task of front.json; by default `category`, or else the first.
+        wrong, second: an owner's price of a wrong decision, and of waiting for a second.
+        formats_path: the file that `python -m export.arithmetic` wrote about that model.
+
+    Returns:
+        The path of report.html.
 
     Raises:
         InputError: the data cannot be used, or a file is of another kind or of other recordings.
@@ -88,15 +92,16 @@ def tradeoff(
         breakaways={} if scene is None else breakaway_times(scene),
         points=points,
         comparisons=early.compare_stopping(dataset, WINDOWS_S, jobs=jobs),
-        costs=costs.measure(raw, dataset, points, workers),
+        costs=costs.measure(raw, dataset, points, rate, workers),
         wrong=wrong,
         second=second,
         formats=formats,
     )
-    simulated = "" if scene is None else f" that were simulated ({scene.name})"
+    simulated = "" if scene is None else f", simulated from the scene {scene.name}"
     lead = [
-        "How long must a robot wait before it knows what its arm has touched, and what does each "
-        f"answer cost? Measured on {counted(len(dataset.trials), 'contact')}{simulated}."
+        "How long must a robot wait before it knows what its arm has touched? This report measures "
+        "the accuracy after each time, and the cost of each way to save. It is based on "
+        f"{counted(len(dataset.trials), 'contact')}{simulated}."
     ]
     sections = [make(measured) for make in SECTIONS]
     report = write(out, "What accuracy costs in time", lead, sections)

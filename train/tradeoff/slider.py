@@ -1,4 +1,4 @@
-"""The first screen: one line a task, and a slider that moves the time of the decision."""
+"""The first screen: a line for each task, and a slider that sets the time of the decision."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from train.report.score import interval
 from train.tradeoff.choices import Points, unseen
 
 FIRST_S = 1.0
-"""The time that is shown first, and without a script."""
+"""The time shown at first; without a script, it stays."""
 PAGE = Template(Path(__file__).with_suffix(".html").read_text(encoding="utf-8"))
 LINE = Template(
     '<tr><td>$task</td><td class="share">$share</td><td class="interval">$interval</td>'
@@ -25,7 +25,7 @@ LINE = Template(
 def slider(points: Points) -> str:
     """The HTML of the first screen.
 
-    Without a script the curves stand still, and the lines show the accuracy after `FIRST_S`.
+    In a browser without scripts, it shows the accuracy after `FIRST_S`.
     """
     windows = list(points)
     first = min(range(len(windows)), key=lambda i: abs(windows[i] - FIRST_S))
@@ -36,7 +36,7 @@ def slider(points: Points) -> str:
         LINE.substitute(
             task=html.escape(task),
             curve=_curve({w: tasks[task].by_trial for w, tasks in points.items()}, first),
-            **dict(zip(("share", "interval", "unseen"), texts[first], strict=True)),
+            **texts[first],
         )
         for task, texts in shown.items()
     ]
@@ -50,15 +50,18 @@ def slider(points: Points) -> str:
     )
 
 
-def _texts(choice: Chosen) -> tuple[str, str, str]:
-    """Accuracy, interval, and accuracy on objects never met."""
+def _texts(choice: Chosen) -> dict[str, str]:
+    """{class in the page: accuracy, its interval, or accuracy on objects never met, as text}."""
     unmet, result = unseen(choice), choice.by_trial
-    share = "" if unmet is None else f"{100 * unmet.accuracy:.0f} %"
-    return f"{100 * result.accuracy:.0f} %", f"({interval(result)})", share
+    return {
+        "share": f"{100 * result.accuracy:.0f} %",
+        "interval": f"({interval(result)})",
+        "unseen": "" if unmet is None else f"{100 * unmet.accuracy:.0f} %",
+    }
 
 
 def _curve(results: Mapping[float, Result], first: int) -> str:
-    """A task's accuracy against time, with its band and a line at the time that is shown."""
+    """An SVG of a task's accuracy against time, with its interval and a line at the time shown."""
     x = [100 * window / max(results) for window in results]
 
     def points(heights: list[float], x: list[float] = x) -> str:

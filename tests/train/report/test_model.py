@@ -1,4 +1,4 @@
-"""The report of an export: what left-out trials were answered, and why the wrong ones were."""
+"""The report of an export: the answers to left-out trials, and the reasons for wrong ones."""
 
 import csv
 from dataclasses import replace
@@ -39,28 +39,28 @@ def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     fitted, page = written
     result = fitted.chosen["category"].accuracy
     answers = report.answers_of(fitted)["category"]
-    assert ((answers.said[-1] == answers.truth) == result.hits).all()
+    assert ((answers.answers[-1] == answers.truth) == result.hits).all()
     rows = table(page, "recall_category")
-    # The touch that was missed is rigid, and counts as told wrong.
+    # The touch that was missed is rigid, and counts as answered wrongly.
     assert [(row["category"], row["trials"]) for row in rows] == [
         ("rigid-fixed", "7"),
         ("soft-fixed", "9"),
     ]
     right = sum(float(row["recall %"]) * int(row["trials"]) / 100.0 for row in rows)
     assert right == pytest.approx(result.right, abs=0.01)
-    assert f"{100 * result.accuracy:.1f} %" in page.read_text()
-    assert "1 recording without a contact among them" in page.read_text()
+    assert f"{result.accuracy:.1%} of 16 trials are classified correctly" in page.read_text()
+    assert "The trials include 1 recording without a contact." in page.read_text()
 
 
-def test_trials_told_wrong_are_named_with_what_told_them(written):
+def test_a_wrong_answer_is_named_with_its_nearest_trial_and_its_strongest_pull(written):
     fitted, page = written
     rows = {row["trial"]: row for row in table(page, "wrong")}
     assert len(rows) == (~fitted.chosen["category"].accuracy.hits).sum()
     row = rows["hard_3"]
-    assert (row["label"], row["said"]) == ("soft-fixed", "rigid-fixed")
+    assert (row["label"], row["answer"]) == ("soft-fixed", "rigid-fixed")
     assert row["nearest trial"].startswith("hard_")
-    assert float(row["distance"]) < float(row["distance of its label"])
-    assert row["pulled by"] in ("max_force", "contact_area", "contact_motion")
+    assert float(row["distance"]) < float(row["distance to its label"])
+    assert row["strongest pull"] in ("max_force", "contact_area", "contact_motion")
     assert (page.parent / "wrong_category.png").read_bytes()[:4] == b"\x89PNG"
 
 
@@ -73,7 +73,7 @@ def test_features_learning_curve_and_prices_have_their_tables(written):
     hits = fitted.chosen["category"].accuracy.hits
     assert float(learning[-1]["category %"]) == pytest.approx(100 * hits.mean(), abs=0.01)
     assert [row["features"] for row in table(page, "candidates")] == ["paper"]
-    assert float(table(page, "candidates_timings")[0]["us a decision"]) > 0.0
+    assert float(table(page, "candidates_timings")[0]["us per decision"]) > 0.0
 
 
 def test_the_page_stands_alone(written):

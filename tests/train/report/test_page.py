@@ -54,7 +54,7 @@ def test_what_a_clock_measured_stands_in_a_file_of_its_own():
 
 def test_the_page_holds_its_pictures_and_no_table_without_rows(tmp_path):
     tables = [table(), Table("empty", "Nothing", [])]
-    sections = [Section("One", figures=[Figure("plot", "A plot", b"\x89PNG")], tables=tables)]
+    sections = [Section("One", figures=[Figure("plot", "A plot", b"\x89PNG", b"")], tables=tables)]
     report = write(tmp_path, "Title", [], sections)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["plot.png", "report.html", "speed.csv"]
     text = report.read_text()

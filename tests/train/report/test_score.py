@@ -62,7 +62,7 @@ def test_nested_accuracy_of_clear_classes_is_one():
     rng = np.random.default_rng(0)
     y = np.repeat(["a", "b", "c"], 20)
     X = rng.normal(size=(60, 30)) + 20.0 * (y == "a")[:, None] - 20.0 * (y == "b")[:, None]
-    result = nested(X, {"t": y}, SearchGrid("IV"), ONE, folds=stratified_folds(y))["t"]
+    result = nested(X, {"t": y}, stratified_folds(y), grid=SearchGrid("IV"), features=ONE)["t"]
     assert (result.right, result.total, result.components, result.k) == (60, 60, 1, 1)
 
 

@@ -26,8 +26,16 @@ def fitted(recordings):
 
 def test_a_row_a_candidate_says_what_it_gives_and_costs(fitted):
     lines = summary(fitted, [(162.04, 31.46)] * len(fitted.candidates)).splitlines()
-    assert lines[0].split() == ["features", "how", *fitted.chosen, "us", "a", "decision", "kB"]
-    assert lines[1].startswith("paper     pca  ")
+    assert lines[0].split() == [
+        "features",
+        "projection",
+        *fitted.chosen,
+        "us",
+        "per",
+        "decision",
+        "kB",
+    ]
+    assert lines[1].startswith("paper     pca         ")
     assert lines[1].split()[-2:] == ["162.0", "31.5"]
     assert len(lines[0]) == len(lines[1])
     assert lines[1].count("*") == len(fitted.chosen)
@@ -40,10 +48,10 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
     paths = [str(recordings), str(tmp_path)]
     fitted = train.fit(paths, features=["paper"], projection="pca", window_s=9.0, jobs=1)
     text = "\n".join(warnings(fitted))
-    assert "warning: without a contact above 150 counts, and counted as wrong: " in text
+    assert "warning: no contact above 150 counts, so counted as wrong: " in text
     assert "python -m train thresholds" in text
     assert "recordings are left out for lack of a label for object: " in text
-    assert "the window of 9 s is longer than any recording goes on after its onset" in text
+    assert "the window of 9 s is too long: every recording ends within 1.59 s of the onset" in text
 
 
 def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings, tmp_path):
@@ -93,7 +101,7 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recording
     classifier.fit(outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen})
     said = [line for line in warnings(replace(fitted, classifier=classifier)) if "steps" in line]
     assert len(said) == len(fitted.chosen)
-    assert f"since {fitted.dataset.trials[7].path} lies far outside all others" in said[0]
+    assert f"because {fitted.dataset.trials[7].path} lies far outside all others" in said[0]
 
 
 @pytest.mark.parametrize(

@@ -42,12 +42,12 @@ def test_predictions_are_counted_without_the_numbers_that_a_scene_was_fitted_to(
     ours = {(e.table, e.setting, e.task): 100.0 for e in entries()}
     ours |= {(e.table, e.setting, e.task): e.percent for e in headlines}
     section = comparison([ours], 140)
-    assert section.text[0].startswith("8 of 46 numbers lie within")
-    assert "Of the other 38, 0 lie within" in section.text[0]
+    assert "agrees with 8 of them" in section.text[0]
+    assert "Of the other 38, 0 agree." in section.text[1]
     assert sum(row["headline"] == "yes" for row in section.tables[0].rows) == 8
 
 
-def test_a_perfect_copy_differs_by_the_chance_of_both_samples():
+def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
     """Of pairs of samples of one accuracy one in twenty lies outside."""
     rng = np.random.default_rng(0)
     paper, ours = rng.binomial(140, 0.8, (2, 2000)) / 1.4
@@ -68,7 +68,7 @@ def test_an_order_stands_beside_the_data_sets_that_have_it_and_its_chance():
     assert len(ranks) == 8
     assert {row["rank correlation"] for row in ranks} == {1.0}
     assert {row["positive in data sets"] for row in ranks} == {"2 of 3"}
-    below = {(row["table"], row["task"]): row["perfect copies below zero %"] for row in ranks}
+    below = {(row["table"], row["task"]): row["negative by chance %"] for row in ranks}
     # Mobility is within 6 points in Table II, category within 21.
     assert below["II", "mobility"] > 5.0 > 0.1 >= below["II", "category"]
     (backwards, *_) = comparison([against], 140).tables[1].rows
@@ -78,7 +78,7 @@ def test_an_order_stands_beside_the_data_sets_that_have_it_and_its_chance():
     assert 40.0 < negative_by_chance([80.0] * 6, 1120) < 50.0
 
 
-def test_what_a_wrong_object_says_of_the_category():
+def test_the_category_is_judged_on_the_trials_with_a_wrong_object():
     numbers = {
         ("I", "1", "category"): 70.0,
         ("I", "1", "object"): 60.0,
@@ -129,16 +129,15 @@ def test_easy_touches_are_recognised_and_the_findings_come_first(studied):
     assert max(float(r["accuracy %"]) for r in compared if r["task"] == "category") == 100.0
 
 
-def test_the_findings_name_no_best_method_below_the_papers_way():
+def test_the_findings_name_no_best_method_below_the_papers():
     """Whatever is better on trials, accuracy on objects never met stands beside it."""
     known = {methods.PAPER: {"softness": Result(49, 50)}, "b": {"softness": Result(47, 50)}}
     unseen = {methods.PAPER: {"softness": Result(41, 50)}, "b": {"softness": Result(42, 50)}}
-    said = methods.sentence("softness", known, unseen)
-    assert "98 % (90 to 100, and 82 % for objects never met). No method here does better" in said
+    text = methods.sentence("softness", known, unseen)
+    assert "98 % of the contacts right (90 to 100; 82 % with objects never met). No method" in text
     known["b"]["softness"] = Result(50, 50)
-    assert "The best is b: 100 % (93 to 100, and 84 %" in methods.sentence(
-        "softness", known, unseen
-    )
+    text = methods.sentence("softness", known, unseen)
+    assert "The best is b: 100 % of the contacts right (93 to 100; 84 %" in text
 
 
 def test_in_a_browser_nothing_overflows_or_is_missing(studied):

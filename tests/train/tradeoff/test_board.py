@@ -20,8 +20,8 @@ def test_number_formats_are_rows_beside_the_other_costs():
     table = costs.section(SimpleNamespace(y={"t": None}, costs=[], formats=[ROW])).tables[0]
 
     first, *boards = table.rows
-    assert first["what"] == "float32"
-    assert first["price"] == (
+    assert first["change"] == "float32"
+    assert first["saves or costs"] == (
         "10 kB; 0.5 % of the labels differ; 2 % of the distances depend on the batch"
     )
     assert first[costs.TIME] == "20 us to decide"

@@ -50,7 +50,7 @@ def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
         text = browser.find_element("css selector", ".slider").text
         browser.find_element("css selector", "button").click()
         copied = browser.execute_script("return getSelection().toString()")
-    assert "Wait 0.4 s" in text
+    assert "After waiting 0.4 s" in text
     assert "60 %" in text
     assert "--window 0.4" in text
     assert copied == "make export EXPORT='--quick --window 0.4'"

@@ -32,7 +32,7 @@ from train.tradeoff.choices import chosen as make_choice
 from train.tradeoff.choices import followed, promised, unseen
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import tradeoff
-from train.tradeoff.wires import count, spread, wires
+from train.tradeoff.wires import spread, wire, wires
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 
@@ -40,27 +40,27 @@ SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 class TestWires:
     def test_cody_s_chips_over_three_buses_cost_what_the_shipped_file_costs(self):
         file = skinfile.load(skinfile.shipped("cody"))
-        ours = count("ours", spread(file.layout, 3))
-        shipped = count("shipped", file)
+        ours = wire("ours", spread(file.layout, 3))
+        shipped = wire("shipped", file)
         assert ours.frame_s == pytest.approx(shipped.frame_s, rel=0.1)
 
     def test_more_buses_share_the_same_bits(self, forearm):
-        one, two, three = (count("w", spread(forearm, n)) for n in (1, 2, 3))
+        one, two, three = (wire("w", spread(forearm, n)) for n in (1, 2, 3))
         assert one.frame_s == pytest.approx(2 * two.frame_s, rel=0.02)
         assert one.every(100.0) == 3
         assert three.every(100.0) == 1
 
     def test_a_single_taxel_is_one_chip_on_one_bus(self):
-        names = [wire.name for wire in wires(SkinLayout(rows=1, cols=1, wraps=False))]
-        assert names == ["AD7147, 1 bus at 400 kHz", "microcontroller, 1 bus at 1 MHz"]
+        names = [choice.name for choice in wires(SkinLayout(rows=1, cols=1, wraps=False))]
+        assert names == ["AD7147, 1 bus at 400 kHz", "microcontroller, 1 bus at 1000 kHz"]
 
     def test_a_skin_is_wired_with_every_chip_that_serves_it(self, forearm):
-        assert [wire.name.split(",")[0] for wire in wires(forearm)] == [
+        assert [choice.name.split(",")[0] for choice in wires(forearm)] == [
             *["AD7147"] * 3,
             "microcontroller",
         ]
         quarter = SkinLayout(rows=8, cols=12, wraps=True)
-        assert "MPR121" in {wire.name.split(",")[0] for wire in wires(quarter)}
+        assert "MPR121" in {choice.name.split(",")[0] for choice in wires(quarter)}
 
 
 def chosen(hits, left_out="trial"):
@@ -147,13 +147,13 @@ class TestCosts:
 
     def test_every_change_is_measured_on_its_own_recordings(self, recordings):
         raw = read([recordings])
-        cases = {case.what: case for case in costs.changes(raw, followed(raw))}
+        cases = {case.name: case for case in costs.changes(raw, followed(raw), 100.0)}
         assert list(cases) == [
             "all candidates (`make export`)", "50 frames a second", "25 frames a second",
             "96 taxels", "24 taxels", "6 taxels", "1 taxel", "the paper's features",
         ]  # fmt: skip
         assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
-        assert cases["50 frames a second"].cost == "AD7147, 2 buses at 400 kHz are enough"
+        assert cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"
 
 
 def test_prices_are_two_numbers():
@@ -207,8 +207,7 @@ class TestEarly:
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
         course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
-        folds = [(course, None), (course, rule)]
-        decisions = early._certified(0.1, folds, (0.6, 1.2))
+        decisions = early._certified(0.1, [(course, rule)], (0.6, 1.2))
         assert (decisions.folds, decisions.result.right, decisions.result.total) == (1, 3, 4)
         # At the full window one more is right and one names nothing.
         assert decisions.gain[0] == 0.0
@@ -220,6 +219,8 @@ class TestEarly:
         assert compared.right.all()
         rule = next(certified for certified in compared.certified if certified.asked == 0.15)
         assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
+        # Forty trials certify no rate as low as the smallest one.
+        assert min(certified.asked for certified in compared.certified) > early.ERRORS[0]
 
     def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
@@ -287,14 +288,14 @@ def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     report = tradeoff([data], out, str(path), scene_path=str(SCENE))
     text = report.read_text()
     assert "http" not in text
-    assert "62 MB of memory, and 812 ms from starting Python" in text
+    assert "62 MB of memory, and the model is ready 812 ms after the start of Python" in text
     assert not browser.available() or browser.faults(report) == []
     assert (out / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
     saved = {
-        row["what"]: row for row in csv.DictReader((out / "costs.csv").read_text().splitlines())
+        row["change"]: row for row in csv.DictReader((out / "costs.csv").read_text().splitlines())
     }
     assert saved["waiting 0.4 s"]["category, points"].startswith("+0 (-")
-    assert saved["28 of 28 trials"]["price"] == "0 recordings fewer"
+    assert saved["28 of 28 trials"]["saves or costs"] == "0 recordings fewer"
     best = ParetoFront.read(out / "front.json", digest)
     assert best.task == "category"
     assert best.points[-1].accuracy > 0.9
