@@ -194,13 +194,14 @@ class Classifier:
         """Decide on a recording as the board would have; this classifier's own state stays.
 
         Args:
-            recording: of a skin like the model's; its own scale is taken into account.
+            recording: of a skin like the model's; its own scale is taken into account, and so is
+                the order of its joints.
 
         Raises:
             InputError: the recording does not suit the model.
         """
         if not (self._motion_on_skin and recording.joints is None):
-            require_joints(self.model, recording.dof, "the recording")
+            recording = suited(self.model, recording, "the recording")
         yield from self._afresh(recording.layout, recording)
 
     def watch(
@@ -346,6 +347,18 @@ class Classifier:
 def _flags(doubts: Mapping[str, bool]) -> tuple[str, ...]:
     """The names of the doubts that hold."""
     return tuple(flag for flag, holds in doubts.items() if holds)
+
+
+def suited(model: Model, recording: Recording, name: str) -> Recording:
+    """The recording with the joint angles that the model needs.
+
+    Raises:
+        InputError: it lacks them; the message begins with `name`.
+    """
+    if model.info.chain is not None:
+        recording = recording.for_joints(model.info.chain.names, name)
+    require_joints(model, recording.dof, name)
+    return recording
 
 
 def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:

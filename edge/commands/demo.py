@@ -66,4 +66,4 @@ def picture(recording: Recording) -> str:
     strongest = int(recording.frames.sum(axis=(1, 2), dtype=np.int64).argmax())
     full = int(recording.frames.max())
     colour, _ = terminal.skin_colours(list(recording)[strongest], layout, full)
-    return terminal.picture(colour, wide=2)
+    return terminal.picture(colour)

@@ -17,7 +17,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from edge.runtime.event_writer import Lines
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
+
+if TYPE_CHECKING:
+    from edge.runtime.page import Page
 
 LOG = logging.getLogger(__name__)
 
@@ -158,12 +161,13 @@ def run(arguments: argparse.Namespace) -> int:
     labels: dict[str, str] = {}
     for task, label in arguments.label:
         labels.setdefault(task, label)
+    folder = None if arguments.out.endswith(".npz") else Path(arguments.out)
     by_key = terminal.is_interactive() and arguments.web is None
-    if not labels and arguments.web is None:
+    # Only the page of a folder takes labels.
+    if not labels and (arguments.web is None or folder is None):
         raise InputError("give --label TASK=LABEL; a trial without a label teaches nothing")
     if len(labels) < len(arguments.label) and not by_key:
         raise InputError("--label names a task twice; only in a terminal do keys choose the label")
-    folder = None if arguments.out.endswith(".npz") else Path(arguments.out)
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
@@ -184,7 +188,7 @@ def run(arguments: argparse.Namespace) -> int:
         names = None if arm is None else arm.names
         if arguments.joints is None and live.playback is not None:
             names = live.playback.joint_names
-        skin, page = live.skin, live.page
+        skin = live.skin
         meta = {
             "skin": skin.layout.to_dict(),
             "skin_name": skin.file.name,
@@ -193,7 +197,7 @@ def run(arguments: argparse.Namespace) -> int:
         }
         if arm is not None:
             meta["arm"] = arm.to_dict()
-        recorder = Recorder(arguments.out, labels, meta, names, lines)
+        recorder = Recorder(arguments.out, labels, meta, names, lines, live.page)
         tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
         lead_frames = round(LEAD_S / skin.period_s)
         trials = Trials(tracker, lead_frames=lead_frames, length_s=arguments.length)
@@ -203,16 +207,11 @@ def run(arguments: argparse.Namespace) -> int:
             LOG.info(f"  {digit}  {task}={label}")
         for frame, faults in live.frames():
             lines.write(faults)
-            frames = trials.push(frame)
-            if page is not None:
-                recorder.labels = page.labels
-                frames = frames if page.recording else None
-            for key in typed() if by_key else "":
+            pressed = typed()
+            for key in pressed if by_key else "":
                 recorder.press(key, choices)
             live.show(frame, faults)
-            saved = recorder.save(frames, complete=True)
-            if page is not None and saved is not None:
-                page.saved(*saved)
+            recorder.save(trials.push(frame), complete=True)
             if len(recorder.paths) == (arguments.trials if folder else 1):
                 break
         else:
@@ -220,7 +219,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not recorder.paths:
         silent = int((skin.invalid_for > 0).sum())
         where = f"; taxels without a valid value: {silent}" if silent else ""
-        LOG.warning(f"there was no contact; nothing was saved{where}")
+        LOG.warning(f"no contact was saved{where}")
     elif arguments.joints is not None and not recorder.any_joints:
         LOG.error("--joints gave no angles at the times of the frames")
         return 1
@@ -237,6 +236,7 @@ class Recorder:
         meta: further metadata of every trial.
         names: the joints' names, or None if they are unknown.
         lines: where the `saved` and `deleted` events go.
+        page: the live page, which then gives the labels and says whether to save; or None.
         paths: the trials saved so far and not deleted.
         any_joints: whether a saved frame had joint angles.
     """
@@ -246,6 +246,7 @@ class Recorder:
     meta: dict[str, Any]
     names: Sequence[str] | None
     lines: Lines
+    page: Page | None = None
     paths: list[Path] = field(default_factory=list)
     any_joints: bool = False
 
@@ -260,10 +261,12 @@ class Recorder:
             path.unlink(missing_ok=True)
             self.lines.write([{"event": "deleted", "file": str(path)}])
 
-    def save(self, frames: list[Frame] | None, *, complete: bool) -> tuple[Path, Recording] | None:
-        """Save the frames of a trial, if there is one; returns its file and the recording."""
-        if frames is None:
-            return None
+    def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
+        """Save the frames of a trial, if there is one and it is to be saved."""
+        if self.page is not None:
+            self.labels = self.page.labels
+        if frames is None or (self.page is not None and not self.page.recording):
+            return
         unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}
         if self.names is not None and unposed < len(frames):
@@ -293,4 +296,5 @@ class Recorder:
         if not complete:
             event["reason"] = "reading stopped before the contact's end"
         self.lines.write([event])
-        return path, trial
+        if self.page is not None:
+            self.page.saved(path, trial)

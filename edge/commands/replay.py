@@ -10,12 +10,12 @@ import argparse
 import logging
 from typing import Any
 
-from edge.classifier import Classifier
+from edge.classifier import Classifier, suited
 from edge.commands.options import add_error, check_error
 from edge.commands.output import Output
 from edge.commands.summary import Summary
 from edge.errors import InputError
-from edge.model.model import Model, require_joints
+from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import Recording, find, load
 from edge.touch.contact import FeatureSeries
@@ -33,18 +33,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_error(parser)
     parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
-
-
-def suited(model: Model, recording: Recording, name: str) -> Recording:
-    """The recording with the joint angles that the model needs.
-
-    Raises:
-        InputError: it lacks them; the message begins with `name`.
-    """
-    if model.info.chain is not None:
-        recording = recording.for_joints(model.info.chain.names, name)
-    require_joints(model, recording.dof, name)
-    return recording
 
 
 def contact_of(model: Model, recording: Recording, name: str) -> FeatureSeries:
@@ -71,8 +59,8 @@ def decide(
     try:
         classifier = Classifier(model, recording.layout, error=error)
         events = [event.to_dict() for event in classifier.classify(recording)]
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+    except InputError as problem:
+        raise InputError(f"{name}: {problem}") from None
     if not any(event["event"] == "onset" for event in events):
         events.append({"event": "no_contact"})
     return events

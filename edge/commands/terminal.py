@@ -10,6 +10,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,17 +39,21 @@ def skin_colours(
     """
     threshold = layout.threshold_counts
     regions = find_regions(frame.counts, threshold, valid=frame.valid, wraps=layout.wraps)
-    counts = frame.counts.astype(np.float64)
-    rest = np.log1p(np.minimum(counts, threshold)) / math.log1p(max(threshold, 1))
-    out: NDArray[np.uint8] = np.array(REST, dtype=np.uint8)[(rest * (len(REST) - 1)).astype(int)]
-    span = math.log(max(full, threshold + 2) / max(threshold, 1))
-    above = np.clip(np.log(np.maximum(counts, 1.0) / max(threshold, 1)) / span, 0.0, 1.0)
-    hot = np.array(TOUCH, dtype=np.uint8)[(above * (len(TOUCH) - 1)).astype(int)]
+    counts, floor = frame.counts.astype(np.float64), max(threshold, 1)
+    colours = _shades(REST, np.log1p(np.minimum(counts, threshold)) / math.log1p(floor))
+    span = math.log(max(full, threshold + 2) / floor)
+    touched = _shades(TOUCH, np.log(np.maximum(counts, 1.0) / floor) / span)
     for region in regions:
-        out[region.mask] = hot[region.mask]
+        colours[region.mask] = touched[region.mask]
     if frame.valid is not None:
-        out[~frame.valid] = LOST
-    return out, regions
+        colours[~frame.valid] = LOST
+    return colours, regions
+
+
+def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """A palette's colour for each share from 0 to 1; others get the colour of the nearer end."""
+    steps = np.clip(share, 0.0, 1.0) * (len(palette) - 1)
+    return np.array(palette, dtype=np.uint8)[steps.astype(int)]
 
 
 def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
@@ -60,15 +65,10 @@ def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
     """
     lines = []
     for top in range(0, len(colour), 2):
-        upper = colour[top].tolist()
-        lower = colour[top + 1].tolist() if top + 1 < len(colour) else [None] * len(upper)
-        line, previous = "", None
-        for pair in zip(upper, lower, strict=True):
-            if pair != previous:
-                background = "49" if pair[1] is None else f"48;5;{pair[1]}"
-                line += f"\x1b[38;5;{pair[0]};{background}m"
-                previous = pair
-            line += "▀" * wide
+        line = ""
+        for (upper, *lower), taxels in groupby(zip(*colour[top : top + 2].tolist(), strict=True)):
+            background = f"48;5;{lower[0]}" if lower else "49"
+            line += f"\x1b[38;5;{upper};{background}m" + "▀" * wide * len(list(taxels))
         lines.append(line + PLAIN)
     return "\n".join(lines)
 
@@ -76,17 +76,14 @@ def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
 def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
     """One line about the largest region and the taxels that cannot be read."""
     items = [f"{frame.t:9.2f} s"]
-    if regions:
-        region = regions[0]
+    for region in regions[:1]:
         scale = layout.counts_per_newton
         force = f"{region.peak} counts" if scale is None else f"{region.peak / scale:.2f} N"
         row, col = region.centroid
         taxels = f"{region.area} taxel{'s' * (region.area != 1)}"
         items.append(f"{force} on {taxels} at row {row:.1f}, column {col:.1f}")
-        if len(regions) > 1:
-            items.append(f"{len(regions) - 1} more")
-    else:
-        items.append("no contact")
+    if len(regions) != 1:
+        items.append(f"{len(regions) - 1} more" if regions else "no contact")
     if frame.valid is not None and not frame.valid.all():
         items.append(f"{int((~frame.valid).sum())} of {frame.valid.size} taxels cannot be read")
     return "  |  ".join(items)
@@ -101,21 +98,19 @@ def legend(columns: int) -> list[str]:
     ]
 
 
-def screen(lines: Sequence[str]) -> str:
-    """Lines from the upper left corner on; each clears the rest of its row."""
-    return HOME + "".join(f"{line}\x1b[K\n" for line in "\n".join(lines).split("\n"))
+def screen(text: str) -> str:
+    """A text from the upper left corner on; each line clears the rest of its row."""
+    return HOME + "".join(f"{line}\x1b[K\n" for line in text.split("\n"))
 
 
 @contextmanager
-def drawing(wanted: bool) -> Iterator[None]:
-    """Within the block, clear the terminal for pictures and hide its cursor, if `wanted`."""
-    if wanted:
-        print(HIDE + CLEAR, end="")
+def drawing() -> Iterator[None]:
+    """Within the block, the terminal is clear for pictures and its cursor is hidden."""
+    print(HIDE + CLEAR, end="")
     try:
         yield
     finally:
-        if wanted:
-            print(PLAIN + SHOW, end="", flush=True)
+        print(PLAIN + SHOW, end="", flush=True)
 
 
 def is_interactive() -> bool:

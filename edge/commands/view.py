@@ -12,6 +12,7 @@ import argparse
 import shutil
 import sys
 import textwrap
+from contextlib import nullcontext
 
 from edge.classifier import Classifier
 from edge.commands import terminal
@@ -36,8 +37,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_reading(parser, " (in place of the terminal)")
 
 
-def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[str]:
-    """The lines of one picture."""
+def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
+    """One picture: the skin, its caption, the decisions and the legend."""
     scale, threshold = layout.counts_per_newton, layout.threshold_counts
     full = FULL_FACTOR * max(threshold, 1) if scale is None else round(FULL_NEWTONS * scale)
     colour, regions = terminal.skin_colours(frame, layout, full)
@@ -45,11 +46,9 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> list[st
     wide = 2 if 2 * layout.cols <= columns else 1
     texts = [terminal.caption(frame, regions, layout)]
     texts += [f"{printable(task)}: {text}" for task, text in decisions.items()]
-    return [
-        terminal.picture(colour[:, :columns], wide=wide),
-        *(line for text in texts for line in textwrap.wrap(text, columns)),
-        *terminal.legend(columns),
-    ]
+    lines = [line for text in texts for line in textwrap.wrap(text, columns)]
+    picture = terminal.picture(colour[:, :columns], wide=wide)
+    return "\n".join([picture, *lines, *terminal.legend(columns)])
 
 
 def decision_text(event: Decided) -> str:
@@ -69,13 +68,13 @@ def run(arguments: argparse.Namespace) -> int:
             arguments, model=model, real_time=sys.stdout.isatty(), decides=model is not None
         ) as live,
         terminal.keys(live.stop) as typed,
-        terminal.drawing(live.page is None),
+        terminal.drawing() if live.page is None else nullcontext(),
     ):
         classifier = None if model is None else Classifier(model, live.skin.layout)
         layout = live.skin.layout if classifier is None else classifier.layout
         interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
         for frame, faults in live.frames():
-            typed()
+            typed()  # q ends the loop
             events = [] if classifier is None else classifier.push(frame)
             live.show(frame, faults, events)
             for event in events:
@@ -85,8 +84,8 @@ def run(arguments: argparse.Namespace) -> int:
                     decisions[event.task] = decision_text(event)
             if live.page is None and frame.t >= due:
                 due = frame.t + interval_s
-                text = terminal.screen(draw(frame, layout, decisions))
-                if text != shown:
-                    print(text, end="", flush=True)
-                    shown = text
+                picture = draw(frame, layout, decisions)
+                if picture != shown:
+                    print(terminal.screen(picture), end="", flush=True)
+                    shown = picture
     return 0

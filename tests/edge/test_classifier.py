@@ -55,6 +55,17 @@ def test_classify_and_watch_give_what_pushing_the_frames_gives(model, make_touch
     ]
 
 
+def test_a_recordings_joints_may_stand_in_another_order(model, make_touch):
+    def distances(recording):
+        events = Classifier(model).classify(recording)
+        return [e.decision.distances.tolist() for e in events if isinstance(e, Decided)]
+
+    recording = make_touch(seed=99)
+    named = {**recording.meta, "joint_names": list(model.info.chain.names[::-1])}
+    turned = replace(recording, joints=recording.joints[:, ::-1], meta=named)
+    assert distances(turned) == distances(recording)
+
+
 def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_recordings(
     exported, make_touch
 ):

@@ -39,7 +39,7 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     more = ("--label", "object=box", "--out", tmp_path / "trials")
     status, events, err = edge("record", *fake, *more)
     assert (status, [(e["event"], e["invalid"]) for e in events]) == (1, [("taxels", 100)])
-    assert "nothing was saved; taxels without a valid value: 100" in err
+    assert "no contact was saved; taxels without a valid value: 100" in err
 
 
 def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):

@@ -190,7 +190,7 @@ def test_record_refuses_a_file_that_exists_before_it_waits(record, tmp_path):
 def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
     status, events, err = record(fake=quiet)
     assert (status, events) == (1, [])
-    assert "there was no contact; nothing was saved" in err
+    assert "no contact was saved" in err
     assert not list((tmp_path / "trials").iterdir())
 
 
@@ -198,6 +198,7 @@ def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
     ("options", "said"),
     [
         ([], "give --label TASK=LABEL"),
+        (["--web", "127.0.0.1:0", "--out", "one.npz"], "give --label TASK=LABEL"),
         (["--label", "a=b", "--label", "a=c"], "--label names a task twice"),
         (["--label", "a=b", "--out", "a" * 300 + ".npz"], "cannot be written: File name too long"),
         (["--label", "a=b", "--out", "a" * 300], "cannot be written: File name too long"),
@@ -232,6 +233,15 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
     assert status == 0
     saved = [event for event in events if event["event"] == "saved"]
     assert {event["labels"]["object"] for event in saved} == {"from the page"}
+
+
+def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_record(
+    edge, parted, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("edge.commands.source.PacedClock", VirtualClock)
+    given = ("--web", "127.0.0.1:0", "--out", tmp_path / "trials", "--seconds", 1.0)
+    assert edge("record", "--fake", parted, *given)[:2] == (1, [])
+    assert list((tmp_path / "trials").iterdir()) == []
 
 
 def test_keys_choose_the_label_and_delete_the_last_trial(edge, parted, tmp_path, monkeypatch):

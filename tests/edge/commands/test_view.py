@@ -27,7 +27,7 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
 def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
     """Half a frame early or late, so that a clock that shifts by less does not skip one."""
     drawn = []
-    monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ["."])
+    monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ".")
     assert edge("view", "--fake", recordings / "hard_0.npz", text=True)[0] == 0
     assert [round(t - drawn[0], 2) for t in drawn] == [round(0.1 * i, 2) for i in range(18)]
 
