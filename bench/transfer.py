@@ -21,8 +21,7 @@ import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
 from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Touched, simulate
-from edge.commands.replay import decide
-from edge.commands.summary import Summary
+from edge.commands.replay import Summary, decide
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.stopping import UNKNOWN

@@ -86,12 +86,7 @@ class Decided:
         line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
             line["place"] = None if self.position is None else list(self.position)
-        line |= {
-            "task": self.task,
-            "label": self.label,
-            "confidence": self.confidence,
-            "latency_ms": self.latency_ms,
-        }
+        line |= {key: getattr(self, key) for key in ("task", "label", "confidence", "latency_ms")}
         if self.strongest is not None:
             line["strongest"] = self.strongest
         if self.stopped_by is not None:

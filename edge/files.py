@@ -160,18 +160,19 @@ def write_whole(
 
     Raises:
         NameTaken: `path` exists and `overwrite` is False.
-        InputError: the name is impossible, the folder cannot be written, or the disk is full.
+        InputError: the name is impossible or that of a folder, a FIFO or a device, the folder
+            cannot be written, or the disk is full.
     """
     target = Path(path)
     folder = target.parent
     if "\0" in target.name:
         raise InputError(f"{target}: a file's name cannot hold a null character; choose another")
-    taken = NameTaken(f"{target}: exists already; choose another name or remove it")
-    if not overwrite and target.exists():
-        raise taken
     # The target's own name may already have the greatest length that the file system allows.
     temporary = folder / f".edge-classify-{os.urandom(8).hex()}"
     try:
+        # Renamed by root, a file would take the place of /dev/null.
+        if target.exists() and not target.is_file():
+            raise InputError(f"{target}: cannot be written: it is not a regular file")
         folder.mkdir(parents=True, exist_ok=True)
         with open(temporary, "xb") as file:
             yield file
@@ -187,7 +188,7 @@ def write_whole(
     except FileExistsError as error:
         if error.filename == os.fspath(folder):
             raise InputError(f"{target}: cannot be written: {folder} is a file") from None
-        raise taken from None
+        raise NameTaken(f"{target}: exists already; choose another name or remove it") from None
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
     finally:

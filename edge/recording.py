@@ -252,17 +252,18 @@ def load_arrays(
             file = stack.enter_context(open_regular(name, LARGEST_BYTES))
         stack.enter_context(parsing(name, "a readable .npz file", "; copy or record it again"))
         archive = stack.enter_context(zipfile.ZipFile(file))
-        members = {info.filename: info for info in archive.infolist()}
-        wanted = [key for key in members if key.endswith(".npy")]
-        if keys is not None:
-            wanted = [key for key in wanted if key.removesuffix(".npy") in keys]
+        members = {
+            info.filename.removesuffix(".npy"): info
+            for info in archive.infolist()
+            if info.filename.endswith(".npy")
+        }
+        wanted = [key for key in members if keys is None or key in keys]
         if sum(members[key].file_size for key in wanted) > LARGEST_BYTES:
             raise InputError(f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it")
         arrays = {}
         for key in wanted:
             with archive.open(members[key]) as stream:
-                array = np.lib.format.read_array(stream, allow_pickle=False)
-            arrays[key.removesuffix(".npy")] = np.asarray(array)
+                arrays[key] = np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
         return arrays
 
 

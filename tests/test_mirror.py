@@ -36,7 +36,6 @@ THROUGH = {
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "train/report/work.py": "train/study/test_study_report.py",
     "edge/commands/source.py": "edge/commands/test_live_commands.py",
-    "edge/commands/summary.py": "edge/commands/test_replay_verify.py",
     "edge/config.py": "edge/skin/test_file.py",
     "train/commands/tradeoff.py": "train/tradeoff/test_tradeoff.py",
     "train/importers/mcap.py": "train/importers/test_log_importers.py",

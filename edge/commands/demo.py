@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from edge import demo
 from edge.classifier import Classifier
 from edge.commands import terminal
 from edge.commands.output import Output
-from edge.events import Decided, Event
+from edge.events import Decided
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import Recording, load
@@ -29,22 +28,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
 
 
-def events(model: Model, recording: Recording) -> Iterator[Event]:
-    """The events of `edge-classify run` for a recording on fake chips."""
-    skin, playback = play(skin_file(recording.layout), recording)
-    with skin:
-        yield from Classifier(model).watch(skin, joints=playback, lasts_s=playback.ends)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 1 if a decision differs from its recording's label."""
-    model, output = Model(demo.MODEL), Output.of(arguments)
+    classifier, output = Classifier(Model(demo.MODEL)), Output.of(arguments)
     right = []
     for path in demo.recordings():
         recording = load(path)
         if not output.as_json:
             output.text(path.stem.replace("-", " "))
-        for event in events(model, recording):
+        skin, playback = play(skin_file(recording.layout), recording)
+        with skin:
+            events = list(classifier.watch(skin, joints=playback, lasts_s=playback.ends))
+        for event in events:
             line = {"source": path.stem, **event.to_dict()}
             if isinstance(event, Decided):
                 line["expected"] = recording.labels[event.task]

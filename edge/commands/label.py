@@ -40,9 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     counts: Counter[tuple[str, str]] = Counter()
     width = max(len(str(path)) for path in paths)
     for path, meta in zip(paths, metas, strict=True):
-        recording = load(path)
         if names or labels:
-            save(path, replace(recording, meta=meta))
+            save(path, replace(load(path), meta=meta))
         current = meta.get("labels", {})
         counts.update(current.items())
         text = " ".join(f"{task}={label}" for task, label in current.items()) or "no label"

@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import argparse
 import logging
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from edge.classifier import Classifier, suited
+from edge.classifier import AS_TRAINED, Classifier, suited
 from edge.commands.options import add_error, check_error
 from edge.commands.output import Output
-from edge.commands.summary import Summary
-from edge.errors import InputError
+from edge.errors import InputError, printable
+from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.recording import Recording, find, load
+from edge.statistics import wilson
 from edge.touch.contact import FeatureSeries
 
 LOG = logging.getLogger(__name__)
+
+UNDECIDED = "(none)"
+"""The column of trials without a decision."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -92,3 +98,74 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.summary:
         output.text(summary.text())
     return 2 if failed else 0
+
+
+class Summary:
+    """Compares each recording's first decision for each task with its label."""
+
+    def __init__(self, tasks: Mapping[str, Task]) -> None:
+        self._pairs: dict[str, Counter[tuple[str, str]]] = {task: Counter() for task in tasks}
+        self.recordings = 0
+        self.as_trained = 0
+        """Recordings whose features equal those of a training trial."""
+
+    def add(self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]) -> None:
+        """Take in the events of one recording and its labels."""
+        self.recordings += 1
+        decisions = [event for event in events if event["event"] == "decision"]
+        self.as_trained += any(AS_TRAINED in decision["flags"] for decision in decisions)
+        first: dict[str, str] = {}
+        for decision in decisions:
+            first.setdefault(decision["task"], printable(decision["label"] or UNDECIDED))
+        for task in self._pairs.keys() & labels:
+            self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
+
+    @property
+    def tasks(self) -> list[str]:
+        """The tasks that are compared."""
+        return list(self._pairs)
+
+    def right(self, task: str) -> tuple[int, int]:
+        """The number of right decisions, and of labelled recordings, of a task."""
+        pairs = self._pairs[task]
+        right = sum(n for (truth, decided), n in pairs.items() if truth == decided)
+        return right, pairs.total()
+
+    def text(self) -> str:
+        """One table for each task: a row for each true label, a column for each decided one."""
+        recordings = f"{self.recordings} recording{'s' * (self.recordings != 1)}"
+        paragraphs = [recordings]
+        if self.as_trained:
+            paragraphs.append(
+                f"{self.as_trained} of {recordings} match a training "
+                "trial to the last bit, so they are most likely training data, and the accuracy "
+                "below does not apply to new touches. The nested accuracy, which `make export` "
+                "and `edge-classify info` print, does."
+            )
+        for task, pairs in self._pairs.items():
+            name, (right, total) = printable(task), self.right(task)
+            if total == 0:
+                paragraphs.append(f"{name}: no recording has a label")
+                continue
+            low, high = wilson(right, total)
+            paragraphs.append(
+                f"{name}: {right} of {total} right, {right / total:.2%} (95 % interval "
+                f"{low:.1%} to {high:.1%})\n" + _matrix(pairs)
+            )
+        return "\n\n".join(paragraphs)
+
+
+def _matrix(pairs: Counter[tuple[str, str]]) -> str:
+    truths = sorted({truth for truth, _ in pairs})
+    decided = sorted({label for _, label in pairs} | set(truths))
+    # The columns of a wide matrix are numbered, so that 36 objects fit on a screen.
+    numbered = sum(len(label) + 2 for label in decided) > 100
+    heads = [str(i + 1) for i in range(len(decided))] if numbered else decided
+    names = [f"{decided.index(t) + 1:>3}  {t}" if numbered else t for t in truths]
+    width = max(map(len, names))
+    rows = [[str(pairs[truth, label] or ".") for label in decided] for truth in truths]
+    return "\n".join(
+        f"{name:<{width}}"
+        + "".join(f"  {cell:>{max(len(h), 3)}}" for cell, h in zip(cells, heads, strict=True))
+        for name, cells in zip(["", *names], [heads, *rows], strict=True)
+    )

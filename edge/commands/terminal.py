@@ -53,7 +53,8 @@ def skin_colours(
 def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> NDArray[np.uint8]:
     """A palette's colour for each share from 0 to 1; others get the colour of the nearer end."""
     steps = np.clip(share, 0.0, 1.0) * (len(palette) - 1)
-    return np.array(palette, dtype=np.uint8)[steps.astype(int)]
+    shades: NDArray[np.uint8] = np.array(palette, dtype=np.uint8)[steps.astype(int)]
+    return shades
 
 
 def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:

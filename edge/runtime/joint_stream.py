@@ -16,8 +16,10 @@ import os
 import select
 import socket
 import time
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Sequence
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,21 +96,18 @@ class Joints:
             return None
         # A line without delay gives the offset of the sender's clock.
         sent = t - sorted(self._recent)[len(self._recent) // 10]
-        after: tuple[float, NDArray[np.float64]] | None = None
-        for pose in reversed(self._poses):
-            if pose[0] <= sent:
-                if after is not None and after[0] - pose[0] <= 2.0 * OLDEST_S:
-                    share = (sent - pose[0]) / (after[0] - pose[0])
-                    # A sender may wrap its angles at +-pi. No joint turns half round between two
-                    # lines, so that the shorter way is the right one.
-                    turned = after[1] - pose[1]
-                    turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
-                    return pose[1] + share * turned
-                if sent - pose[0] <= OLDEST_S:
-                    return pose[1]
-                break
-            after = pose
-        return None
+        later = bisect_right(self._poses, sent, key=itemgetter(0))
+        if later == 0:
+            return None
+        before_s, angles = self._poses[later - 1]
+        after_s, next_angles = self._poses[min(later, len(self._poses) - 1)]
+        if 0.0 < after_s - before_s <= 2.0 * OLDEST_S:
+            # A sender may wrap its angles at +-pi. No joint turns half round between two lines, so
+            # that the shorter way is the right one.
+            turned = next_angles - angles
+            turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
+            return angles + (sent - before_s) / (after_s - before_s) * turned
+        return angles if sent - before_s <= OLDEST_S else None
 
     def _take(self) -> None:
         """Parse the lines that have come."""

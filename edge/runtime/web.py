@@ -42,10 +42,11 @@ WATCHED_S = 2.0
 LARGEST_ACTION = 4096
 
 
-class WebServer:
+class WebServer(ThreadingHTTPServer):
     """The server of a page, in threads of its own.
 
     Attributes:
+        server_port: the port at which it listens.
         token: without it in a request's query, nothing is served but the script and the style.
         link: the address to open in a browser, with the token.
     """
@@ -61,13 +62,13 @@ class WebServer:
             InputError: the address is not of that form, or cannot be listened at.
         """
         host, port = parse_address("--web ", address, "127.0.0.1:8000")
+        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with refusing(f"--web {address}: cannot be listened at"):
-            self._http = _Http((host, port), self)
-        self.port = self._http.server_address[1]
+            super().__init__((host, port), _Handler)
         name = _own_address() if host in ("0.0.0.0", "::") else host
         name = f"[{name}]" if ":" in name else name
         self.token = secrets.token_urlsafe(16)
-        self.link = f"http://{name}:{self.port}/?token={self.token}"
+        self.link = f"http://{name}:{self.server_port}/?token={self.token}"
         self.act, self.acting = act, threading.Lock()
         self._picture: Mapping[str, Any] | None = None
         self._asked_at = -WATCHED_S
@@ -76,7 +77,7 @@ class WebServer:
             path: (f"text/{kind}; charset=utf-8", (folder / (path[1:] or "page.html")).read_bytes())
             for path, kind in FILES.items()
         }
-        threading.Thread(target=self._http.serve_forever, args=(0.1,), daemon=True).start()
+        threading.Thread(target=self.serve_forever, args=(0.1,), daemon=True).start()
 
     @property
     def watched(self) -> bool:
@@ -96,8 +97,11 @@ class WebServer:
 
     def close(self) -> None:
         """Stop serving."""
-        self._http.shutdown()
-        self._http.server_close()
+        self.shutdown()
+        self.server_close()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a browser that went away."""
 
 
 def _own_address() -> str:
@@ -108,30 +112,16 @@ def _own_address() -> str:
     return socket.gethostname()
 
 
-class _Http(ThreadingHTTPServer):
-    """The listening socket."""
-
-    daemon_threads = True
-
-    def __init__(self, address: tuple[str, int], page: WebServer) -> None:
-        self.page = page
-        self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
-        super().__init__(address, _Handler)
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a browser that went away."""
-
-
 class _Handler(BaseHTTPRequestHandler):
     """One request of a browser."""
 
-    server: _Http
+    server: WebServer
     timeout = SLOW_S
     server_version, sys_version = "edge-classify", ""
 
     def do_GET(self) -> None:
         """Serve the page, its files, or the latest picture."""
-        page, path = self.server.page, urlsplit(self.path).path
+        page, path = self.server, urlsplit(self.path).path
         # The script and the style are asked for without the query, and hold no secret.
         if path not in ("/page.js", "/page.css") and not self._has_token():
             self._answer(HTTPStatus.UNAUTHORIZED)
@@ -147,7 +137,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """Take an action."""
-        page, length = self.server.page, self.headers.get("Content-Length", "")
+        page, length = self.server, self.headers.get("Content-Length", "")
         if not self._has_token():
             return self._answer(HTTPStatus.UNAUTHORIZED)
         if not length.isdecimal() or int(length) > LARGEST_ACTION:
@@ -164,7 +154,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _has_token(self) -> bool:
         given = parse_qs(urlsplit(self.path).query).get("token", [""])[0]
-        return secrets.compare_digest(given.encode(), self.server.page.token.encode())
+        return secrets.compare_digest(given.encode(), self.server.token.encode())
 
     def _answer(
         self, status: HTTPStatus, contents: bytes = b"", kind: str = "text/plain; charset=utf-8"

@@ -143,6 +143,19 @@ def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
             check_writable(folder)
 
 
+def test_a_fifo_a_device_or_a_folder_is_not_replaced_by_a_file(tmp_path):
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "fifo", tmp_path / "folder"):
+        before = path.stat()
+        with (
+            pytest.raises(InputError, match="cannot be written: it is not a regular file"),
+            write_whole(path),
+        ):
+            raise AssertionError
+        assert path.stat() == before
+
+
 def test_a_name_with_a_null_character_is_refused_in_a_sentence(tmp_path):
     with (
         pytest.raises(InputError, match="cannot hold a null character"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from edge.cli import main
-from edge.commands.summary import Summary
+from edge.commands.replay import Summary
 
 ROOT = Path(__file__).parents[3]
 

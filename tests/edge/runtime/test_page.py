@@ -163,6 +163,6 @@ class TestInABrowser:
     def test_a_wrong_token_shows_nothing(self):
         page = Page("0.0.0.0:0", LAYOUT, title="pad")
         with closing(page.server), chromium(390) as browser:
-            browser.get(f"http://127.0.0.1:{page.server.port}/?token=wrong")
+            browser.get(f"http://127.0.0.1:{page.server.server_port}/?token=wrong")
 
             assert browser.find_elements("id", "skin") == []
