@@ -1,7 +1,5 @@
 """The `edge-classify` command line: parses the arguments and runs one subcommand."""
 
-from __future__ import annotations
-
 import argparse
 import atexit
 import errno

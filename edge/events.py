@@ -1,7 +1,5 @@
 """The events of a contact: its onset, its decisions and its release."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Reading files up to a size limit, and writing them whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator

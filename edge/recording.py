@@ -127,10 +127,14 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     def fail(problem: str) -> NoReturn:
         raise InputError(f"{path}: {problem}")
 
-    def expect(name: str, array: NDArray[Any], dtype: type, *shapes: tuple[int, ...]) -> None:
+    def expect(name: str, values: Any, dtype: type, *shapes: tuple[int, ...]) -> NDArray[Any]:
+        array: NDArray[Any] = np.asarray(values)
+        if array.dtype.kind == "f":
+            array = array.astype(np.float64)
         if array.dtype != dtype or array.shape not in shapes:
             wanted = f"{np.dtype(dtype)} {' or '.join(map(str, shapes))}"
             fail(f"{name} must be {wanted}, not {array.dtype} {array.shape}")
+        return array
 
     meta, frames = dict(recording.meta), np.asarray(recording.frames)
     if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
@@ -154,9 +158,7 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     if layout.shape != (rows, cols):
         fail(f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}")
 
-    t = np.asarray(recording.t)
-    t = t.astype(np.float64) if t.dtype.kind == "f" else t
-    expect("t", t, np.float64, (n,))
+    t = expect("t", recording.t, np.float64, (n,))
     if not np.isfinite(t).all():
         fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
     backwards = np.flatnonzero(t[1:] < t[:-1])
@@ -165,9 +167,8 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     joints, dof = recording.joints, 0
     if joints is not None:
         joints = np.asarray(joints)
-        joints = joints.astype(np.float64) if joints.dtype.kind == "f" else joints
         dof = max(joints.shape[1], 1) if joints.ndim == 2 else 1
-        expect("joints", joints, np.float64, (n, dof))
+        joints = expect("joints", joints, np.float64, (n, dof))
         unknown = np.isnan(joints)
         odd = (np.isinf(joints) | (unknown != unknown[:, :1])).any(axis=1)
         if odd.any():

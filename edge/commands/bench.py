@@ -6,15 +6,13 @@ workstation. Each figure is that of the fastest of five rounds, as other program
 one slower; if they took part of the processor's time, a warning says how much.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json
-import logging
 import math
 import os
 import platform
+import re
 import subprocess
 import sys
 import time
@@ -27,14 +25,12 @@ import numpy as np
 
 from edge import __version__
 from edge.classifier import Classifier
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import first_contact
-
-LOG = logging.getLogger(__name__)
 
 RATE_HZ = 100.0
 INSIDE = slice(1, -2)
@@ -202,8 +198,8 @@ def kind() -> str:
     """The name of the board, or else of the processor."""
     with suppress(OSError):
         return Path("/proc/device-tree/model").read_text(errors="replace").strip("\x00 \n")
-    with suppress(OSError, StopIteration):
-        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
-        name = next(line for line in lines if line.startswith("model name"))
-        return name.partition(":")[2].strip()
+    with suppress(OSError):
+        named = re.search(r"^model name\s*:(.*)", Path("/proc/cpuinfo").read_text(), re.M)
+        if named:
+            return named[1].strip()
     return platform.processor() or "unknown"

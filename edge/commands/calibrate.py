@@ -5,10 +5,7 @@ the skin file. The old file is kept as skin.toml.bak. A skin that is touched, or
 cannot be read or are saturated, is refused.
 """
 
-from __future__ import annotations
-
 import argparse
-import logging
 import math
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -17,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.commands.options import add_skin, within
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output
 from edge.commands.source import open_skin
 from edge.errors import InputError
 from edge.i2c.chip import UNUSED
@@ -25,8 +22,6 @@ from edge.skin.calibration import save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
-
-LOG = logging.getLogger(__name__)
 
 FRAMES = 1000
 """As many as the paper's lab averaged for its baseline."""

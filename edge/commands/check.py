@@ -6,8 +6,6 @@ rate that the file asks for. Without a skin file, prints the state of this machi
 rights, versions, clock, load and disk, with a remedy for each shortcoming.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from importlib.util import find_spec

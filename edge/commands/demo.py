@@ -5,23 +5,18 @@ drivers, and decides with the model that comes with the program. Everything but 
 on a robot. The exit status is 1 if a decision is wrong.
 """
 
-from __future__ import annotations
-
 import argparse
-import logging
 
 import numpy as np
 
 from edge import demo
 from edge.classifier import Classifier
 from edge.commands import terminal
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output
 from edge.events import Decided
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import Recording, load
-
-LOG = logging.getLogger(__name__)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -6,8 +6,6 @@ much nearer, as a squared distance, it brings the touch to the nearest trial wit
 the nearest one with another label. `python -m train show REC --model model.onnx` draws the curves.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from typing import Any

@@ -7,8 +7,6 @@ real skin. With --plug the skin's chips appear on this machine's own /dev/i2c-N 
 program can read them, until Ctrl-C.
 """
 
-from __future__ import annotations
-
 import argparse
 from contextlib import ExitStack
 from pathlib import Path

@@ -4,8 +4,6 @@ Prints a model's tasks with their labels and accuracy, its features and training
 and arm that it needs, and its size. Of two models it prints the differences.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

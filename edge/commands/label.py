@@ -5,8 +5,6 @@ them, writes the changed recordings anew, each whole or not at all, if all of th
 next `make export` trains on the new labels.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from collections.abc import Mapping

@@ -1,19 +1,15 @@
 """Command-line options that several commands share, and the checks that go with them."""
 
-from __future__ import annotations
-
 import argparse
-import logging
 import math
 from collections.abc import Callable
 from contextlib import suppress
 
 from edge.classifier import stopping_rules
+from edge.commands.output import LOG
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.touch.arm import Chain
-
-LOG = logging.getLogger(__name__)
 
 
 def within(kind: type, low: float, high: float) -> Callable[[str], float]:

@@ -1,8 +1,9 @@
-"""Output of a command: text for a person at a terminal, JSON lines for a program."""
+"""Output of a command: text for a person, JSON lines for a program, and messages on stderr."""
 
 from __future__ import annotations
 
 import argparse
+import logging
 import shutil
 import sys
 import textwrap
@@ -12,6 +13,8 @@ from typing import Any
 from edge.errors import printable
 from edge.events import json_line
 
+LOG = logging.getLogger("edge.commands")
+"""For messages, which are printed to stderr (see `edge.cli.dispatch`)."""
 BAR = 10
 """Width in characters of a bar that shows a share."""
 LONGEST_LINE = 80

@@ -8,7 +8,6 @@ status is 1 if nothing was saved, or if --joints gave no angles.
 from __future__ import annotations
 
 import argparse
-import logging
 import math
 import re
 from collections import deque
@@ -23,11 +22,13 @@ import numpy as np
 
 from edge.commands import terminal
 from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
+from edge.commands.output import LOG
 from edge.commands.source import reading
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable, refusing
 from edge.recording import Recording, save
 from edge.runtime.event_writer import Lines
+from edge.skin.skin import Skin
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker, TrackSettings
@@ -35,7 +36,6 @@ from edge.touch.track import ContactTracker, TrackSettings
 if TYPE_CHECKING:
     from edge.runtime.page import Page
 
-LOG = logging.getLogger(__name__)
 
 LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes, a character
@@ -46,7 +46,6 @@ LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
 KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
 DIGITS = "123456789"
-_DEBOUNCE = TrackSettings().debounce
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -88,9 +87,11 @@ class Trials:
     onset. No other trial begins while a saved contact continues.
     """
 
-    def __init__(self, tracker: ContactTracker, *, lead_frames: int, length_s: float) -> None:
-        self._tracker, self._length = tracker, length_s
-        self._before: deque[Frame] = deque(maxlen=max(lead_frames, 0) + _DEBOUNCE)
+    def __init__(self, skin: Skin, length_s: float) -> None:
+        settings, lead_frames = TrackSettings(), round(LEAD_S / skin.period_s)
+        self._tracker = ContactTracker(skin.layout, settings, horizon_s=0.0)
+        self._length = length_s
+        self._before: deque[Frame] = deque(maxlen=lead_frames + settings.debounce)
         self._frames: list[Frame] | None = None
         self._saved: Contact | None = None
 
@@ -198,9 +199,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arm is not None:
             meta["arm"] = arm.to_dict()
         recorder = Recorder(arguments.out, labels, meta, names, lines, live.page)
-        tracker = ContactTracker(skin.layout, TrackSettings(), horizon_s=0.0)
-        lead_frames = round(LEAD_S / skin.period_s)
-        trials = Trials(tracker, lead_frames=lead_frames, length_s=arguments.length)
+        trials = Trials(skin, arguments.length)
         LOG.info("waiting for a contact" + (KEYS if by_key else ""))
         choices = arguments.label if by_key else []
         for digit, (task, label) in zip(DIGITS, choices, strict=False):

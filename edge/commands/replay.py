@@ -4,17 +4,14 @@ Decides on recordings as `edge-classify run` decides live. Files that cannot be 
 stderr and skipped; the exit status is then 2.
 """
 
-from __future__ import annotations
-
 import argparse
-import logging
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from edge.classifier import AS_TRAINED, Classifier, suited
 from edge.commands.options import add_error, check_error
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output
 from edge.errors import InputError, printable
 from edge.model.info import Task
 from edge.model.model import Model
@@ -22,8 +19,6 @@ from edge.model.verify import first_series
 from edge.recording import Recording, find, load
 from edge.statistics import wilson
 from edge.touch.contact import FeatureSeries
-
-LOG = logging.getLogger(__name__)
 
 UNDECIDED = "(none)"
 """The column of trials without a decision."""

@@ -5,10 +5,7 @@ SIGHUP ends it cleanly after the current frame, a second one at once. It tells s
 ready and that it is alive.
 """
 
-from __future__ import annotations
-
 import argparse
-import logging
 import time
 from collections.abc import Sequence
 from contextlib import closing
@@ -16,6 +13,7 @@ from typing import Any
 
 from edge.classifier import Classifier
 from edge.commands.options import add_error, add_reading, check_error
+from edge.commands.output import LOG
 from edge.commands.source import reading
 from edge.events import Decided, Event
 from edge.model.model import Model
@@ -24,7 +22,6 @@ from edge.runtime.touch_map import map_writer
 from edge.skin.loop import Schedule
 from edge.touch.track import MAX_CONTACTS
 
-LOG = logging.getLogger(__name__)
 LAST_TOUCHES, FEWEST_TOUCHES = 20, 8
 """Touches by which a model is judged to know the things that it meets."""
 

@@ -5,8 +5,6 @@ taxel with a valid value, . one without, and a blank one without a chip. The exi
 chip does not answer or a taxel has no valid value.
 """
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

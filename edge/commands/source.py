@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -11,7 +10,7 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from edge.commands.output import Output, event_text
+from edge.commands.output import LOG, Output, event_text
 from edge.errors import InputError
 from edge.events import Event
 from edge.fake.clock import PacedClock, VirtualClock
@@ -29,8 +28,6 @@ from edge.touch.layout import for_device
 
 if TYPE_CHECKING:
     from edge.runtime.page import Page
-
-LOG = logging.getLogger(__name__)
 
 
 def ending_signals() -> list[int]:

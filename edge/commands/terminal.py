@@ -1,7 +1,5 @@
 """A terminal: keys, and the skin in ANSI half-blocks, two rows of taxels in each line."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -5,17 +5,12 @@ the stored one: integers must be equal, floats within their stated bounds. The e
 result differs.
 """
 
-from __future__ import annotations
-
 import argparse
-import logging
 from typing import Any
 
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output
 from edge.model.model import Model
 from edge.model.verify import verify
-
-LOG = logging.getLogger(__name__)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

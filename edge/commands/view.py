@@ -6,8 +6,6 @@ of taxels, with row 0 at the top. q or Ctrl-C quits. With --web, a page for a br
 same, with the features of each contact over time.
 """
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import sys
@@ -62,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = None if arguments.model is None else Model(arguments.model)
     tasks = () if model is None else tuple(model.info.tasks)
     decisions = dict.fromkeys(tasks, "no contact yet")
-    due, shown = -float("inf"), ""
+    due = -float("inf")
     with (
         reading(
             arguments, model=model, real_time=sys.stdout.isatty(), decides=model is not None
@@ -84,8 +82,5 @@ def run(arguments: argparse.Namespace) -> int:
                     decisions[event.task] = decision_text(event)
             if live.page is None and frame.t >= due:
                 due = frame.t + interval_s
-                picture = draw(frame, layout, decisions)
-                if picture != shown:
-                    print(terminal.screen(picture), end="", flush=True)
-                    shown = picture
+                print(terminal.screen(draw(frame, layout, decisions)), end="", flush=True)
     return 0

@@ -3,8 +3,6 @@
 Model and recordings are simulated (`make demo-data`).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 FOLDER = Path(__file__).parent

@@ -1,7 +1,5 @@
 """The machine that the program runs on, beside the needs of a board."""
 
-from __future__ import annotations
-
 import grp
 import os
 import platform

@@ -4,8 +4,6 @@ A slow reader never delays a decision. A pipe that nobody empties, a full disk o
 down costs lines, and those are counted.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import socket

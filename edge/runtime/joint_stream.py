@@ -8,8 +8,6 @@ longer is older by the difference. With a line whose time goes back, everything 
 sender's clock was set, or the sender was started again.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import os

@@ -1,7 +1,5 @@
 """The live page of a skin: its pictures, and the actions that a person can take there."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Messages to the service manager: ready, alive, stopping (sd_notify(3): a datagram each)."""
 
-from __future__ import annotations
-
 import os
 import socket
 from collections.abc import Callable, Mapping

@@ -6,8 +6,6 @@ where `frame` is the arm's base, or `skin`. The decisions that have a place foll
 leave out a line that was cut short (`train.touch_map`).
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Mapping

@@ -6,8 +6,6 @@ reading is dropped. The page, its pictures and its actions need the token of the
 other site, user or machine can see them or act.
 """
 
-from __future__ import annotations
-
 import json
 import secrets
 import socket
