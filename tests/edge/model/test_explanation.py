@@ -1,12 +1,18 @@
 """Why a model answers as it does, by hand and by the graph's own distances."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from edge.model.explanation import Change, Explanation, Near, Space, explain
+from edge.model.info import Task
 from edge.model.model import Model
+from export.graph import to_onnx
+from train.evaluate import stratified_folds
+from train.pipeline import Choice
+from train.stopping import SequentialClassifier
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 
@@ -37,6 +43,56 @@ def test_the_feature_that_has_to_change_least_comes_first():
     space = BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]]))
     why = explain(space, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
     assert [change.feature for change in why.changes] == ["force", "area"]
+
+
+def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
+    space = Space(
+        columns=np.arange(4),
+        mean=np.zeros(4),
+        gain=np.ones(4),
+        weights=np.array([[0.0, 0.0], [1.0, 2.0], [0.5, 0.0], [0.25, 0.0]]),
+        rows=np.array([[0.0, 0.0], [2.0, 0.0], [1.5, 3.0], [5.5, 11.0]]),
+        labels=np.array([0, 1, 0, 1]),
+    )
+    names = ["still", "across", "quick", "slow"]
+    why = explain(space, np.zeros(4), [0], 0, names, [1] * 4)
+    # The nearest other trial is as near where the first coordinate is 1; a fifth more makes it
+    # nearer. Across, a trial of the answer lies in between for up to four times as much.
+    assert why.changes == tuple(
+        Change(name, 1, pytest.approx(size), pytest.approx(size))
+        for name, size in (("quick", 2.4), ("across", 4.0), ("slow", 4.8))
+    )
+
+
+def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(exported, tmp_path):
+    """Three decision points; one task takes one feature, the other lacks labels."""
+    info = replace(Model(exported / "model.onnx").info, decision_points_s=(0.3, 0.6, 1.2))
+    tasks = {
+        "of_area": Task(("a", "b", "c"), 3, 4, "none", 0.5, features=("contact_area",)),
+        "partial": Task(("d", "e"), 3, 4, "none", 0.5),
+    }
+    choices = {name: Choice("none", 4, 3, features=task.features) for name, task in tasks.items()}
+    rng = np.random.default_rng(0)
+    X, vectors = rng.normal(size=(3, 60, info.width)), rng.normal(size=(9, info.width))
+    vectors[-1] *= 1e3  # beyond the reach of the coordinates
+    y = {"of_area": np.array(["a", "b", "c"] * 20), "partial": np.array(["d", "e", "", "d"] * 15)}
+    fitted = SequentialClassifier(choices, info.decision_points_s, info.features)
+    fitted.fit(X, y, stratified_folds(y["of_area"]), [choices] * 10)
+    calibration = {"stopping": fitted.stopping_, "novelty": fitted.novelty_}
+    info = replace(info, tasks=tasks, rows=60, trials=(), **calibration)
+    (tmp_path / "model.onnx").write_bytes(to_onnx(fitted, info))
+    model = Model(tmp_path / "model.onnx")
+    assert model.decide(vectors[-1])["partial"].out_of_range
+    for name, task in tasks.items():
+        space = Space.of(model, name)
+        for vector in vectors:
+            decision = model.decide(vector)[name]
+            label, rows = task.labels.index(decision.label), decision.neighbours.tolist()
+            why = explain(space, vector, rows, label, info.features, info.widths)
+            distances = [near.distance for near in why.voters]
+            assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
+            for near in (*why.voters, why.rival):
+                assert task.labels[near.label] == y[name][near.row]
 
 
 def test_features_and_coordinates_are_cut_off_as_in_the_graph(exported):
