@@ -6,7 +6,7 @@ import time
 from typing import Protocol
 
 TIME_ROUNDING_S = 5e-7
-"""A time meant to be that of a sample may lie below it by rounding, by less than this."""
+"""Rounding may put the time of a sample below the sample's true time, by less than this."""
 
 
 class Clock(Protocol):

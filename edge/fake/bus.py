@@ -85,7 +85,10 @@ class FakeBus:
         """
         messages = prepared.messages
         address = messages[0].address
-        self._refuse(messages)
+        if any(message.address != address for message in messages):
+            raise bus_error(errno.EINVAL, self.name, address)
+        if any(message.read for message in messages[:-1]):
+            raise bus_error(errno.EOPNOTSUPP, self.name, address)
         if not self.is_open:
             raise bus_error(errno.ENODEV, self.name, address)
         chips = self.chips_at(address)
@@ -96,13 +99,6 @@ class FakeBus:
         self.stop()
         if not chips:
             raise bus_error(errno.EREMOTEIO, self.name, address)
-
-    def _refuse(self, messages: Sequence[Message]) -> None:
-        address = messages[0].address
-        if any(message.address != address for message in messages):
-            raise bus_error(errno.EINVAL, self.name, address)
-        if any(message.read for message in messages[:-1]):
-            raise bus_error(errno.EOPNOTSUPP, self.name, address)
 
     def chips_at(self, address: int) -> list[FakeChip]:
         """Every chip that hears the address."""

@@ -48,41 +48,33 @@ class Playback:
         """Play it once, or over and over.
 
         Args:
-            recording: what the skin will feel.
+            recording: the contact that the skin feels.
             loop: start again at its end.
         """
         t = recording.t - recording.t[0]
         self._t, self._frames = t, recording.frames
         self._joints = recording.joints
+        self.dof = recording.dof
+        """Number of joint angles, or None without any."""
         self.joint_names = recording.joint_names
         """The joint of each angle, where the recording names them."""
         steps = np.diff(t)
         last = float(np.median(steps)) if steps.size else 0.01
         self._length = float(t[-1]) + last
-        self._loop = loop
+        self.ends = math.inf if loop else self._length
+        """Length in seconds; infinity where it loops."""
         self.start = 0.0
         """Start of the playback on the skin's clock."""
 
-    @property
-    def ends(self) -> float:
-        """Length in seconds; infinity where it loops."""
-        return math.inf if self._loop else self._length
-
-    @property
-    def dof(self) -> int | None:
-        """Number of joint angles, or None without any."""
-        return None if self._joints is None else int(self._joints.shape[1])
-
     def _index(self, t: float) -> int:
         t -= self.start
-        if self._loop:
+        if self.ends == math.inf:
             t %= self._length
         return max(0, int(np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")) - 1)
 
     def __call__(self, t: float) -> NDArray[np.uint16]:
         """Counts above baseline (rows, cols) at `t`."""
-        frame: NDArray[np.uint16] = self._frames[self._index(t)]
-        return frame
+        return np.asarray(self._frames[self._index(t)])
 
     def at(self, t: float) -> NDArray[np.float64] | None:
         """Joint angles (dof,) at `t`, where the recording has them."""
@@ -124,7 +116,7 @@ def fake_buses(
         timed: the clock advances with the bits on the wire, and conversions take their time.
         overhead_s: time of the software for each transaction, where timed.
         noise_counts: standard deviation of the noise on raw values.
-        seed: of the noise and what power-up leaves undefined.
+        seed: of the noise, and of the registers that power-up leaves undefined.
         make: makes a bus.
     """
     calibration = calibrated(file).calibration
@@ -170,8 +162,7 @@ def _sense(
         counts = scene(t).reshape(-1)[taxels].astype(np.int64)
         noisy = noise[int((t + TIME_ROUNDING_S) / NOISE_STEP_S) % len(noise)]
         raw = at_rest + used * (chip.sign * counts + noisy[taxels])
-        clipped: NDArray[np.uint16] = np.clip(raw, 1, chip.highest).astype(np.uint16)
-        return clipped
+        return np.asarray(np.clip(raw, 1, chip.highest), dtype=np.uint16)
 
     return sense
 

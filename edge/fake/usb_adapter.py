@@ -68,7 +68,7 @@ class UsbAdapter:
     """An i2c-tiny-usb adapter on a bus: USB requests in, answers out.
 
     Messages are collected up to the last of a call and then sent at once, so that the bus refuses
-    what it would refuse from any other caller. A chip that does not answer is not acknowledged (the
+    the same calls as from any other program. A chip that does not answer is not acknowledged (the
     kernel then gives ENXIO), a bus that hangs leaves the request without an answer (EIO after the
     driver's 2 s), and every other error stalls the request (EIO).
 

@@ -45,7 +45,7 @@ def stage_bank(stage: int) -> tuple[int, ...]:
 BANKS = sum((stage_bank(stage) for stage in range(STAGES)), ())
 """The registers of all stages, from `STAGE_BANK` on."""
 CONNECTIONS = np.array(BANKS).reshape(STAGES, STAGE_REGISTERS)[:, :3]
-"""(12, 3) registers that say what each stage converts."""
+"""(12, 3) registers that connect inputs to each stage."""
 SYSTEM_ROW: Row = (SYSTEM, (0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400))
 """PWR_CONTROL (full power, 12 stages, decimation of 64), calibration of all stages, and ambient
 compensation and interrupts, all off."""
@@ -61,8 +61,8 @@ CHECK_ROWS: list[Row] = [
     *((STAGE_BANK + i, BANKS[i : i + 3]) for i in range(0, len(BANKS), STAGE_REGISTERS)),
     SYSTEM_ROW,
 ]
-"""The rows to read back: what each stage converts, and last the system registers. A reset changes
-each of them, so that any one row tells a chip that has lost its settings."""
+"""The rows to read back: the connections of each stage, and last the system registers. A reset
+changes each of them, so that any one row tells a chip that has lost its settings."""
 
 
 def words(values: tuple[int, ...]) -> bytes:

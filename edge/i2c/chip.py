@@ -186,7 +186,7 @@ class ChipKind:
         parse: values and intact taxels of n chips from their bytes (n, frame_bytes); a pure
             function.
         fake: makes a model from the spec, the sensed values, whether conversions take their real
-            time, and a stream for what power-up leaves undefined.
+            time, and a random stream for the registers that power-up leaves undefined.
         frame_bytes: bytes of one reading.
         highest: the largest raw value that is not saturated.
         rest: raw value at rest of a fake chip without calibration.

@@ -44,14 +44,11 @@ def encode(data: bytes) -> bytes:
     '02 11 01 02 22 00'
     """
     out = bytearray()
-    at = 0
-    while at <= len(data):
-        end = data.find(0, at, at + 254)
-        run = data[at : end if end >= 0 else at + 254]
-        out.append(len(run) + 1)
-        out += run
-        # No zero follows a run of 254 bytes; the packet's end stands for the last zero.
-        at += len(run) + (len(run) < 254)
+    for run in data.split(b"\0"):
+        while len(run) >= 254:  # as many as one code can announce, without a zero after them
+            out += b"\xff" + run[:254]
+            run = run[254:]
+        out += bytes([len(run) + 1]) + run
     return bytes(out) + b"\0"
 
 

@@ -24,6 +24,8 @@ from edge.touch.track import ContactTracker, TrackSettings
 
 METADATA_KEY = "edge-classify"
 FORMAT = 4
+OPTIONAL = "decision_points_s stopping novelty joints kernels name trials taught".split()
+"""Keys that are left out where they would be empty."""
 
 
 @dataclass(frozen=True)
@@ -147,32 +149,20 @@ class ModelInfo:
 
     def to_json(self) -> str:
         """The metadata as JSON text, as the model file holds it."""
-        entries = {
+        entries = vars(self) | {
             "format": FORMAT,
             "tasks": {name: _to_dict(task) for name, task in self.tasks.items()},
             "skin": self.layout.to_dict(),
             "tracking": vars(self.tracking),
-            "window_s": self.window_s,
-            "samples": self.samples,
-            "features": self.features,
-            "units": self.units,
-            "motion_frame": self.motion_frame,
             "arm": None if self.chain is None else self.chain.to_dict(),
-            "rows": self.rows,
-            "data_digest": self.data_digest,
-            "versions": self.versions,
-        }
-        optional = {
-            "decision_points_s": self.decision_points_s,
             "stopping": {task: asdict(rules) for task, rules in self.stopping.items()},
             "novelty": self.novelty and asdict(self.novelty),
-            "joints": self.joints,
             "kernels": {name: vars(table) for name, table in self.kernels.items()},
-            "name": self.name,
-            "trials": self.trials,
-            "taught": self.taught,
         }
-        entries |= {key: value for key, value in optional.items() if value}
+        del entries["layout"], entries["chain"]
+        for key in OPTIONAL:
+            if not entries[key]:
+                del entries[key]
         return json.dumps(entries, sort_keys=True, allow_nan=False, ensure_ascii=False)
 
     @classmethod

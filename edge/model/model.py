@@ -34,12 +34,13 @@ class Decision(NamedTuple):
             `edge.model.agreement`) may have another label than most votes.
         confidence: the label's share of the votes, 0 to 1.
         scores: (labels,) share of the votes of each label.
-        distances: (k,) of the neighbours, nearest first, in PCA space.
+        distances: (k,) of the neighbours, nearest first, in the space of the projection.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
-        label_distances: (labels,) mean squared distance to the nearest (up to three) training
-            trials of each label, of a model with decision points or with tasks that are decided
-            together: the distance of the nearest answer with this label in which they agree.
+        label_distances: (labels,) mean squared distance to the nearest training trials of each
+            label (`edge.model.teaching.nearest_of_label` says to how many), of a model with
+            decision points or with tasks that are decided together. For these it is the distance
+            of the nearest answer with this label in which they agree.
         out_of_range: the features lie so far outside those of the training trials that the model
             cut them off; see `train.projection.Grid`.
     """

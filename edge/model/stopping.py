@@ -177,11 +177,8 @@ class Novelty:
 
     def rate(self, decision_point: int, distance: float) -> float:
         """The smallest novelty rate at which the distance counts as unknown; 1 if it never does."""
-        smallest = 1.0
-        for rate, limit in zip(self.rates, self.limits[decision_point], strict=True):
-            if distance > limit:
-                smallest = rate
-        return smallest
+        limits = zip(self.rates, self.limits[decision_point], strict=True)
+        return min((rate for rate, limit in limits if distance > limit), default=1.0)
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Novelty:

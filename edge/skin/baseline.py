@@ -54,8 +54,7 @@ class Baseline:
         """Counts above the baseline (n,), 0 to 65535, with sign and dead band applied."""
         counts = (raw.astype(np.int32) - self.counts) * self._sign
         counts *= counts >= self._dead
-        above: NDArray[np.uint16] = np.minimum(counts, 65535).astype(np.uint16)
-        return above
+        return np.asarray(np.minimum(counts, 65535), dtype=np.uint16)
 
     def follow(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
         """Follow the drift of the `valid` taxels by a step; call it while nothing touches."""

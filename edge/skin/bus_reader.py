@@ -53,7 +53,7 @@ class Slot:
         error: why it is down.
         at: when it was last read, on the bus's clock.
         good: whether `row` holds a complete reading of a chip with its settings.
-        damaged: number of readings in a row whose bytes made no sense; the skin counts it.
+        damaged: number of readings in a row whose bytes made no sense; the decoder counts them.
         has_settings: the settings were written and read back, and no loss was seen since.
         steps: the steps left until it runs, while it is being set up.
     """

@@ -18,7 +18,6 @@ from edge.skin.file import SkinFile, TaxelCalibration, parse
 
 def calibration_text(calibration: TaxelCalibration) -> str:
     """The `[calibration]` table as TOML, one line for each row of the skin."""
-
     lines = ["[calibration]\n"]
     if calibration.taken is not None:
         lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")

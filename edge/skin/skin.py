@@ -169,7 +169,7 @@ class Skin:
         ]
 
     def bus_changes(self) -> list[tuple[str, bool]]:
-        """The buses that were lost or have come back since the last call: name, and if it is lost.
+        """The buses that were lost or have come back since the last call: name and whether lost.
 
         A bus is lost while every chip on it fails, as when its adapter is unplugged.
         """
@@ -183,8 +183,6 @@ class Skin:
         A chip that is down stays so until it runs, whatever is tried.
         """
         former, self._states = self._states, [slot.state for slot in self._slots]
-        if former == self._states:
-            return []
         return [s for s, state in zip(self.status(), former, strict=True) if s.state != state]
 
     @property

@@ -193,7 +193,8 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
             raise InputError(
                 f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most {FASTEST_MUX_HZ}"
             )
-        # A chip behind a mux hears what is sent to the chips in front of it.
+        # While its channel is connected, a chip behind a mux also hears messages to the chips on
+        # the bus itself, so these claim their addresses first.
         for c, chip in sorted(enumerate(bus.chips), key=lambda entry: entry[1].mux is not None):
             place = f"bus {b} chip {c}"
             route = (chip.mux, chip.channel, chip.address)

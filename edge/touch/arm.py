@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +27,7 @@ class Joint:
 
     The step before the motion is `origin_xyz` and `origin_rpy`, as in a URDF. The step after it is
     `translate`, as in `edge/arms/cody.toml`. Lengths are in metres, angles in radians. `limits` are
-    the lowest and highest value of the joint's angle.
+    the lowest and highest angle of the joint, or its travel along the axis if it slides.
     """
 
     name: str
@@ -37,16 +37,6 @@ class Joint:
     origin_rpy: Vector = ZERO
     translate: Vector = ZERO
     limits: tuple[float, float] | None = None
-
-
-class _Link(NamedTuple):
-    """A moving joint as plain numbers: its axis, and the fixed step before it."""
-
-    slides: bool
-    axis: Vector
-    """A direction, of length 1."""
-    step: tuple[float, ...]
-    """(12,) the first three rows of the fixed step's transform."""
 
 
 class Chain:
@@ -66,8 +56,16 @@ class Chain:
         """
         self.joints = tuple(joints)
         self.base, self.tip = base, tip
-        self._moving = [joint for joint in self.joints if joint.kind != "fixed"]
-        self._links: list[_Link] = []
+        moving = [joint for joint in self.joints if joint.kind != "fixed"]
+        self.dof = len(moving)
+        """Number of angles that `pose` takes."""
+        self.names = tuple(joint.name for joint in moving)
+        """The moving joints' names, in the order of the angles."""
+        self.limits = tuple(joint.limits for joint in moving)
+        """(lower, upper) of each moving joint in radians, or metres if it slides; or None."""
+        self._links: list[tuple[bool, Vector, tuple[float, ...]]] = []
+        """Of each moving joint: whether it slides, its axis of length 1, and the fixed step before
+        it, (12,) the first three rows of a transform."""
         fixed = np.eye(4)
         for joint in self.joints:
             _check_joint(joint)
@@ -75,26 +73,10 @@ class Chain:
             if joint.kind != "fixed":
                 length = math.hypot(*joint.axis)
                 x, y, z = (component / length for component in joint.axis)
-                slides = joint.kind == "prismatic"
-                self._links.append(_Link(slides, (x, y, z), _rows(fixed)))
+                self._links.append((joint.kind == "prismatic", (x, y, z), _rows(fixed)))
                 fixed = np.eye(4)
             fixed = fixed @ _transform(joint.translate, ZERO)
         self._tip = _rows(fixed)
-
-    @property
-    def dof(self) -> int:
-        """Number of angles that `pose` takes."""
-        return len(self._moving)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The moving joints' names, in the order of the angles."""
-        return tuple(j.name for j in self._moving)
-
-    @property
-    def limits(self) -> tuple[tuple[float, float] | None, ...]:
-        """(lower, upper) of each moving joint in radians, or metres if it slides; or None."""
-        return tuple(j.limits for j in self._moving)
 
     def pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pose of the tip in the base's frame.
@@ -156,9 +138,9 @@ class Chain:
         """
         x, y, z, w = position
         x, y, z = _moved(self._tip, x, y, z, w)
-        for angle, link in zip(reversed(angles), reversed(self._links), strict=True):
-            kx, ky, kz = link.axis
-            if link.slides:
+        links = zip(reversed(angles), reversed(self._links), strict=True)
+        for angle, (slides, (kx, ky, kz), step) in links:
+            if slides:
                 x, y, z = x + angle * kx * w, y + angle * ky * w, z + angle * kz * w
             else:
                 half = sin(0.5 * angle)
@@ -167,7 +149,7 @@ class Chain:
                 x = x + (f * ax + g * (ky * az - kz * ay))
                 y = y + (f * ay + g * (kz * ax - kx * az))
                 z = z + (f * az + g * (kx * ay - ky * ax))
-            x, y, z = _moved(link.step, x, y, z, w)
+            x, y, z = _moved(step, x, y, z, w)
         return x, y, z
 
     def to_dict(self) -> dict[str, Any]:

@@ -25,9 +25,9 @@ SAMPLES = 40
 """Times of the window at which a channel is taken."""
 TAPS = 9
 BITS = 14
-"""Of a channel's values; larger ones are cut off."""
+"""Bits of a channel's values; larger values are cut off."""
 BIAS_BITS = 21
-"""Of a bias: 9 channels times 12, the sum of a kernel's weights, times 2^`BITS`."""
+"""Bits of a bias: 9 channels times 12, the sum of a kernel's weights, times 2^`BITS`."""
 KERNELS = np.array(
     [[2 if tap in heavy else -1 for tap in range(TAPS)] for heavy in combinations(range(TAPS), 3)],
     dtype=np.int32,
@@ -41,15 +41,15 @@ CONVOLUTIONS = len(DILATIONS) * len(KERNELS)
 MIXED = (1, 1, 1, 2, 2, 3, 4, 6, 9)
 """How many channels a convolution may sum up; each entry is as likely as the others."""
 SEED = 2021
-"""Of the channels that each convolution sums up."""
+"""Seed of the draw of the channels that each convolution sums up."""
 
 
 @dataclass(frozen=True)
 class KernelTable:
-    """What training says about the kernels of one feature.
+    """The shifts and biases that training found for the kernels of one feature.
 
     Attributes:
-        shifts: of each channel: its values are multiplied by 2^shift, fractions cut off.
+        shifts: of each channel, whose values are multiplied by 2^shift and lose their fractions.
         biases: of every kernel, in the order of `convolution_of_bias`.
     """
 
@@ -58,7 +58,7 @@ class KernelTable:
 
     @classmethod
     def from_table(cls, table: ConfigTable, channels: int, biases: int) -> KernelTable:
-        """Read what `vars` of a table gave to a model's metadata.
+        """Read the table from a model's metadata, which holds its `vars`.
 
         Raises:
             InputError: the numbers are not those of so many channels and biases.
@@ -106,7 +106,7 @@ def _mixes(channels: int) -> NDArray[np.float32]:
 
 
 def shifted(channels: NDArray[np.int64], shifts: Sequence[int]) -> NDArray[np.int32]:
-    """Channels (c, samples) times powers of two, cut off at what `BITS` hold."""
+    """Channels (c, samples) times powers of two, cut off at the largest number of `BITS` bits."""
     by = np.array(shifts)[:, None]
     moved = np.minimum(channels, 1 << 48) << np.maximum(by, 0) >> np.maximum(-by, 0)
     return np.asarray(np.minimum(moved, (1 << BITS) - 1), dtype=np.int32)

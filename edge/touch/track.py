@@ -67,7 +67,7 @@ class ContactTracker:
 
         Args:
             layout: the skin, with its thresholds.
-            settings: how contacts begin and end.
+            settings: how contacts begin.
             chain: with it, motion is measured in the base's frame from each frame's joint
                 angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no more.
