@@ -13,7 +13,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain, Vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import COLS, FORCE, ROWS, Measurer
+from edge.touch.measures import Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 CLOCK_ROUNDING_S = 1e-6
@@ -24,7 +24,7 @@ PLAIN = 4
 
 @dataclass(frozen=True)
 class FeatureSeries:
-    """What was measured on one contact, frame by frame from its onset.
+    """The measurements of one contact, frame by frame from its onset.
 
     Attributes:
         t: (n,) seconds from onset, increasing, the first 0.
@@ -32,9 +32,9 @@ class FeatureSeries:
         area: (n,) taxels of the region; 0 without contact.
         sums: (n, 2) sums of rows and columns over the region's taxels: area times centroid;
             0 where motion was not asked for.
-        motion: (n,) distance of the centroid from its place at onset, metres; its last value
-            is kept without contact; NaN where the arm's pose was not known; 0 where it was not
-            asked for.
+        motion: (n,) distance of the centroid from its place at onset in metres, or in taxels if
+            the skin's pitch is unknown; its last value is kept without contact; NaN where the
+            arm's pose was not known; 0 where it was not asked for.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`.
@@ -62,8 +62,7 @@ class FeatureSeries:
 
         A board decides with that frame, so later ones must not count. Frames in which the contact
         has lifted off are left out, as it may go on. But once it has been away for the skin's
-        `release_s`,
-        the contact was over when it lifted off, and these frames stay.
+        `release_s`, the contact was over when it lifted off, and these frames stay.
         """
         n = min(int(self.t.searchsorted(window_s)) + 1, self.t.size)
         felt = self.area[:n] > 0
@@ -89,7 +88,7 @@ class FeatureSeries:
 
 
 class _Row(NamedTuple):
-    """What one frame adds to a series."""
+    """The measurements of one frame."""
 
     t: float
     motion: float
@@ -157,8 +156,8 @@ class Contact:
                 motion = self._distance("motion", region.centroid, frame.joints)
             if measurer.force_motion:
                 # The contact's zone comes first.
-                row, col = zones[ROWS] / zones[FORCE], zones[COLS] / zones[FORCE]
-                centroid = row, col % self.layout.cols
+                _, _, force, rows, cols, *_ = zones
+                centroid = rows / force, cols / force % self.layout.cols
                 force_motion = self._distance("force_motion", centroid, frame.joints)
         elif self._rows:
             motion, force_motion = self._rows[-1].motion, self._rows[-1].force_motion
@@ -221,7 +220,7 @@ class Contact:
         return self._located(self.region.centroid, self.joints)
 
     def series(self) -> FeatureSeries:
-        """What was measured so far; later frames leave it as it is."""
+        """The measurements so far; later frames do not change them."""
         measured: dict[str, Any] = {
             name: None if values[0] is None else np.array(values)
             for name, values in zip(_Row._fields, zip(*self._rows, strict=True), strict=True)

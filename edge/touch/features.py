@@ -15,28 +15,13 @@ from edge.touch import kernels, measures
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
 from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import (
-    AREA,
-    COLS,
-    COLS_COLS,
-    FORCE,
-    KERNEL_CELLS,
-    KERNELS,
-    PEAK,
-    ROWS,
-    ROWS_COLS,
-    ROWS_ROWS,
-    ZONE_WIDTH,
-    ZONES,
-    Cells,
-    Feature,
-)
+from edge.touch.measures import KERNEL_CELLS, KERNELS, ZONE_WIDTH, ZONES, Cells, Feature
 
 FEATURES = measures.PAPER
 SAMPLES = 40
 WINDOW_S = 1.2
 MOTION_FLOOR = 0.1
-"""Motion that counts as noise of the centroid, in distances between taxels."""
+"""Motion that counts as noise of the centroid, in distances between rows."""
 
 
 def widths(
@@ -94,7 +79,8 @@ def feature_vector(
 
     Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus a
     floor, so that it stays finite at 0. The floor is the smallest force of a taxel in contact, one
-    taxel, or a tenth of the distance between taxels; it is 1 after another transform.
+    taxel, or a tenth of the distance between taxels; it is 1 after another transform. A stiffness
+    is above 0 and needs no floor; where no frame knows it, its logarithm is 0 too.
 
     Args:
         series: the contact.
@@ -105,7 +91,7 @@ def feature_vector(
 
     Returns:
         (sum of `widths`,) float64: by default max_force in newtons (or counts),
-        contact_area in taxels, contact_motion in metres, each at `samples` times.
+        contact_area in taxels, contact_motion in metres (or taxels), each at `samples` times.
 
     Raises:
         InputError: the window or the number of samples makes no sense, the series is empty, a
@@ -134,7 +120,7 @@ def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
 
 
 class _Course:
-    """What was measured on a contact, at times of its window."""
+    """The measurements of a contact, sampled at times of its window."""
 
     def __init__(
         self, series: FeatureSeries, window_s: float, tables: Mapping[str, KernelTable]
@@ -160,7 +146,8 @@ class _Course:
         floors = np.array([[self._floor(feature)] for feature in group])
         for transform in first.transforms:
             if transform == "log":
-                values = np.log(values + floors)
+                above = values + floors
+                values = np.log(np.where(above > 0.0, above, 1.0))
             elif transform == "sqrt":
                 values = np.copysign(np.sqrt(np.abs(values)), values)
             else:
@@ -220,10 +207,8 @@ class _Course:
         series, name, quantity = self._series, feature.zone, feature.quantity
         zone = self._zones.get(name)
         values: NDArray[Any] | None = None
-        if quantity == "motion":
-            values = series.motion
-        elif quantity == "force_motion":
-            values = series.force_motion
+        if quantity in ("motion", "force_motion"):
+            values = getattr(series, quantity)
         elif (name, quantity) == ("contact", "max_force"):
             values = series.peak / self._scale
         elif (name, quantity) == ("contact", "area"):
@@ -278,11 +263,11 @@ def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArra
     The centroid of an empty zone is NaN, everything else of it 0.
     """
     scale = layout.counts_per_newton or 1.0
-    force, area = sums[:, FORCE], sums[:, AREA]
+    peak, area, force, row_sum, col_sum, *_ = sums.T
     along, around = np.full((2, len(sums)), np.nan)
     touched = force > 0
-    np.divide(sums[:, ROWS], force, out=along, where=touched)
-    np.divide(sums[:, COLS], force, out=around, where=touched)
+    np.divide(row_sum, force, out=along, where=touched)
+    np.divide(col_sum, force, out=around, where=touched)
     if layout.wraps:
         # A contact that crosses the seam goes on; it does not jump to the other end.
         turn = layout.cols
@@ -290,15 +275,12 @@ def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArra
     # Variances and the covariance are whole numbers times force squared, so nothing cancels.
     # Products beyond 64 bits, of large skins, take Python's integers.
     bound = int(sums.max(initial=0)) * int(force.max(initial=0))
-    s = sums if bound < 1 << 62 else sums.astype(object)
+    exact = sums if bound < 1 << 62 else sums.astype(object)
+    _, _, f, r, c, rr, rc, cc = exact.T
     total = np.maximum(force, 1).astype(np.float64)
     rows, cols, slant = (
-        (s[:, FORCE] * s[:, product] - s[:, a] * s[:, b]).astype(np.float64) / total / total
-        for product, a, b in (
-            (ROWS_ROWS, ROWS, ROWS),
-            (COLS_COLS, COLS, COLS),
-            (ROWS_COLS, ROWS, COLS),
-        )
+        (f * products - a * b).astype(np.float64) / total / total
+        for products, a, b in ((rr, r, r), (cc, c, c), (rc, r, c))
     )
     larger = 0.5 * (rows + cols + np.hypot(rows - cols, 2.0 * slant))
     # The smaller eigenvalue is the determinant over the larger one: the difference of the
@@ -307,7 +289,7 @@ def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArra
     determinant = np.maximum(rows * cols - slant * slant, 0.0)
     smaller = np.divide(determinant, larger, out=np.zeros_like(larger), where=larger > 0)
     return {
-        "max_force": sums[:, PEAK] / scale,
+        "max_force": peak / scale,
         "force": force / scale,
         "area": area,
         "pressure": force / (np.maximum(area, 1) * scale),

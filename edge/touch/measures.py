@@ -1,4 +1,4 @@
-"""What is measured on a contact: features by name, and the whole numbers of each frame.
+"""Features of a contact by name, and the whole numbers that each frame gives for them.
 
 A feature's name is a zone and a quantity, such as `skin_force` or `left_width`; the paper's three
 features keep their own names. Transforms stand before the name (`log_`, `sqrt_`, `relative_`; the
@@ -78,13 +78,12 @@ _NAME = re.compile(
 )
 MOST_SAMPLES = 10_000
 MOST_CELLS = 256
-"""A skin of more taxels is pooled into cells."""
+"""The most cells of a skin; the taxels of a larger one are pooled."""
 KERNEL_CELLS = 32
-"""The same, for kernels."""
-PEAK, AREA, FORCE, ROWS, COLS, ROWS_ROWS, ROWS_COLS, COLS_COLS = range(8)
-"""Columns of the whole numbers of a zone: largest count, taxels, sum of counts, and the sums of
-counts times row, column, row squared, row times column, column squared."""
+"""The most cells that kernels take."""
 ZONE_WIDTH = 8
+"""Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the sums of
+counts times row, column, row squared, row times column, column squared."""
 
 
 @dataclass(frozen=True)
@@ -227,20 +226,20 @@ class Measurer:
         force_motion: whether its force-weighted centroid is followed.
         zones: the zones measured, in the order of `ZONES`.
         width: how many whole numbers `measure` returns for a frame.
-        columns: {zone: its part of them}.
+        columns: {zone: the slice of these numbers that it takes}.
         cells: the skin's cells where a feature needs them, else None.
-        kernel_cells: the same, for kernels.
+        kernel_cells: the fewer cells that kernels take, likewise.
         joints: number of joint angles kept of each frame; 0 where no feature needs them.
     """
 
     def __init__(self, layout: SkinLayout, wanted: Sequence[str], joints: int = 0) -> None:
         types = features(wanted)
+        quantities = {f.quantity for f in types}
         self._wraps = layout.wraps
-        self.motion = any(f.quantity == "motion" for f in types)
-        self.force_motion = any(f.quantity in ("force_motion", "stiffness") for f in types)
-        self.cells = Cells(layout) if any(f.quantity == "taxel_force" for f in types) else None
-        kernels = any(f.quantity == "taxel_kernels" for f in types)
-        self.kernel_cells = Cells(layout, KERNEL_CELLS) if kernels else None
+        self.motion = "motion" in quantities
+        self.force_motion = not quantities.isdisjoint(("force_motion", "stiffness"))
+        self.cells = Cells(layout) if "taxel_force" in quantities else None
+        self.kernel_cells = Cells(layout, KERNEL_CELLS) if "taxel_kernels" in quantities else None
         self.joints = joints if any(f.of_joints for f in types) else 0
         self.zones = tuple(zone for zone in ZONES if any(zone in f.zones for f in types))
         self.width = ZONE_WIDTH * len(self.zones)
@@ -266,15 +265,13 @@ class Measurer:
             return [0] * self.width
         row: list[int] = []
         for zone in self.zones:
-            counts = active.counts * (contact.mask if zone == "contact" else active.mask)
-            half = self._halves.get(zone)
-            if half is not None:
-                counts = counts[:, half]
+            half = self._halves.get(zone, slice(None))
+            mask = contact.mask if zone == "contact" else active.mask
+            counts = (active.counts * mask)[:, half]
             lines = self._rows @ counts  # of each column: counts, times row, times row squared
-            cut = best_cut(lines[0].tolist()) if self._wraps and half is None else 0
-            basis = self._cols[cut, slice(None) if half is None else half]
+            cut = best_cut(lines[0].tolist()) if self._wraps and zone not in self._halves else 0
             (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (
-                lines @ basis
+                lines @ self._cols[cut, half]
             ).tolist()
             row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
             row += force, rows, cols, rows_rows, rows_cols, cols_cols

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector
 from edge.touch.layout import SkinLayout
@@ -162,3 +163,14 @@ def test_what_is_too_large_is_refused_and_not_taken_for_unknown():
     large = series([0.0, 0.5, 1.2], [10, 20, 30], scale=1e-308)
     with pytest.raises(InputError, match="max_force is too large"):
         feature_vector(large, 1.2)
+
+
+def test_the_logarithm_of_a_stiffness_that_no_frame_knows_is_0():
+    """Without joint angles an arm's contact has no motion, and so no stiffness."""
+    layout = SkinLayout(4, 4, threshold_counts=99)
+    frames = [pressed(layout, i / 10, {(1, 1): 400}) for i in range(13)]
+    for chain, expected in ((Chain.cody(), 0.0), (None, math.log((400 + 100) / 0.1))):
+        contact = followed(layout, frames, features=["log_stiffness"], chain=chain)
+        vector = feature_vector(contact.series(), 1.2, 5, ["log_stiffness"])
+        assert vector.tolist() == [expected] * 5
+        assert contact.missing_pose == (chain is not None)
