@@ -4,8 +4,6 @@ This needs Chromium with its driver (Debian: `apt install chromium chromium-driv
 dependency group `browser`; tests are skipped with a reason where they are missing.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import shutil
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Recordings small enough to read, and a model fitted on them."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

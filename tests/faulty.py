@@ -5,7 +5,7 @@ import math
 import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
@@ -37,9 +37,7 @@ class Fault:
         bus, mux, channel, address: the target of the transaction.
     """
 
-    kind: Literal["none", "error", "flip", "misroute", "foreign", "reset", "hold", "break"] = (
-        "error"
-    )
+    kind: str = "error"
     code: int = errno.EREMOTEIO
     at: Collection[int] | None = None
     rate: float = 1.0

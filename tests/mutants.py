@@ -6,8 +6,6 @@ changed function; `[tool.mutmut]` in pyproject.toml names the files and the test
 mutant that no test noticed. Results are kept in `mutants/`, and no mutant is tried twice.
 """
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import signal

@@ -3,8 +3,6 @@
 Each function takes a valid file and a `Random` of hypothesis, which can so shrink the damage.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

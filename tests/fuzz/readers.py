@@ -1,11 +1,10 @@
 """Each reader of a file: its command, and the valid files that are damaged for it."""
 
-from __future__ import annotations
-
 import bz2
 import contextlib
 import io
 import json
+import re
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -32,6 +31,10 @@ from train.touch_map import TouchMap
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "edge" / "demo"
 MODEL = DEMO / "model.onnx"
+
+
+UNPRINTABLE = re.compile(r"[\0-\x08\n-\x1f\x7f-\x9f\u2028\u202e\ud800-\udfff]")
+"""Characters that act on a terminal or that no file can hold."""
 
 
 class Wrong(AssertionError):
@@ -72,22 +75,10 @@ def command(main: Callable[[list[str]], int], *words: object) -> None:
     errors = err.getvalue().replace("\r", "\n").strip()
     if status not in (0, 1, 2) or (status == 2 and not errors):
         raise Wrong(f"exit status {status} with {errors!r} on stderr")
-    if characters := unprintable((out.getvalue() + errors).replace("\n", "")):
+    if characters := UNPRINTABLE.findall((out.getvalue() + errors).replace("\n", "")):
         raise Wrong(f"prints {characters} unescaped")
     if status == 2:
         raise InputError(" ".join(errors.splitlines()))
-
-
-def unprintable(text: str) -> list[str]:
-    """The characters of a text that act on a terminal or that no file can hold."""
-    return [
-        c
-        for c in text
-        if (c < " " and c != "\t")
-        or "\x7f" <= c < "\xa0"
-        or "\ud800" <= c <= "\udfff"
-        or c in "\u202e\u2028"
-    ]
 
 
 def importing(kind: str, *more: str) -> Callable[[Path], None]:

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from edge.errors import EdgeError
-from tests.fuzz.readers import READERS, unprintable
+from tests.fuzz.readers import READERS, UNPRINTABLE
 
 CORPUS = Path(__file__).parent / "corpus"
 BY_NAME = {reader.name: reader for reader in READERS}
@@ -96,7 +96,7 @@ def test_damaged_files_end_in_an_answer_or_a_printable_sentence(reader, path_for
     @given(st.randoms(use_true_random=False))
     def check(draw):
         path.write_bytes(reader.mutate(draw.choice(seeds), draw))
-        assert unprintable(limited_refusal(reader, path)) == []
+        assert not UNPRINTABLE.search(limited_refusal(reader, path))
 
     check()
 

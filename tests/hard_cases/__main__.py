@@ -1,7 +1,5 @@
 """`python -m tests.hard_cases`: the hard cases as text and as a table in Markdown."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import textwrap
@@ -37,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Print and write the table; 1 if a case exceeds its bound."""
     parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("build/hard-cases"))
-    parser.add_argument("--only", default="", help="cases whose group and name hold this text")
+    parser.add_argument("--only", default="", help="cases whose name holds this text")
     arguments = parser.parse_args(argv)
     rows: list[tuple[str, ...]] = []
     beyond = 0

@@ -1,7 +1,5 @@
 """A hard case, and the search for the largest error of it."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -71,11 +69,9 @@ class Case:
     """A hazard with an oracle.
 
     Attributes:
-        group: the kind of hazard.
-        name: the hazard.
+        key: the kind of hazard, a colon, the hazard.
         oracle: what the answer is judged by.
         unit: what `error` measures.
-        bound: the most that it may be.
         error: the error at given parameters.
         hazard: the parameters that the case is known by.
         around: strategies of parameters near them, which the search draws from.
@@ -83,13 +79,12 @@ class Case:
         usual: measures what the usual tools give on the same hazard, in words.
         guard: whose price the table shows, if not that of the group.
         examples: how many the search draws.
+        bound: the largest error that is allowed.
     """
 
-    group: str
-    name: str
+    key: str
     oracle: str
     unit: str
-    bound: float
     error: Callable[..., float]
     hazard: Sequence[Mapping[str, Any]] = ({},)
     around: Mapping[str, Any] = field(default_factory=dict)
@@ -97,11 +92,7 @@ class Case:
     usual: Callable[[], str] | None = None
     guard: str = ""
     examples: int = EXAMPLES
-
-    @property
-    def key(self) -> str:
-        """Group and name, for people."""
-        return f"{self.group}: {self.name}"
+    bound: float = 0.0
 
     # Decompositions of this size only lose by a second thread, most of all beside others.
     @threadpool_limits.wrap(limits=1)

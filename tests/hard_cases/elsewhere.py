@@ -2,14 +2,11 @@
 of another ONNX Runtime or another architecture.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -49,20 +46,14 @@ def ask(
     Raises:
         subprocess.CalledProcessError: it ended with an error.
     """
-    folders = [str(folder.resolve()) for folder in sets(golden)]
-    with tempfile.TemporaryDirectory() as folder:
-        printed = subprocess.run(
-            [*python, "-c", GUEST, *folders],
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": path},
-            stdout=subprocess.PIPE,
-            text=True,
-            check=True,
-        ).stdout
+    # -P: the current folder, which may be the checkout, offers no modules.
+    command = [*python, "-P", "-c", GUEST, *map(str, sets(golden))]
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
     machine: dict[str, Any] = {}
     shares: dict[tuple[str, str], float] = {}
     name = ""
-    for line in map(json.loads, printed.splitlines()):
+    for line in map(json.loads, done.stdout.splitlines()):
         if line["event"] == "set":
             name = line["name"]
         elif line["event"] == "check":
@@ -79,10 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--golden", type=Path, default=Path("build/hard-cases/golden"))
     parser.add_argument("python", nargs="+", help="the command that runs the other Python")
     arguments = parser.parse_args(argv)
-    program, *words = arguments.python
-    if os.sep in program:
-        program = os.path.abspath(program)
-    machine, shares = ask(arguments.golden, [program, *words], str(ROOT))
+    machine, shares = ask(arguments.golden, arguments.python, str(ROOT))
     farthest = max(shares, key=lambda key: shares[key])
     print(
         f"ONNX Runtime {machine['onnxruntime']} on {machine['machine']}: {len(shares)} quantities "

@@ -1,7 +1,5 @@
 """The same bits with other threads, batches, types, optimisations and engines."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -68,11 +66,9 @@ def engine_usual() -> str:
 
 CASES = [
     Case(
-        "everywhere",
-        "threads, batches, optimisation, another engine, float32 input",
+        "everywhere: threads, batches, optimisation, another engine, float32 input",
         "the board's session, all at once",
         "outputs with another bit",
-        0,
         engine_error,
         [
             {"engine": engine, "n": n, "kind": kind, "seed": 0}

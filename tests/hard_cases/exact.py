@@ -1,7 +1,5 @@
 """Oracles that do not round: Python's whole numbers and fractions."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Any

@@ -4,8 +4,6 @@
 answers are the same. Every golden file holds the same hard frames beside its vectors.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys
@@ -58,7 +56,7 @@ def split(recording: Recording) -> Recording:
 
 
 def wrapped(recording: Recording) -> Recording:
-    assert recording.joints is not None
+    """The first joint's angle jumps by a turn from frame to frame."""
     joints = recording.joints.copy()
     joints[::2, 0] += 2.0 * math.pi
     return replace(recording, joints=joints)
@@ -68,7 +66,6 @@ def short(recording: Recording) -> Recording:
     """Let go after half the window, and touched from the first frame on."""
     frames = recording.frames[20:].copy()
     frames[60:] = 0
-    assert recording.joints is not None
     return replace(recording, frames=frames, t=recording.t[20:], joints=recording.joints[20:])
 
 

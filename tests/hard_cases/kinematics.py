@@ -1,7 +1,5 @@
 """The arm's kinematics: many steps, large and tiny angles, limits and wrapped angles."""
 
-from __future__ import annotations
-
 import json
 import math
 
@@ -72,23 +70,20 @@ def line_error(angle: float, step: float) -> float:
 
 CASES = [
     Case(
-        "kinematics",
-        "orthonormal over a million steps",
+        "kinematics: orthonormal over a million steps",
         "R R^T = 1",
         "largest entry of R R^T - 1",
-        5e-15,
         orthonormal_error,
         [{"steps": 1_000_000, "reach": 2.0}],
         {"steps": st.just(2000), "reach": st.floats(0, 1e6)},
         Ladder("radians a step", decades(0, 18, 1), seeded("reach", steps=2000)),
         examples=8,
+        bound=5e-15,
     ),
     Case(
-        "kinematics",
-        "large and tiny angles, and limits of joints wrapped by 2 pi",
+        "kinematics: large and tiny angles, and limits of joints wrapped by 2 pi",
         "Rodrigues' formula in 400 digits",
         "error of an entry, off the diagonal over a tiny angle",
-        1e-15,
         turn_error,
         [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)]
         + [
@@ -99,16 +94,16 @@ CASES = [
         {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
         Ladder("radians", decades(0, 300, 0.1), seeded("angle", seed=0)),
         examples=25,
+        bound=1e-15,
     ),
     Case(
-        "kinematics",
-        "a sender that wraps its angles between two lines",
+        "kinematics: a sender that wraps its angles between two lines",
         "the pose midway on the shorter way",
         "error of an entry",
-        2e-12,
         line_error,
         [{"angle": math.pi - 0.001, "step": 0.002}],
         {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
         Ladder("radians between two lines", [1e-9, 1e-3, 1.0, 3.1, 3.2], seeded("step", angle=3.0)),
+        bound=2e-12,
     ),
 ]

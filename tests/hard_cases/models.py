@@ -1,11 +1,7 @@
 """Models of the project and of the usual stack on the same training vectors."""
 
-from __future__ import annotations
-
-import math
 import tempfile
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -138,18 +134,6 @@ def converted(pipe: Any, X: Array) -> Callable[[Array], NDArray[Any]]:
 def answers_of_usual(pipe: Any, X: Array, queries: Array) -> dict[str, NDArray[Any]]:
     """The answers of scikit-learn and of its conversion."""
     return {"scikit-learn": pipe.predict(queries), "skl2onnx": converted(pipe, X)(queries)}
-
-
-def microseconds(calls: Sequence[Callable[[], object]], rounds: int = 40) -> list[float]:
-    """Shortest time of each call, taken in turns, so that other load on the machine hits all."""
-    shortest = [math.inf] * len(calls)
-    for _ in range(rounds):
-        for i, call in enumerate(calls):
-            for _ in range(4):
-                began = time.perf_counter()
-                call()
-                shortest[i] = min(shortest[i], time.perf_counter() - began)
-    return [1e6 * seconds for seconds in shortest]
 
 
 def usual_neighbours(X: Array, queries: Array, components: int = 6) -> str:

@@ -1,7 +1,5 @@
 """Neighbours: which rows are nearest, in order, by whole numbers that never round."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -187,9 +185,8 @@ def answers(
 ) -> Case:
     """A row whose answers whole numbers judge."""
     around = around | SEEDED if "seed" in hazard[0] else around
-    return Case(
-        "neighbours", name, WHOLE, LISTS, 0, error, hazard, around, ladder, usual, examples=4
-    )
+    key = f"neighbours: {name}"
+    return Case(key, WHOLE, LISTS, error, hazard, around, ladder, usual, examples=4)
 
 
 BY_ROWS: dict[str, Any] = {
@@ -206,11 +203,9 @@ CASES = [
         {"n": st.just(160), "spread": powers_of_ten(-7, -2)},
     ),
     Case(
-        "neighbours",
-        "distances of near-duplicates",
+        "neighbours: distances of near-duplicates",
         "fractions, nothing rounded",
         "error over the longest training row",
-        1e-6,
         grid_error,
         [{"spread": 1e-7, "seed": 0}],
         {"spread": powers_of_ten(-9, -2), "seed": SEEDS},
@@ -228,6 +223,7 @@ CASES = [
             )
         ),
         examples=3,
+        bound=1e-6,
     ),
     answers(
         "offset 1e6, deviation 0.01",
@@ -294,11 +290,9 @@ CASES = [
         Ladder("shrinkage", decades(0, -12, 0.5), seeded("shrinkage", seed=0)),
     ),
     Case(
-        "neighbours",
-        "queries outside the training set: cut off, and flagged",
+        "neighbours: queries outside the training set: cut off, and flagged",
         WHOLE,
         f"{LISTS}, or a flag that is wrong",
-        0,
         far_error,
         [{"factor": factor, "seed": 0} for factor in (1.0, 10.0, 1e6)],
         {"factor": powers_of_ten(0, 6), "seed": SEEDS},

@@ -1,7 +1,5 @@
 """Numbers that are not finite are refused wherever frames, angles and vectors enter."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections.abc import Callable
@@ -139,21 +137,17 @@ def usual() -> str:
 
 CASES = [
     Case(
-        "refusals",
-        f"NaN and infinity at {len(ENTRIES)} places where they can enter",
+        f"refusals: NaN and infinity at {len(ENTRIES)} places where they can enter",
         "one sentence, no result",
         "let in",
-        0,
         let_in,
         [{"entry": entry, "bad": bad} for entry in ENTRIES for bad in BAD],
         usual=usual,
     ),
     Case(
-        "refusals",
-        "finite, but beyond float64 once scaled",
+        "refusals: finite, but beyond float64 once scaled",
         "one sentence, no result",
         "let in",
-        0,
         let_in,
         [
             {"entry": entry, "bad": size}

@@ -1,7 +1,5 @@
 """All hard cases, in the order of the table."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 from tests.hard_cases.cases import Case

@@ -1,7 +1,5 @@
 """The simulator's hard cases, by its own judges."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 
@@ -18,7 +16,7 @@ def push_error(h: float, mu: float, steps: int = 120) -> float:
     trace = rig.run(steps)
     pushes = (Trace(*(seen[:, i : i + 1] for seen in trace)) for i in range(mass.size))
     judged = zip(pushes, stiffness, mass, strict=True)
-    return float(sum(bool(judge(push, k, m, h, mu, 0.8 * mu)) for push, k, m in judged))
+    return float(sum(bool(judge(push, k, m, mu, 0.8 * mu)) for push, k, m in judged))
 
 
 def lugre(h: float, v: float = 0.2, sigma: float = 1e5, hold: float = 1.0) -> float:
@@ -35,11 +33,9 @@ def lugre(h: float, v: float = 0.2, sigma: float = 1e5, hold: float = 1.0) -> fl
 
 CASES = [
     Case(
-        "simulator",
-        "stiffness x mass x step x friction, 1e-3 to 1e15 N/m, 1e-9 to 1e9 kg",
+        "simulator: stiffness x mass x step x friction, 1e-3 to 1e15 N/m, 1e-9 to 1e9 kg",
         "force, stick, energy ledger",
         "pushes with a complaint",
-        0,
         push_error,
         [{"h": h, "mu": mu} for h in (0.001, 0.01, 0.02, 0.05, 0.1, 0.2) for mu in (0.05, 1.0)],
         {"h": powers_of_ten(-3.0, -0.7), "mu": st.floats(0.05, 1.0), "steps": st.just(30)},

@@ -1,18 +1,12 @@
 """An unmodified smbus2 end to end: open, I2C_TIMEOUT, I2C_RDWR and errno over a C shim."""
 
-import importlib.util
 import subprocess
 import sys
 import textwrap
-from pathlib import Path
 
 import pytest
 
-_spec = importlib.util.spec_from_file_location(
-    "shim_build", Path(__file__).with_name("shim") / "build.py"
-)
-shim = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(shim)
+from tests.edge.i2c.shim import build as shim
 
 pytestmark = pytest.mark.skipif(
     shim.compiler() is None, reason="needs Linux and a C compiler to stand in for /dev/i2c-N"

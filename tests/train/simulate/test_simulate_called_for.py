@@ -34,15 +34,16 @@ def scene(*add, leave_out=(), objects=None, **trials):
 
 
 def everything():
-    """One object of each family, with every key that calls for an effect."""
+    """One object of each family, with every key that calls for an effect; a plant of few stems."""
     full = {
         **MOVES, "skin_friction": 0.3, "cover_n_m": 3000.0, "stribeck_m_s": 0.05, "base_m": 0.1,
         "height_m": 0.3, "foot_m": 0.2, "aside_m": 0.02, "slope_deg": 1.0,
     }  # fmt: skip
-    return [
+    objects = [
         {"name": family, "family": family, "conditions": ["fixed", "movable"], **full}
         for family in ("rigid", "foam", "pillow", "bubbles", "foliage")
     ]
+    return [*objects, {**objects[-1], "name": "plant", "stem_count": 6}]
 
 
 def batch_of(trial_scene, index=0):

@@ -108,12 +108,6 @@ class TestSliding:
         assert errors[0] < 0.02
         assert errors[1] < errors[0]
 
-    @pytest.mark.parametrize(("mass", "seconds"), [(1.0, 0.2), (5.0, 1.0)])
-    def test_the_time_floor_of_looking_movable(self, mass, seconds):
-        batch = run(make(movable(mass, 0.4, 0.35, width_m=0.05)))
-        start = batch.t[np.argmax(batch.traces["slide_m"][0] > 0.0)] - 0.2
-        assert start == pytest.approx(seconds, rel=0.25)
-
     def test_it_tips_before_it_slides_where_mu_says_so(self):
         height = 0.4
         for mu, tips in ((0.30, False), (0.60, True)):

@@ -1,7 +1,5 @@
 """Builds the stand-in for /dev/i2c-N that lets an unmodified smbus2 run without hardware."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
