@@ -299,10 +299,8 @@ def _learning(exported: Exported) -> Section:
     folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
     largest = n * (1.0 - 1.0 / folds)
     sizes = [round(largest * quarter / QUARTERS) for quarter in range(1, QUARTERS + 1)]
-    results = {}
-    for task, answer in exported.answers.items():
-        hits = (answer.answers == answer.truth)[:, answer.truth != ""]
-        results[task] = [Result(int(quarter.sum()), quarter.size) for quarter in hits]
+    hits = {t: (a.answers == a.truth)[:, a.truth != ""] for t, a in exported.answers.items()}
+    results = {t: [Result(int(q.sum()), q.size) for q in quarters] for t, quarters in hits.items()}
     rows: list[Row] = [
         {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}
         for i, size in enumerate(sizes)

@@ -7,7 +7,7 @@ import csv
 import html
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +38,6 @@ def table_csv(table: Table) -> dict[str, str]:
 def _text(text: str) -> str:
     """The text as HTML; words between backquotes become code."""
     return CODE.sub(r"<code>\1</code>", html.escape(text, quote=False))
-
-
-def _paragraphs(texts: Iterable[str]) -> list[str]:
-    return [f"<p>{_text(text)}</p>" for text in texts]
 
 
 def _decimals(values: Sequence[Any]) -> int:
@@ -92,7 +88,7 @@ def _section(section: Section, folded: bool) -> str:
     terms = [f"<dt>{_text(a)}</dt><dd>{_text(b)}</dd>" for a, b in section.terms.items()]
     body = [
         section.widget,
-        *_paragraphs(section.text),
+        *(f"<p>{_text(text)}</p>" for text in section.text),
         *map(_figure, section.figures),
         *(_table(table) for table in section.tables if table.rows),
         *(["<dl>", *terms, "</dl>"] if terms else []),
@@ -112,7 +108,7 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>",
             f"<h1>{_text(title)}</h1>",
-            *_paragraphs(lead),
+            *(f"<p>{_text(text)}</p>" for text in lead),
             *(_section(section, i > 0) for i, section in enumerate(sections)),
             "</body></html>\n",
         ]

@@ -280,11 +280,10 @@ def _against(known: Mapping[Entry, Row], title: str) -> Figure:
         axes.plot(ends, ends, color="0.4", lw=1, label="equal accuracies")
         for entry, row in known.items():
             colour, _, dashes = strokes[entry.task]
-            face = colour if row["within"] == "yes" else "white"
-            bar = [entry.percent + row["from"], entry.percent + row["to"]]
-            axes.plot([entry.percent] * 2, bar, color=colour, lw=1, alpha=0.6, ls=dashes)
-            style = {"color": colour, "mfc": face, "ms": 6}
-            axes.plot(entry.percent, row["ours %"], marks[entry.table], **style)
+            x, face = entry.percent, colour if row["within"] == "yes" else "white"
+            bar = [x + row["from"], x + row["to"]]
+            axes.plot([x, x], bar, color=colour, lw=1, alpha=0.6, ls=dashes)
+            axes.plot(x, row["ours %"], marks[entry.table], color=colour, mfc=face, ms=6)
         for task, (colour, _, dashes) in strokes.items():
             axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
         for table, mark in marks.items():

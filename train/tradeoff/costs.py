@@ -60,13 +60,12 @@ class Change:
 
 def every_nth(recording: Recording, n: int) -> Recording:
     """The recording as a wire that carries only every n-th frame would have made it."""
-    joints = None if recording.joints is None else recording.joints[::n]
-    valid = recording.valid
+    joints, valid = recording.joints, recording.valid
     return replace(
         recording,
         t=recording.t[::n],
         frames=recording.frames[::n],
-        joints=joints,
+        joints=None if joints is None else joints[::n],
         valid=valid[::n] if valid is not None and valid.ndim == 3 else valid,
     )
 

@@ -75,8 +75,7 @@ def tradeoff(
     dataset = followed(raw, progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}")
-    if main is None:
-        main = "category" if "category" in dataset.tasks else dataset.tasks[0]
+    main = main or ("category" if "category" in dataset.tasks else dataset.tasks[0])
     if main not in dataset.tasks:
         raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
