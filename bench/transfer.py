@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -196,15 +196,16 @@ def score(model: Model, by_habit: Mapping[str, list[Path]]) -> str:
             summary.add(recording.labels, events)
             pooled.add(recording.labels, events)
         if paths:
-            rows.append(row(habit, summary))
-    lines = [f"{'right':<20}" + "".join(f"{task:>26}" for task in tasks), row("all", pooled), *rows]
+            rows.append(row(habit, summary, tasks))
+    head = f"{'right':<20}" + "".join(f"{task:>26}" for task in tasks)
+    lines = [head, row("all", pooled, tasks), *rows]
     lines.append(f"{'unknown':<20}{share(unknown, pooled.recordings):>26}")
     return "\n".join([*lines, "", pooled.text()])
 
 
-def row(name: str, summary: Summary) -> str:
+def row(name: str, summary: Summary, tasks: Iterable[str]) -> str:
     """A line of the table: the right decisions of each task."""
-    cells = "".join(f"{share(*summary.right(task)):>26}" for task in summary.tasks)
+    cells = "".join(f"{share(*summary.right(task)):>26}" for task in tasks)
     return f"{name:<20}{cells} of {summary.recordings}"
 
 

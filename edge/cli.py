@@ -70,8 +70,8 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse the arguments and run the command; returns the exit status.
 
     An expected error becomes one sentence on stderr and exit status 2 or 3. Meanwhile, log messages
-    are printed to stderr, one line each. A shell that asks for
-    completions gets them, if argcomplete is installed.
+    are printed to stderr, one line each. A shell that asks for completions gets them if argcomplete
+    is installed.
     """
     _open_missing_streams()
     if "_ARGCOMPLETE" in os.environ:
@@ -88,15 +88,6 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     for logger in loggers:
         logger.addHandler(handler)
         logger.setLevel(level)
-    try:
-        return _run(top, arguments)
-    finally:
-        for logger, former in zip(loggers, before, strict=True):
-            logger.removeHandler(handler)
-            logger.setLevel(former)
-
-
-def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
     try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()
@@ -117,6 +108,10 @@ def _run(top: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    finally:
+        for logger, former in zip(loggers, before, strict=True):
+            logger.removeHandler(handler)
+            logger.setLevel(former)
 
 
 def _open_missing_streams() -> None:

@@ -62,6 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--out",
+        type=Path,
         default="recordings",
         metavar="FOLDER|FILE.npz",
         help="a folder for numbered trials (default: %(default)s), or a file for one trial",
@@ -136,25 +137,23 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     )
 
 
-def trial_path(out: str, labels: dict[str, str]) -> Path:
+def trial_path(out: Path, labels: dict[str, str]) -> Path:
     """The file for the next trial: `out` itself, or a file with the first free number in `out`.
 
     Raises:
         InputError: `out` names a file that exists, or that no folder can hold.
     """
-    path = Path(out)
-    if path.suffix == ".npz":
-        # A name of 300 characters, for one, cannot be looked up.
-        with refusing(f"{path}: cannot be written"), suppress(FileNotFoundError):
-            path.lstat()
-            raise InputError(f"{path}: exists already; choose another name or remove it")
-        return path
     # A listing of the folder omits names that begin with a dot.
     stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
-    with refusing(f"{path}: cannot be written"):
-        taken = {p.name for p in path.glob(f"{stem}-*.npz")}
-    names = (f"{stem}-{number:03}.npz" for number in count(1))
-    return path / next(name for name in names if name not in taken)
+    with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
+        if out.suffix != ".npz":
+            taken = {path.name for path in out.glob(f"{stem}-*.npz")}
+            names = (f"{stem}-{number:03}.npz" for number in count(1))
+            return out / next(name for name in names if name not in taken)
+        with suppress(FileNotFoundError):
+            out.lstat()
+            raise InputError(f"{out}: exists already; choose another name or remove it")
+    return out
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -162,7 +161,7 @@ def run(arguments: argparse.Namespace) -> int:
     labels: dict[str, str] = {}
     for task, label in arguments.label:
         labels.setdefault(task, label)
-    folder = None if arguments.out.endswith(".npz") else Path(arguments.out)
+    folder = None if arguments.out.suffix == ".npz" else arguments.out
     by_key = terminal.is_interactive() and arguments.web is None
     # Only the page of a folder takes labels.
     if not labels and (arguments.web is None or folder is None):
@@ -240,7 +239,7 @@ class Recorder:
         any_joints: whether a saved frame had joint angles.
     """
 
-    out: str
+    out: Path
     labels: dict[str, str]
     meta: dict[str, Any]
     names: Sequence[str] | None
@@ -292,8 +291,6 @@ class Recorder:
         if trial.joints is not None and unposed:
             LOG.warning(f"{path}: {unposed} of {len(frames)} frames have no joint angles")
             event["frames_without_joints"] = unposed
-        if not complete:
-            event["reason"] = "reading stopped before the contact's end"
         self.lines.write([event])
         if self.page is not None:
             self.page.saved(path, trial)

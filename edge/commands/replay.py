@@ -115,11 +115,6 @@ class Summary:
         for task in self._pairs.keys() & labels:
             self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
 
-    @property
-    def tasks(self) -> list[str]:
-        """The tasks that are compared."""
-        return list(self._pairs)
-
     def right(self, task: str) -> tuple[int, int]:
         """The number of right decisions, and of labelled recordings, of a task."""
         pairs = self._pairs[task]

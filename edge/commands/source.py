@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import signal
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from edge.fake.player import Playback, play, skin_file
 from edge.model.model import Model, require_joints
 from edge.recording import load
 from edge.runtime.event_writer import Lines, LineWriter
-from edge.runtime.joint_stream import Datagrams, Joints, Source, from_file
+from edge.runtime.joint_stream import Joints, joint_source
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
@@ -122,40 +121,6 @@ def open_skin(
         yield Opened(skin, lasts_s, playback, source)
 
 
-def open_joints(
-    arguments: argparse.Namespace, opened: Opened, arm: Chain | None, dof: int, stack: ExitStack
-) -> Joints:
-    """The source of joint angles that `--joints` names.
-
-    Args:
-        arguments: with the options of `options.add_reading`.
-        opened: the skin that is being read.
-        arm: whose joint angles are wanted, or None if it is unknown.
-        dof: how many angles a line must have.
-        stack: closes the source.
-
-    Raises:
-        InputError: the option cannot be used.
-    """
-    kind, _, address = arguments.joints.partition(":")
-    source: Source
-    if kind == "udp":
-        source = stack.enter_context(closing(Datagrams(address)))
-    elif arguments.joints == "stdin":
-        source = from_file(sys.stdin.fileno())
-    else:
-        raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {arguments.joints!r}")
-    clock = opened.skin.clock
-    now = clock.real if isinstance(clock, PacedClock) else clock.now
-    return Joints(source, dof=dof, names=None if arm is None else arm.names, now=now)
-
-
-def report_malformed(joints: Joints) -> None:
-    """Warn of lines of joint angles that could not be used."""
-    if joints.malformed:
-        LOG.warning(f"--joints: unusable lines: {joints.malformed}; the last one: {joints.problem}")
-
-
 @dataclass(frozen=True)
 class Reading(Opened):
     """A skin that is being read, with its loop, page and output.
@@ -247,8 +212,11 @@ def reading(
         if arguments.joints is not None:
             if dof is None:
                 raise InputError("the model uses no joint angles; leave --joints out")
-            joints = open_joints(arguments, opened, arm, dof, stack)
-            stack.callback(report_malformed, joints)
+            clock = opened.skin.clock
+            now = clock.real if isinstance(clock, PacedClock) else clock.now
+            source = stack.enter_context(joint_source(arguments.joints))
+            names = None if arm is None else arm.names
+            joints = stack.enter_context(closing(Joints(source, dof=dof, names=names, now=now)))
         elif model is not None and needs_joints:
             require_joints(model, opened.dof, opened.source)
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)

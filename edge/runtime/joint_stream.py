@@ -13,10 +13,12 @@ import math
 import os
 import select
 import socket
+import sys
 import time
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from operator import itemgetter
 
 import numpy as np
@@ -107,6 +109,11 @@ class Joints:
             return angles + (sent - before_s) / (after_s - before_s) * turned
         return angles if sent - before_s <= OLDEST_S else None
 
+    def close(self) -> None:
+        """Report the lines that were not used."""
+        if self.malformed:
+            LOG.warning(f"--joints: unusable lines: {self.malformed}; the last one: {self.problem}")
+
     def _take(self) -> None:
         """Parse the lines that have come."""
         arrived, data = self._now(), b""
@@ -154,6 +161,23 @@ class Joints:
             self._recent.clear()
         self._recent.append(arrived - t)
         self._poses.append((float(t), np.array(q, dtype=np.float64)))
+
+
+@contextmanager
+def joint_source(option: str) -> Iterator[Source]:
+    """The source that `--joints` names, closed at the end of the block.
+
+    Raises:
+        InputError: the option names none, or the address cannot be bound.
+    """
+    kind, _, address = option.partition(":")
+    if kind == "udp":
+        with closing(Datagrams(address)) as source:
+            yield source
+    elif option == "stdin":
+        yield from_file(sys.stdin.fileno())
+    else:
+        raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {option!r}")
 
 
 def from_file(fd: int) -> Source:

@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[3]
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
     for label in (".box", "..", "a/b\0c", "x" * 500, "\U0001f4e6" * 300, ""):
-        path = trial_path(str(tmp_path), {"object": label})
+        path = trial_path(tmp_path, {"object": label})
         assert path.parent == tmp_path
         assert not path.name.startswith(".")
         path.write_bytes(b"")
@@ -37,7 +37,7 @@ def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp
 @contextmanager
 def recorder(folder, out=None, *, names=None):
     with closing(Lines(out or io.StringIO())) as lines:
-        yield Recorder(str(folder), {"object": "box"}, {}, names, lines)
+        yield Recorder(folder, {"object": "box"}, {}, names, lines)
 
 
 def frames(*poses):
