@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from edge.files import parsing
 from edge.model.model import Model
 
-STEPS = (1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
-"""Multiples of the change that makes the rival as near; several votes may take more."""
+STEPS = (0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
+"""Multiples of the change at which two trials become equally near. A further trial on the way may
+take less, several votes more."""
 
 
 class Space(NamedTuple):
@@ -127,7 +128,8 @@ class Explanation(NamedTuple):
         pulls: {feature: how much more it pulls towards the nearest trial with the answer than
             towards the rival}, the strongest first.
         changes: one for each feature that can change the answer, the smallest of them, in
-            deviations of the training trials, first.
+            deviations of the training trials, first. There are none where the votes are for
+            another label already, and the answer follows from other tasks.
     """
 
     voters: tuple[Near, ...]
@@ -160,7 +162,8 @@ def explain(
     members = {name: feature_of == name for name in features if name in feature_of}
     differences = space.differences(vector)
     shifts = np.array([differences[c] @ space.weights[c] for c in members.values()])
-    squares = ((space.rows - space.coordinates(differences)) ** 2).sum(axis=1)
+    z = space.coordinates(differences)
+    squares = ((space.rows - z) ** 2).sum(axis=1)
 
     def pulls(towards: NDArray[np.float64]) -> dict[str, float]:
         by_feature = zip(members, (2.0 * shifts @ towards).tolist(), strict=True)
@@ -171,18 +174,26 @@ def explain(
         return Near(row, int(space.labels[row]), distance, pulls(space.rows[row]))
 
     nearest, answered = tuple(map(near, voters)), space.labels == label
-    if answered.all():
-        return Explanation(nearest)
     others = space.labels == truth
-    others = others if truth != label and others.any() else ~answered
+    if truth == label or not others.any():
+        others = ~answered & (space.labels >= 0)
+    if not others.any():
+        return Explanation(nearest)
     ally, rival = (int(np.where(rows, squares, np.inf).argmin()) for rows in (answered, others))
-    direction = space.rows[ally] - space.rows[rival]
+    pulled = pulls(space.rows[ally] - space.rows[rival])
+    if space.vote(z, len(voters)) != label:
+        return Explanation(nearest, near(rival), pulled)
+    # A vote changes where a trial of another label comes as near as the last one for the answer.
+    votes = np.isin(np.arange(len(squares)), voters)
+    leaves = np.where(votes & answered, squares, -np.inf).argmax()
+    joins = np.where(others & ~votes, squares, np.inf).argmin()
+    direction = space.rows[leaves] - space.rows[joins]
     changes = []
     for name, columns in members.items():
         slope = 2.0 * space.weights[columns] @ direction
         if not slope.any():
             continue
-        step = slope * (min(squares[ally] - squares[rival], 0.0) / (slope @ slope))
+        step = slope * (min(squares[leaves] - squares[joins], 0.0) / (slope @ slope))
         for times in STEPS:
             changed = differences.copy()
             changed[columns] += times * step
@@ -193,4 +204,4 @@ def explain(
                 changes.append((times**2 * (step**2).mean(), change))
                 break
     ordered = tuple(change for _, change in sorted(changes, key=lambda pair: pair[0]))
-    return Explanation(nearest, near(rival), pulls(direction), ordered)
+    return Explanation(nearest, near(rival), pulled, ordered)

@@ -64,6 +64,34 @@ def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
     )
 
 
+VOTES = Space(
+    columns=np.arange(1),
+    mean=np.zeros(1),
+    gain=np.ones(1),
+    weights=np.ones((1, 1)),
+    rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [np.inf]]),
+    labels=np.array([1, 0, 0, 1, -1]),
+)
+"""Three trials vote at 0: the nearest for label 1, the others for label 0. One has no label."""
+
+
+def test_a_change_is_found_where_the_nearest_trial_was_outvoted():
+    why = explain(VOTES, np.zeros(1), [0, 1, 2], 0, ["force"], [1])
+    assert (why.rival.row, why.rival.distance) == (0, 1.0)
+    # At -0.5 the trial at -3 is as near as that at 2; a fifth more makes it nearer.
+    assert why.changes == (Change("force", 1, pytest.approx(0.6), pytest.approx(-0.6)),)
+
+
+def test_an_answer_that_its_votes_do_not_give_has_no_change():
+    """Tasks that are decided together may give it; a label of its votes would be no change."""
+    assert explain(VOTES, np.zeros(1), [0, 1, 2], 1, ["force"], [1]).changes == ()
+
+
+def test_a_trial_without_a_label_is_no_rival():
+    space = VOTES._replace(labels=np.array([0, 0, 0, 0, -1]))
+    assert explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1]).rival is None
+
+
 def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(exported, tmp_path):
     """Three decision points; one task takes one feature, the other lacks labels."""
     info = replace(Model(exported / "model.onnx").info, decision_points_s=(0.3, 0.6, 1.2))
