@@ -1,7 +1,5 @@
 """The clock of a skin and its loop; a fake skin may have a virtual one (`edge.fake.clock`)."""
 
-from __future__ import annotations
-
 import time
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Statistics of accuracies."""
 
-from __future__ import annotations
-
 import math
 
 

@@ -1,7 +1,5 @@
 """A fake bus: models of chips on a wire, refusing the transactions that real adapters refuse."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable, Mapping, Sequence
 

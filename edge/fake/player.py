@@ -1,7 +1,5 @@
 """A fake skin: a recording or any other scene, played onto the registers of fake chips."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

@@ -6,8 +6,6 @@ place, strength and speed. They serve to rehearse before a wire is soldered; a m
 knows nothing of the real skin.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -6,8 +6,6 @@ is attached over USB/IP (Documentation/usb/usbip_protocol.rst): the kernel's vir
 program then reaches the bus through the kernel, as it reaches a real one.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import socket

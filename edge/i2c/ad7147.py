@@ -4,8 +4,6 @@ Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-incre
 sheet). The start sequence is that of robotology/icub-firmware and of Linux's driver ad714x.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 

@@ -9,8 +9,6 @@ docs/block-protocol.md describes the protocol for whoever writes the firmware, a
 examples/firmware/ has one.
 """
 
-from __future__ import annotations
-
 from binascii import crc_hqx
 
 import numpy as np

@@ -5,8 +5,6 @@ The drivers use only the transactions that every adapter carries: `[write]`, `[r
 last, the Pi 5 a second address in one call.
 """
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import math

@@ -4,8 +4,6 @@ Registers have 8 bits behind an 8-bit pointer, with auto-increment. Most take a 
 the chip is stopped (MPR121 data sheet; application note AN3944 for the filter).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -6,8 +6,6 @@ in a CRC-16 of its own. Packets are encoded with COBS (consistent overhead byte 
 a zero byte always ends a packet, wherever reading begins.
 """
 
-from __future__ import annotations
-
 import errno
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Tasks that agree: one whose labels are the pairs of two others' labels is decided with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A model.onnx on the board, and its decisions."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ a few fields of the ONNX protobuf (onnx.proto3) shows that a file refers to noth
 and uses only the operators of an exported model, in a graph of its size.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -20,8 +20,6 @@ be equal. Distances have none: they come from whole numbers, and an engine that 
 gives others.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

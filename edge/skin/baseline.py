@@ -1,7 +1,5 @@
 """Counts above a baseline that follows slow drift, in integers, so that results repeat."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

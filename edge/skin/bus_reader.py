@@ -6,8 +6,6 @@ second of its return. While a chip is being set up, the others are read in every
 frame, and the time saved goes to it, one transaction at a time.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

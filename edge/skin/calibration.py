@@ -1,7 +1,5 @@
 """A skin's calibration: written into its file, and the dead band that follows from its noise."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

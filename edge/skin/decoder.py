@@ -1,7 +1,5 @@
 """From the bytes of all chips to raw taxel values, and which of them can be trusted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import groupby
 

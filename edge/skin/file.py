@@ -1,7 +1,5 @@
 """`skin.toml`: the taxel of each chip stage, and the meaning of its counts."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields

@@ -1,7 +1,5 @@
 """The kinds of chips that a skin file may name, and the defaults that follow from them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from edge.i2c import ad7147, block, mpr121

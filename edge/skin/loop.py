@@ -1,7 +1,5 @@
 """The loop in real time: frames with their joint angles at ticks that do not drift."""
 
-from __future__ import annotations
-
 import gc
 import math
 import signal

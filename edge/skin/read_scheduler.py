@@ -5,8 +5,6 @@ contact, the chips at and around the touched taxels come before all others, exce
 overdue. A taxel that was not read keeps its last value and its own time (`Frame.times`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

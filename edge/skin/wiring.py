@@ -1,7 +1,5 @@
 """A skin's buses and chips: the `[[bus]]` tables of its file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A contact's series to the vector that is classified (paper, section III-B)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby

@@ -1,7 +1,5 @@
 """One reading of the whole skin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

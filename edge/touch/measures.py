@@ -13,8 +13,6 @@ a forearm). Centroids and spreads are weighted by force. Only zones that some fe
 measured.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Thresholds that suit a recording's own noise."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

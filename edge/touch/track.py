@@ -1,7 +1,5 @@
 """Contacts over time: when each begins, which region it is, and when it ends."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Joints of a URDF file (wiki.ros.org/urdf/XML) between two of its links."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ElementTree
 from typing import Any
