@@ -86,12 +86,11 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
     """The file with its calibration, or with that of fake chips with this noise."""
     if file.calibration is not None:
         return file
-    baseline = np.zeros(file.layout.rows * file.layout.cols, dtype=np.uint16)
+    baseline = np.zeros(file.layout.shape, dtype=np.uint16)
     for chip in file.chips:
-        baseline[[taxel for taxel in chip.taxels if taxel != UNUSED]] = chip.kind.rest(chip)
-    shape = file.layout.shape
-    noise = np.full(shape, noise_counts)
-    return replace(file, calibration=TaxelCalibration(baseline.reshape(shape), noise))
+        baseline.flat[[taxel for taxel in chip.taxels if taxel != UNUSED]] = chip.kind.rest(chip)
+    noise = np.full(baseline.shape, noise_counts)
+    return replace(file, calibration=TaxelCalibration(baseline, noise))
 
 
 def fake_buses(
@@ -180,7 +179,6 @@ def fake_skin(
     buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts)
     skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
     skin.start()
-    clock.sleep_until(clock.now())
     return skin
 
 

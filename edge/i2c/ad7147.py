@@ -99,11 +99,7 @@ class AD7147(Chip):
     """
 
     def __init__(
-        self,
-        bus: Bus,
-        address: int,
-        *,
-        into: NDArray[np.uint8] | int = 2 * STAGES,
+        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * STAGES
     ) -> None:
         """Identify the chip.
 

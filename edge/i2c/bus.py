@@ -11,6 +11,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fcntl import LOCK_EX, LOCK_NB, flock, ioctl
 from pathlib import Path
@@ -244,14 +245,12 @@ def device_path(device: str | int) -> str:
 
 def lock_holder(fd: int) -> str:
     """Name and number of the process that holds the lock of an open file."""
-    try:
+    with suppress(OSError, IndexError):
         inode = str(os.fstat(fd).st_ino)
         for line in Path("/proc/locks").read_text().splitlines():
             fields = line.split()
             if fields[1] == "FLOCK" and fields[5].split(":")[-1] == inode:
                 return f"{Path('/proc', fields[4], 'comm').read_text().strip()} ({fields[4]})"
-    except (OSError, IndexError):
-        pass
     return "another program"
 
 
@@ -327,9 +326,8 @@ class LinuxBus:
             flock(smbus.fd, LOCK_EX | LOCK_NB)
             ioctl(smbus.fd, I2C_TIMEOUT, max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)))
         except BlockingIOError:
-            other = lock_holder(smbus.fd)
+            remedy = f"{lock_holder(smbus.fd)} is using the bus; end it first"
             smbus.close()
-            remedy = f"{other} is using the bus; end it first"
             raise bus_error(errno.EBUSY, self.name, remedy=remedy) from None
         except OSError as error:
             smbus.close()

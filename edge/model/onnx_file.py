@@ -31,15 +31,16 @@ NODES, INITIALIZERS, SPARSE = 1, 5, 15
 OPERATOR, ATTRIBUTES, DOMAIN = 4, 5, 7
 """Fields of a NodeProto."""
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
-"""Fields of an attribute that is a number or several: it holds no tensor and no graph."""
+"""Fields of an attribute that is a number, a text or several numbers, not a tensor or a graph."""
 TENSOR_NAME, EXTERNAL_DATA, DATA_LOCATION = 8, 13, 14
 """Fields of a TensorProto."""
 
 TYPES = {1: "<f4", 7: "<i8", 9: "|b1", 11: "<f8"}
 """{type of a TensorProto: its numbers}."""
 
-Message = dict[int, list[int | memoryview]]
-"""{field number: its values}: a number, or the bytes of a text or of a message within."""
+Message = dict[int, list[Any]]
+"""{field number: its values}: numbers, or memoryviews of the bytes of a text or an inner message.
+A damaged file may have one where the other belongs."""
 
 
 class Node(NamedTuple):
@@ -110,10 +111,8 @@ def _varint(data: memoryview, at: int) -> tuple[int, int]:
     raise ValueError("a number of more than 64 bits")
 
 
-def _fields(value: int | memoryview) -> Iterator[tuple[int, int | memoryview, memoryview]]:
+def _fields(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
     """Number, value and bytes of each field of a protobuf message (protobuf.dev, Encoding)."""
-    if isinstance(value, int):
-        raise ValueError("a number where a message belongs")
     at = 0
     while at < len(value):
         first = at
@@ -131,7 +130,7 @@ def _fields(value: int | memoryview) -> Iterator[tuple[int, int | memoryview, me
         yield key >> 3, value[at - size : at], value[first:at]
 
 
-def _message(value: int | memoryview) -> Message:
+def _message(value: memoryview) -> Message:
     """The values of a protobuf message's fields."""
     fields: Message = defaultdict(list)
     for number, content, _ in _fields(value):
@@ -144,10 +143,7 @@ def _messages(message: Message, number: int) -> Sequence[Message]:
 
 
 def _texts(message: Message, number: int) -> list[str]:
-    values = message.get(number, [])
-    if any(isinstance(value, int) for value in values):
-        raise ValueError("a number where a text belongs")
-    return [bytes(value).decode() for value in values]
+    return [str(value, "utf-8") for value in message.get(number, [])]
 
 
 def _text(message: Message, number: int) -> str:
@@ -181,7 +177,8 @@ def read(data: bytes, name: str) -> Contents:
                 contents.tensors[_text(tensor, TENSOR_NAME)] = tensor
                 if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
                     foreign.append("weights in another file")
-    except (IndexError, ValueError):  # a field that runs past its message, or of no known kind
+    # A field that runs past its message or is of no known kind; a number in place of bytes.
+    except (IndexError, TypeError, ValueError):
         contents.nodes.clear()
     if not contents.nodes:
         raise InputError(f"{name}: not an ONNX model; copy or export it again")
@@ -219,7 +216,7 @@ def rewritten(
 
 
 def _constants_changed(
-    graph: int | memoryview, constants: Mapping[str, NDArray[Any]]
+    graph: memoryview, constants: Mapping[str, NDArray[Any]]
 ) -> Iterator[bytes | memoryview]:
     kinds = {np.dtype(kind): number for number, kind in TYPES.items()}
     for number, value, unchanged in _fields(graph):

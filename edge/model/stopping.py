@@ -20,15 +20,14 @@ TEST_SHARE = 0.5
 which errs more or less often than the folds' models do on average."""
 
 
-def check_rate(value: float, name: str) -> float:
-    """The value, if it is a rate inside (0, 1).
+def check_rate(value: float, name: str) -> None:
+    """Refuse a rate outside (0, 1).
 
     Raises:
-        InputError: it is not; the sentence begins with `name`.
+        InputError: the sentence begins with `name`.
     """
     if not 0.0 < value < 1.0:
         raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
-    return value
 
 
 def margin(distances: Sequence[float], label: int) -> float:

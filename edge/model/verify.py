@@ -92,14 +92,11 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
 
 
 def _trials(arrays: dict[str, NDArray[Any]], meta: dict[str, Any]) -> Iterator[Recording]:
+    keys = [key for key in ("t", "frames", "joints", "valid") if key in arrays]
     for first, end in pairwise(arrays["start"].tolist()):
         if not 0 <= first < end <= len(arrays["t"]):
             raise ValueError("a trial has no frames")
-        columns = {
-            key: arrays[key][first:end]
-            for key in ("t", "frames", "joints", "valid")
-            if key in arrays
-        }
+        columns = {key: arrays[key][first:end] for key in keys}
         yield Recording(**columns, meta={"skin": meta["skin"]})
 
 

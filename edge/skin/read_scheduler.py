@@ -41,9 +41,7 @@ class ReadScheduler:
         for bus in file.buses:
             taxels_of_chip = np.zeros((len(bus.chips), *file.layout.shape), dtype=np.bool_)
             for i, chip in enumerate(bus.chips):
-                taxels_of_chip[i].reshape(-1)[
-                    [taxel for taxel in chip.taxels if taxel != UNUSED]
-                ] = True
+                taxels_of_chip[i].flat[[taxel for taxel in chip.taxels if taxel != UNUSED]] = True
             # A chip is near a contact on its own taxels or on those next to them.
             near = with_neighbours(taxels_of_chip, file.layout.wraps)
             self._near.append(near.reshape(len(near), -1))

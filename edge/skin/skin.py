@@ -105,7 +105,6 @@ class Skin:
         """Frames in a row without a valid value of each taxel."""
         self._silent, self._since_silent = 0, 0
         self._touched_at = -math.inf
-        self._states = [slot.state for slot in self._slots]
         self._lost = [False for _ in self.readers]
         self._threads = ThreadPoolExecutor(len(self.readers))
 

@@ -13,7 +13,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain, Vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import Measurer
+from edge.touch.measures import ZONE_WIDTH, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 CLOCK_ROUNDING_S = 1e-6
@@ -226,7 +226,8 @@ class Contact:
             for name, values in zip(_Row._fields, zip(*self._rows, strict=True), strict=True)
         }
         counted = measured.pop("counted")
-        zones = counted[:, PLAIN:]
+        zones = self._measurer.zones
+        sums = counted[:, PLAIN:].reshape(len(counted), len(zones), ZONE_WIDTH)
         return FeatureSeries(
             **measured,
             peak=counted[:, 0],
@@ -234,7 +235,7 @@ class Contact:
             sums=counted[:, 2:PLAIN],
             layout=self.layout,
             ended=self.ended,
-            zones={zone: zones[:, columns] for zone, columns in self._measurer.columns.items()},
+            zones={zone: sums[:, i] for i, zone in enumerate(zones)},
         )
 
 

@@ -182,9 +182,8 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
     )
     if of_device != of_model:
         raise InputError(f"this skin has {of_device}, but the model was made for {of_model}")
-    ratio = 1.0
-    if device.counts_per_newton is not None and model.counts_per_newton is not None:
-        ratio = device.counts_per_newton / model.counts_per_newton
+    # Both scales are known or neither is, as the units are equal.
+    ratio = (device.counts_per_newton or 1.0) / (model.counts_per_newton or 1.0)
     return replace(
         device,
         release_s=model.release_s,

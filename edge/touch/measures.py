@@ -224,7 +224,6 @@ class Measurer:
         force_motion: whether its force-weighted centroid is followed.
         zones: the zones measured, in the order of `ZONES`.
         width: how many whole numbers `measure` returns for a frame.
-        columns: {zone: the slice of these numbers that it takes}.
         cells: the skin's cells where a feature needs them, else None.
         kernel_cells: the fewer cells that kernels take, likewise.
         joints: number of joint angles kept of each frame; 0 where no feature needs them.
@@ -241,9 +240,6 @@ class Measurer:
         self.joints = joints if any(f.of_joints for f in types) else 0
         self.zones = tuple(zone for zone in ZONES if any(zone in f.zones for f in types))
         self.width = ZONE_WIDTH * len(self.zones)
-        self.columns = {
-            zone: slice(ZONE_WIDTH * i, ZONE_WIDTH * (i + 1)) for i, zone in enumerate(self.zones)
-        }
         half = layout.cols // 2
         self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
         rows, cols = np.arange(layout.rows), np.arange(layout.cols)

@@ -62,11 +62,6 @@ class Grid:
         """The taxel of a flat index (row * cols + col)."""
         return 1 << (index // self.cols * self.stride + index % self.cols)
 
-    def index(self, bits: int) -> int:
-        """Lowest flat index (row * cols + col) of a set."""
-        row, col = divmod((bits & -bits).bit_length() - 1, self.stride)
-        return row * self.cols + col
-
     def neighbours(self, bits: int) -> int:
         """The taxels next to one of `bits`; bits outside the grid may be set too."""
         beside = bits << 1 | bits >> 1 | bits << self.stride | bits >> self.stride
@@ -200,7 +195,8 @@ class Region:
     @property
     def index(self) -> int:
         """Lowest flat index (row * cols + col) of its taxels."""
-        return self._grid.index(self.bits)
+        row, col = divmod((self.bits & -self.bits).bit_length() - 1, self._grid.stride)
+        return row * self._grid.cols + col
 
     def touches(self, other: Region) -> bool:
         """Whether a taxel of this region is next to, or the same as, one of the other's."""

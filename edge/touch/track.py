@@ -195,8 +195,6 @@ def first_contact(
         contacts = tracker.push(frame)
         if first is None and contacts:
             first = contacts[0]
-        if first is not None and (
-            first.ended or first not in contacts or frame.t - first.onset_s >= tracker.horizon_s
-        ):
+        if first is not None and (first.ended or frame.t - first.onset_s >= tracker.horizon_s):
             break
     return None if first is None else (first.onset_s, first.series())

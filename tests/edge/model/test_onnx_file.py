@@ -75,3 +75,30 @@ REFUSED = {
 def test_what_no_exported_model_has_is_refused(proto, sentence):
     with pytest.raises(InputError, match=rf"^m.onnx: has {sentence}"):
         check(proto.SerializeToString(), "m.onnx")
+
+
+@pytest.mark.parametrize("value", [0.5, 3, "text", [0.5, 1.5], [1, 2]], ids=str)
+def test_an_attribute_may_be_numbers_or_a_text(value):
+    check(model([add(own=value)]).SerializeToString(), "m.onnx")
+
+
+OTHER_ATTRIBUTES = {
+    "texts": ["a", "b"],
+    "tensors": [TENSOR, TENSOR],
+    "graphs": [model([add()]).graph] * 2,
+    "a sparse tensor": a_sparse_constant().graph.sparse_initializer[0],
+    "a type": helper.make_tensor_type_proto(TensorProto.DOUBLE, [1]),
+}
+
+
+@pytest.mark.parametrize("value", OTHER_ATTRIBUTES.values(), ids=OTHER_ATTRIBUTES)
+def test_an_attribute_of_another_kind_is_refused(value):
+    with pytest.raises(InputError, match=PARTS):
+        check(model([add(own=value)]).SerializeToString(), "m.onnx")
+
+
+@pytest.mark.parametrize("data", ["38 05", "3a 02 08 05", "3a 04 0a 02 20 05"])
+def test_a_number_where_bytes_belong_is_no_model(data):
+    """A graph, a node and the name of an operator that are the number 5."""
+    with pytest.raises(InputError, match=r"^m.onnx: not an ONNX model; copy or export it again"):
+        onnx_file.read(bytes.fromhex(data), "m.onnx")
