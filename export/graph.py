@@ -87,7 +87,7 @@ def _decide(
     # A vector that is not finite has no votes: class -1, whose row of the votes (the last) is 0.
     finite = build.node("LessOrEqual", [off, build.constant(LARGEST)])
     voters = build.node("Where", [finite, voters, build.constant(-1, np.int64)])
-    ballots = build.constant(np.vstack([np.eye(classes), np.zeros((1, classes))]))
+    ballots = build.constant(np.eye(classes + 1, classes), name=f"ballots of {task}")
     if k <= 2:
         # Two neighbours agree or tie: either way the nearest decides.
         first = [voters, build.constant(0, np.int64)]
@@ -147,7 +147,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         squares, length = _squares(
             build, output, projected[space][0], widened(rows), components, labels < 0
         )
-        k = build.ints(choice.k)
+        k = build.constant([choice.k], np.int64, f"k of {output}")
         near = ["", names[f"{task}_neighbours"]]
         values, places = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
         classes = len(last.classes_[task])
@@ -178,17 +178,20 @@ def _label_sums(
 
 
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
+    """Name and type of each output.
+
+    ONNX Runtime derives the sizes from the constants, which `edge.model.teaching` enlarges.
+    """
     outputs: list[tuple[str, Any]] = []
-    for task, choice in model.choices.items():
-        classes = len(_decision_points(model)[-1].classes_[task])
+    for task in model.choices:
         outputs += [
             (f"{task}_label", Int64TensorType([None])),
-            (f"{task}_scores", DoubleTensorType([None, classes])),
-            (f"{task}_distances", DoubleTensorType([None, choice.k])),
-            (f"{task}_neighbours", Int64TensorType([None, choice.k])),
+            (f"{task}_scores", DoubleTensorType([None, None])),
+            (f"{task}_distances", DoubleTensorType([None, None])),
+            (f"{task}_neighbours", Int64TensorType([None, None])),
         ]
         if isinstance(model, SequentialClassifier) or model.products_:
-            outputs.append((f"{task}_label_distances", DoubleTensorType([None, classes])))
+            outputs.append((f"{task}_label_distances", DoubleTensorType([None, None])))
     outputs.append(("out_of_range", DoubleTensorType([None])))
     return outputs
 

@@ -8,6 +8,7 @@ the model was fitted on.
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError, printable
 from edge.files import parsing
 from edge.model import onnx_file
-from edge.model.info import METADATA_KEY
+from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.model import Model
 from edge.model.onnx_file import Contents
 
@@ -79,11 +80,60 @@ def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str
     return {**implied, **labels}
 
 
+def unknown_labels(info: ModelInfo, labels: Sequence[Mapping[str, str]]) -> dict[str, Counter[str]]:
+    """{task: {label that the model does not know: how many trials have it}}, the labels sorted.
+
+    Args:
+        info: of the model.
+        labels: of each trial, {task: label}.
+    """
+    of_task = {task: [own[task] for own in labels if task in own] for task in info.tasks}
+    return {
+        task: Counter(sorted(label for label in each if label not in info.tasks[task].labels))
+        for task, each in of_task.items()
+    }
+
+
+def spelled_like(label: str, labels: Sequence[str]) -> str:
+    """A question for the known label that an unknown one may have been meant as, if any."""
+    from difflib import get_close_matches  # rarely needed, and slow to load
+
+    return "".join(f"; did you mean {near!r}?" for near in get_close_matches(label, labels, 1, 0.8))
+
+
+def with_labels(info: ModelInfo, unknown: Mapping[str, Mapping[str, int]]) -> ModelInfo:
+    """A model's metadata with new labels, each after those that its task knows.
+
+    No more neighbours vote than a new label has trials, for it could win no vote among more.
+
+    Args:
+        info: of the model.
+        unknown: {task: {new label: its number of trials}}.
+
+    Raises:
+        InputError: a task with a new label is decided together with others.
+    """
+    tasks = dict(info.tasks)
+    for task, counts in unknown.items():
+        for product, factors in info.products.items():
+            if counts and task in (product, *factors):
+                raise InputError(
+                    f"{task} {next(iter(counts))!r} is new, but each {product} is a pair of known "
+                    f"labels of {' and '.join(factors)}; correct it, or export a model with it"
+                )
+        entry = tasks[task]
+        k = min([entry.k, *counts.values()])
+        tasks[task] = replace(entry, labels=(*entry.labels, *counts), k=k)
+    return replace(info, tasks=tasks)
+
+
 def taught(
     model: Model,
     names: Sequence[str],
     vectors: NDArray[np.float64],
     labels: Sequence[Mapping[str, str]],
+    *,
+    new_labels: bool = False,
 ) -> bytes:
     """The model's file with further neighbours.
 
@@ -94,12 +144,15 @@ def taught(
         names: (m,) of the trials' files.
         vectors: (decision points, m, width) of the trials.
         labels: (m,) {task: label}.
+        new_labels: the model gets to know the labels that it does not know, see `with_labels`.
 
     Raises:
         InputError: a trial lies outside the projection's reach, or has no label that is known; or
             the file was exported by an earlier version.
     """
     info = model.info
+    if new_labels:
+        info = with_labels(info, unknown_labels(info, labels))
     for name, trial, trial_labels in zip(names, vectors.swapaxes(0, 1), labels, strict=True):
         points = [model.decide(vector, point) for point, vector in enumerate(trial)]
         if any(next(iter(decisions.values())).out_of_range for decisions in points):
@@ -109,8 +162,10 @@ def taught(
             )
         if not any(trial_labels.get(task) in entry.labels for task, entry in info.tasks.items()):
             known = "; ".join(f"{t}: {', '.join(e.labels[:6])}" for t, e in info.tasks.items())
+            meant = [spelled_like(trial_labels.get(t, ""), e.labels) for t, e in info.tasks.items()]
             raise InputError(
-                f"{name}: has no label that the model knows ({known}); label it, or export anew"
+                f"{name}: has no label that the model knows ({known}); label it, or teach it with "
+                f"--new-labels{''.join(meant)}"
             )
     contents = model.contents
     with parsing(model.path, "a model that can be taught", "; export it again"):
@@ -127,9 +182,14 @@ def taught(
                 changed[f"{key} of {task}"] = np.concatenate([old, values], axis=-1)
             all_labels = np.concatenate([contents.constant(f"labels of {task}"), new])
             changed[f"labels of {task}"] = all_labels
+            tables, classes = {}, len(entry.labels)
+            if classes > len(model.info.tasks[task].labels):
+                tables = {"ballots": np.eye(classes + 1, classes), "k": np.array([entry.k])}
             if f"members of {task}" in contents.tensors:
-                for key, table in label_tables(all_labels, len(entry.labels)).items():
-                    changed[f"{key} of {task}"] = table
+                tables |= label_tables(all_labels, classes)
+            for key, table in tables.items():
+                old = contents.constant(f"{key} of {task}")
+                changed[f"{key} of {task}"] = table.astype(old.dtype)
     digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
     trials = tuple(printable(Path(name).stem) for name in names)
     after = replace(

@@ -226,8 +226,13 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(agreeing,
             assert (event.label != truth[task][i]) == wrong[i]
 
 
-def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(early, tmp_path):
-    """Two tasks of one space; the second trial has a label for the first task alone."""
+@pytest.mark.parametrize("new", [False, True])
+def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(early, tmp_path, new):
+    """Two tasks of one space; two labels of the further trials are new.
+
+    Without new labels, each trial has a label for one task. With them, no more than the two trials
+    of `d` vote.
+    """
     rng = np.random.default_rng(1)
     y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
     width = early[0].info.samples * len(FEATURES)
@@ -247,10 +252,16 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
         trials=(),
     )
     model = written(tmp_path / "model.onnx", to_onnx(sequential, info))
-    labels = [{"t": "c", "u": "y"}, {"t": "a", "u": "strange"}, {"u": "x", "t": "b"}]
-    data = taught(model, ["one", "two", "three"], more, labels)
+    labels = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
+    data = taught(model, ["one", "two", "three"], more, labels, new_labels=new)
+    counted = {"t": [1], "u": [0, 2]}
+    if new:
+        counted = {"t": [0, 1, 2], "u": [0, 1, 2]}
+        choices["t"] = Choice("none", 4, 2)
+        y = {"t": np.append(y["t"], "d"), "u": np.append(y["u"], "z")}
     for point, vectors in zip(sequential.decision_points_, more, strict=True):
-        for task, known in (("t", [0, 1, 2]), ("u", [0, 2])):
+        for task, known in counted.items():
+            classes = sorted(set(y[task]))
             before, after = point.spaces_[task], (*point.spaces_[task], task)
             point.spaces_[task], point.n_trials_ = after, 48
             for of_space in (point.projections_, point.columns_):
@@ -258,16 +269,21 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
             rows = point.project(after, vectors[known])
             point.rows_[after] = np.vstack([point.rows_[before], rows])
             point.members_[after] = np.array([*range(45), *(45 + i for i in known)])
-            new = [sorted(set(y[task])).index(labels[i][task]) for i in known]
-            point.labels_[task] = np.array([*point.labels_[task], *new])
+            further = [classes.index(labels[i][task]) for i in known]
+            point.labels_[task] = np.array([*point.labels_[task], *further])
+            point.classes_[task] = np.array(classes)
         del point.projections_[before]
-    oracle = written(tmp_path / "oracle.onnx", to_onnx(sequential, replace(info, rows=48)))
     model = written(tmp_path / "taught.onnx", data)
+    described = replace(info, rows=48, tasks=model.info.tasks)
+    oracle = written(tmp_path / "oracle.onnx", to_onnx(sequential, described))
     for point in range(3):
         for vectors in (queries[point], more[point]):
             expected = oracle.run(vectors, point)
             for key, values in model.run(vectors, point).items():
                 assert (values == expected[key]).all(), key
     assert (model.info.rows, model.info.taught) == (48, 3)
+    assert {t: (e.labels[2:], e.k) for t, e in model.info.tasks.items()} == (
+        {"t": (("c", "d"), 2), "u": (("z",), 1)} if new else {"t": (("c",), 3), "u": ((), 1)}
+    )
     with pytest.raises(InputError, match=r"taught 3 trials after its error rates were certified"):
         stopping_rules(model, 0.2)

@@ -23,6 +23,10 @@ def teach(edge, exported, tmp_path):
     return run
 
 
+def shares_of(lines, key="trials"):
+    return {line["task"]: line[key] for line in lines}
+
+
 def labelled(touch, **labels):
     return replace(touch, meta={**touch.meta, "labels": labels})
 
@@ -33,7 +37,8 @@ def test_a_taught_trial_is_known_again_and_the_new_files_agree(
     save(tmp_path / "cup.npz", labelled(make_touch(seed=70), category="soft-fixed", object="cup"))
     status, lines, messages = teach(tmp_path / "cup.npz")
     assert status == 0
-    assert {line["task"]: line["trials"] for line in lines} == {"category": 1, "object": 0}
+    assert shares_of(lines) == {"category": 1, "object": 0}
+    assert "object: left out 1 trial of the new label 'cup'; --new-labels adds it\n" in messages
     assert "its accuracy is not measured, and no error rate is certified" in messages
     before = Model(exported / "model.onnx")
     after = Model(tmp_path / "taught" / "model.onnx")
@@ -58,6 +63,48 @@ def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path)
     assert Model(tmp_path / "taught" / "model.onnx").info.trials[-1] == r"c\udcff"
 
 
+def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
+    teach, edge, exported, make_touch, tmp_path
+):
+    recordings = [tmp_path / f"{name}.npz" for name in ("cup 0", "cup 1", "cup 2", "mug")]
+    for seed, path in enumerate(recordings):
+        labels = {"category": "soft-movable", "object": path.stem.split()[0]}
+        touch = make_touch(seed=70 + seed)
+        save(path, labelled(replace(touch, frames=touch.frames // 3 * 4), **labels))
+    status, lines, messages = teach("--new-labels", *recordings[:3])
+    assert (status, shares_of(lines)) == (0, {"category": 3, "object": 3})
+    new = {"category": {"soft-movable": 3}, "object": {"cup": 3}}
+    assert shares_of(lines, "new_labels") == new
+    assert "object: 3 trials of the new label 'cup'\n" in messages
+    assert "'soft-movable'; did you mean 'soft-fixed'?" not in messages
+    model = tmp_path / "taught" / "model.onnx"
+    before, after = Model(exported / "model.onnx"), Model(model)
+    for task, labels in new.items():
+        known = before.info.tasks[task].labels
+        assert after.info.tasks[task].labels == (*known, *labels)
+    for path in recordings[:3]:
+        _, series = first_series(load(path), after)
+        decision = after.decide(after.info.vector(series))["object"]
+        assert (decision.label, len(decision.scores)) == ("cup", 5)
+    again = tmp_path / "again"
+    given = ["--model", model, "--out", again, "--new-labels", recordings[3]]
+    assert edge("teach", *given)[0] == 0
+    assert Model(again / "model.onnx").info.tasks["object"].labels[-2:] == ("cup", "mug")
+    for folder in (model.parent, again):
+        golden = folder / "golden.npz"
+        assert edge("verify", "--model", folder / "model.onnx", "--golden", golden)[0] == 0
+        assert edge("explain", folder / "model.onnx", recordings[0])[0] == 0
+        status, lines, _ = edge("run", "--model", folder / "model.onnx", "--fake", recordings[0])
+        assert [each["label"] for each in lines if each.get("task") == "object"] == ["cup"]
+
+
+def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_path):
+    save(tmp_path / "x.npz", labelled(make_touch(seed=71), category="sofft-fixed", object="hard 1"))
+    sentence = "category: {}1 trial of the new label 'sofft-fixed'{}; did you mean 'soft-fixed'?\n"
+    assert sentence.format("left out ", "; --new-labels adds it") in teach(tmp_path / "x.npz")[2]
+    assert sentence.format("", "") in teach(tmp_path / "x.npz", "--new-labels")[2]
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
@@ -65,7 +112,10 @@ def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path)
             lambda t: labelled(t),
             "odd.npz: has no label that the model knows (category: rigid-fixed",
         ),
-        (lambda t: labelled(t, object="cup"), "odd.npz: has no label that the model knows"),
+        (
+            lambda t: labelled(t, object="sotf 1"),
+            "label it, or teach it with --new-labels; did you mean 'soft 1'?",
+        ),
         (lambda t: replace(t, frames=0 * t.frames), "odd.npz: holds no contact"),
         (
             lambda t: replace(t, frames=t.frames.max(axis=(1, 2), keepdims=True) * ALL_TAXELS),
