@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import onnx
@@ -221,6 +222,35 @@ def test_a_graph_whose_answer_has_another_shape_is_refused(altered):
 
     with pytest.raises(InputError, match=r"no tensor\(double\) object_distances of shape \[3\]"):
         Model(altered(doubled))
+
+
+class Underived:
+    """A session of a runtime that leaves open the sizes of the outputs it is given for."""
+
+    def __init__(self, session, names):
+        self._session, self._names = session, names
+
+    def __getattr__(self, name):
+        return getattr(self._session, name)
+
+    def get_outputs(self):
+        return [
+            SimpleNamespace(name=x.name, type=x.type, shape=[None, *self._sizes(x)])
+            for x in self._session.get_outputs()
+        ]
+
+    def _sizes(self, output):
+        return ["unknown"] if output.name in self._names else output.shape[1:]
+
+
+def test_sizes_that_an_older_runtime_does_not_derive_are_left_to_the_run(exported, monkeypatch):
+    model = Model(exported / "model.onnx")
+    monkeypatch.setattr(model, "_session", Underived(model._session, {"object_scores"}))
+    model._check()
+    assert len(model.decide(np.zeros(model.info.width))["object"].scores) == 4
+    monkeypatch.setattr(model, "_session", Underived(model._session, {"object_label"}))
+    with pytest.raises(InputError, match=r"no tensor\(int64\) object_label of shape \[\]"):
+        model._check()
 
 
 def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
