@@ -102,8 +102,8 @@ def section(context: Context) -> Section:
             "left out together; the paper's claim is about such objects.",
             "The paper's method is PCA and k-NN on its three features, unscaled. The best of its "
             "grid is the accuracy that its grid search maximised with leave-one-out, so it is too "
-            "high. `train/feature_sets.py` lists the feature sets. Extra trees have scikit-learn's "
-            "default settings.",
+            "high. The other k-NN methods scale their features by the paper's Method IV; "
+            "`train/feature_sets.py` lists the features. Extra trees have default settings.",
         ],
         [Table("methods", title, rows)],
         [

@@ -277,7 +277,7 @@ def _against(known: Mapping[Entry, Row], title: str) -> Figure:
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
-        axes.plot(ends, ends, color="0.4", lw=1, label="equal accuracies")
+        axes.plot(ends, ends, color="0.4", lw=1, label="equal")
         for entry, row in known.items():
             colour, _, dashes = strokes[entry.task]
             x, face = entry.percent, colour if row["within"] == "yes" else "white"
@@ -288,7 +288,7 @@ def _against(known: Mapping[Entry, Row], title: str) -> Figure:
             axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
         for table, mark in marks.items():
             axes.plot([], [], mark, color="0.3", label=f"Table {table}")
-        axes.plot([], [], "o", color="0.3", mfc="white", label="interval without zero")
+        axes.plot([], [], "o", color="0.3", mfc="white", label="disagrees")
         axes.set(xlim=ends, ylim=ends, xlabel="the paper's accuracy, %", ylabel="our accuracy, %")
         legend(canvas, axes, 3 if phone else 4)
 
