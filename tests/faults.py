@@ -13,8 +13,10 @@ import errno
 import math
 import sys
 from dataclasses import astuple, dataclass, replace
+from itertools import count
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated
@@ -24,8 +26,8 @@ from edge.skin import file as skinfile
 from edge.skin.loop import Schedule
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
-from tests.faulty import Fault, faulty_buses
-from tests.wires import one_bus
+from tests.faulty import Fault, faulty_buses, one_bus
+from train.progress import bar
 
 OVERHEADS_US = (0.0, 50.0, 100.0)
 """Microseconds a transaction."""
@@ -162,25 +164,33 @@ def touches(fault, bus, chip):
     return at_it and all(getattr(fault, key) in (None, there[key]) for key in there)
 
 
-def run(name, file, faults, *, seconds=LASTS_S, overhead_s=0.0, seed=0):
-    """Play a script for some seconds."""
+def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, seed=0):
+    """Play a script for some seconds; reset every chip and mux before each of the numbered frames.
+
+    Frames count from 1. Without a script no reading counts as lost on another chip.
+    """
     watched = Watched(file, overhead_s=overhead_s, seed=seed)
     for bus in file.buses:
         for chip in bus.chips:
-            spared = not any(touches(fault, bus, chip) for fault in faults)
+            spared = bool(faults) and not any(touches(fault, bus, chip) for fault in faults)
             watched.spared.flat[list(chip.taxels)] = spared
     with watched.skin as skin:
         start = skin.clock.now()
         moved = [replace(f, during=tuple(start + t for t in f.during)) for f in faults]
         for bus in watched.buses:
             bus.inject(moved, seed)
+        end = max((fault.during[1] for fault in moved), default=start)
         schedule = Schedule(skin.clock, skin.period_s)
-        while schedule.wait() - start < seconds:
+        for k in count(1):
+            if schedule.wait() - start >= seconds:
+                break
+            if k in resets:
+                end = skin.clock.now()
+                for chip in models(watched.buses):
+                    chip.reset()
             watched.read()
-    met = sum(bus.met for bus in watched.buses)
-    return watched.outcome(
-        name, met, start + max(f.during[1] for f in faults), schedule.missed_ticks
-    )
+    met = len(resets) + sum(bus.met for bus in watched.buses)
+    return watched.outcome(name, met, end, schedule.missed_ticks)
 
 
 def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
@@ -196,8 +206,8 @@ def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
         frame = [bus.transactions - n for bus, n in zip(watched.buses, before, strict=True)]
     outcomes = [
         _one_fault(file, replace(fault, at=[position], bus=bus.device), set_up, overhead_s)
-        for bus, count in zip(file.buses, before if set_up else frame, strict=True)
-        for position in range(first, count, every)
+        for bus, transactions in zip(file.buses, before if set_up else frame, strict=True)
+        for position in range(first, transactions, every)
     ]
     return Outcome(
         f"{name}, {'set-up' if set_up else 'frame'}",
@@ -222,22 +232,6 @@ def _one_fault(file, fault, set_up, overhead_s):
             if k > 4 and t - max(end, watched.back_at) > INTACT_FRAMES * skin.period_s:
                 break
     return watched.outcome("", 1, end)
-
-
-def brown_out(name, file, *, at=(3,), overhead_s=0.0):
-    """Reset every chip and mux between two frames, before each of the numbered frames."""
-    watched = Watched(file, overhead_s=overhead_s)
-    with watched.skin as skin:
-        schedule = Schedule(skin.clock, skin.period_s)
-        schedule.wait()
-        for k in range(1, at[-1] + 60):
-            if k in at:
-                end = skin.clock.now()
-                for chip in models(watched.buses):
-                    chip.reset()
-            watched.read()
-            schedule.wait()
-    return watched.outcome(name, len(at), end, schedule.missed_ticks)
 
 
 def models(buses):
@@ -295,15 +289,11 @@ def campaign(overhead_us, every, seed):
     Returns:
         The names of the outcomes that break the promise.
     """
-    from joblib import Parallel, delayed
-
-    from train.progress import bar
-
     cost = {"overhead_s": overhead_us * 1e-6}
     jobs = [delayed(run)(name, file, faults, seed=seed, **cost) for name, file, faults in scripts()]
     for name, file in SKINS.items():
-        jobs.append(delayed(brown_out)(f"all reset, {name}", file, **cost))
-        jobs.append(delayed(brown_out)(f"all reset 4 times, {name}", file, at=REPEATED, **cost))
+        jobs.append(delayed(run)(f"all reset, {name}", file, resets=REPEATED[:1], **cost))
+        jobs.append(delayed(run)(f"all reset 4 times, {name}", file, resets=REPEATED, **cost))
     played = len(jobs)
     jobs += [
         delayed(sweep)(f"{kind}, {name}", file, fault, set_up=set_up, every=every, **cost)

@@ -4,7 +4,7 @@ import errno
 import math
 import random
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from edge.fake.bus import FakeBus
@@ -13,6 +13,7 @@ from edge.fake.player import calibrated, fake_buses
 from edge.i2c.bus import Transfer, bus_error, write
 from edge.i2c.tca9548a import FakeTCA9548A
 from edge.skin.skin import Skin
+from edge.skin.wiring import BusSpec
 
 NACK_BITS = 11
 
@@ -163,3 +164,12 @@ def faulty_skin(file, scene, faults=(), **options):
     for reader in skin.readers:
         reader.bus.inject(faults)
     return skin
+
+
+def one_bus(file):
+    """The skin with the chips of all its buses on one, behind further channels of one mux."""
+    chips, channel = [], 0
+    for bus in file.buses:
+        chips += [replace(chip, channel=channel + (chip.channel or 0)) for chip in bus.chips]
+        channel += 1 + max(chip.channel or 0 for chip in bus.chips)
+    return replace(file, buses=(BusSpec("one bus", tuple(chips)),))

@@ -5,6 +5,7 @@
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ TABLE = re.findall(r"^\| (an? .*|another .*) \|$", (ROOT / "CONTRIBUTING.md").re
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.split(" | ")[0])
-def test_what_the_table_names_is_there(row):
+def test_each_file_and_name_of_the_table_exists(row):
     for path in re.findall(r"`([\w/]+\.py)`", row):
         assert (ROOT / path.replace("NAME", "__init__")).exists(), path
     files = [ROOT / path for path in re.findall(r"`([\w/]+\.py)`", row) if "NAME" not in path]
@@ -49,7 +50,7 @@ def module(package, monkeypatch, folder, text):
     """A module `toy` in a package."""
     (folder / "toy.py").write_text(text)
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
-    monkeypatch.delitem(__import__("sys").modules, f"{package.__name__}.toy", raising=False)
+    monkeypatch.delitem(sys.modules, f"{package.__name__}.toy", raising=False)
 
 
 IMPORTER = '''"""Pictures of a toy, one trial a line."""

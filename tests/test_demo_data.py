@@ -1,12 +1,13 @@
 """The demo in the wheel, and the golden outputs of its model."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from edge import demo
 from edge.cli import main
 from edge.model.model import Model
-from edge.recording import load
+from edge.recording import load, save
 
 GOLDEN = Path(__file__).parent / "golden" / "demo.npz"
 
@@ -20,10 +21,6 @@ def test_the_demo_touches_one_of_each_category_and_gets_them_right(capsys):
 
 
 def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, capsys):
-    from dataclasses import replace
-
-    from edge.recording import save
-
     other = load(demo.recordings()[0])
     labels = {**other.labels, "mobility": "movable"}
     save(tmp_path / "wrong.npz", replace(other, meta={**other.meta, "labels": labels}))

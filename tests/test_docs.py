@@ -6,6 +6,7 @@ import shlex
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from edge import cli
@@ -78,4 +79,4 @@ def test_the_block_protocol_is_described_as_it_is():
     text = (DOCS / "block-protocol.md").read_text()
     assert f"`{block.crc16(b'123456789'):#06x}`".replace("0x29b1", "0x29B1") in text
     assert f"at most {MOST_TAXELS} taxels" in text
-    assert block.pack(__import__("numpy").array([0xABC, 0xDEF], "u2"), 12).hex(" ").upper() in text
+    assert block.pack(np.array([0xABC, 0xDEF], "u2"), 12).hex(" ").upper() in text

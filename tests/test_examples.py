@@ -7,6 +7,7 @@ import runpy
 import subprocess
 import sys
 import types
+from collections import defaultdict
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -84,17 +85,11 @@ def test_a_skin_is_watched(monkeypatch, capsys):
     assert {event.task for event in decided} == set(edge.Model(demo.MODEL).info.tasks)
 
 
-class Publisher(list):
-    """Keeps the published messages."""
-
-    publish = list.append
-
-
 class Ros:
     """The part of rclpy and its messages that the node uses: one node, spun until it has ended."""
 
     def __init__(self, **parameters):
-        self.parameters, self.topics, self.heard = parameters, {}, {}
+        self.topics, self.heard = defaultdict(list), {}
         ros = self
 
         class Node:
@@ -102,10 +97,10 @@ class Ros:
                 self.name = name
 
             def declare_parameter(self, name, default):
-                return types.SimpleNamespace(value=ros.parameters.get(name, default))
+                return types.SimpleNamespace(value=parameters.get(name, default))
 
             def create_publisher(self, kind, topic, depth):
-                return ros.topics.setdefault(topic, Publisher())
+                return types.SimpleNamespace(publish=ros.topics[topic].append)
 
             def create_subscription(self, kind, topic, callback, depth):
                 ros.heard[topic] = callback
@@ -185,13 +180,8 @@ def test_a_task_becomes_a_valid_topic(monkeypatch):
     ros = Ros(model=str(demo.MODEL), fake=str(PILLOW))
     ros.run(monkeypatch)
     topic = sys.modules["edge_classify_ros.node"].topic
-    assert [topic(t) for t in ("object", "Object-36", "36 things", "Größe/x", "--")] == [
-        "object",
-        "object_36",
-        "task_36_things",
-        "gr_e_x",
-        "task",
-    ]
+    topics = [topic(task) for task in ("object", "Object-36", "36 things", "Größe/x", "--")]
+    assert topics == ["object", "object_36", "task_36_things", "gr_e_x", "task"]
 
 
 def test_the_launch_file_gives_every_parameter_of_the_node():

@@ -62,7 +62,7 @@ class Registers:
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
-def test_its_registers_are_what_the_driver_reads_over_i2c(host, bits):
+def test_the_driver_reads_its_registers_over_i2c(host, bits):
     dump = subprocess.run([host(bits), "dump"], capture_output=True, text=True, check=True)
     lines = [bytes.fromhex(line) for line in dump.stdout.split("\n")[:-1]]
     for n in range(3):

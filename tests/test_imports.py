@@ -1,4 +1,4 @@
-"""Each package imports only what it may, so that data flows one way."""
+"""Imports follow the one way of the data, and the board's package needs few others."""
 
 import ast
 import subprocess
@@ -82,7 +82,7 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
     ("names", "left_out"),
     [("edge", ("edge.", "numpy")), ("edge.cli, edge.classifier", ("onnxruntime",))],
 )
-def test_what_takes_long_to_import_is_loaded_only_when_it_is_needed(names, left_out):
+def test_slow_packages_are_loaded_only_when_they_are_needed(names, left_out):
     """Loading onnxruntime takes most of the start-up time, and only a model needs it."""
     code = f"import sys, {names}; print([m for m in sys.modules if m.startswith({left_out})])"
     command = [sys.executable, "-c", code]

@@ -127,7 +127,7 @@ class Case:
         """The answer of the usual tools, in words; "" without one."""
         if self.usual is None:
             return ""
-        # It warns of some hazards; what counts is what it then answers.
+        # It warns of some hazards; only its answer counts.
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             return self.usual()

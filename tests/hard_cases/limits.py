@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from edge import demo
 from edge.classifier import Classifier
 from edge.events import Decided, Onset
-from edge.model.model import Model
 from edge.recording import Recording, load
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten, seeded
 from tests.hard_cases.frames import FOREARM, contact_of
+from tests.hard_cases.models import shipped
 
 
 def skin_error(side: int, across: bool, full: bool = False) -> float:
@@ -59,9 +59,9 @@ def clock_error(start: float) -> float:
 
 
 @cache
-def shipped() -> tuple[Model, tuple[Recording, ...]]:
-    """The model and the touches that come with the program."""
-    return Model(demo.MODEL), tuple(load(path) for path in sorted(demo.FOLDER.glob("*.npz")))
+def touches() -> tuple[Recording, ...]:
+    """The touches that come with the program."""
+    return tuple(map(load, demo.recordings()))
 
 
 def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Recording:
@@ -74,16 +74,15 @@ def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Re
 
 def decisions(recording: Recording) -> tuple[float, list[Decided]]:
     """When the contact began, and the decisions about it."""
-    events = list(Classifier(shipped()[0]).classify(recording))
+    events = list(Classifier(shipped()).classify(recording))
     (onset,) = (event.onset_s for event in events if isinstance(event, Onset))
     return onset, [event for event in events if isinstance(event, Decided)]
 
 
 def gap_error(pause_s: float, frames: int, unit: float) -> float:
     """Decisions whose flag `gap` is wrong: one step covers more than a quarter of the window."""
-    model, touches = shipped()
-    window, wrong = Fraction(model.info.window_s), 0
-    for touch in touches:
+    window, wrong = Fraction(shipped().info.window_s), 0
+    for touch in touches():
         recording = paused(touch, pause_s, frames, unit)
         onset, decided = decisions(recording)
         ages = [Fraction(t) - Fraction(onset) for t in recording.t[recording.t >= onset].tolist()]
@@ -95,7 +94,7 @@ def gap_error(pause_s: float, frames: int, unit: float) -> float:
 def gap_usual() -> str:
     """The labels that interpolation across the pause alone gives the touches."""
     changed, sure = [], []
-    for touch in shipped()[1]:
+    for touch in touches():
         (_, right), (_, blind) = decisions(touch), decisions(paused(touch, 5.0, 3, 1.0))
         changed += [a.label != b.label for a, b in zip(right, blind, strict=True)]
         sure += [event.confidence for event in blind]

@@ -2,6 +2,8 @@
 
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +15,9 @@ from sklearn.decomposition import PCA
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
+from edge import demo
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
-from edge.touch.features import FEATURES
-from edge.touch.layout import SkinLayout
-from edge.touch.track import TrackSettings
 from export.graph import to_onnx
 from tests.hard_cases import exact
 from train.pipeline import Choice, ContactClassifier
@@ -35,30 +35,26 @@ def features(n: int, seed: int = 0) -> Array:
     return X
 
 
+@cache
+def shipped() -> Model:
+    """The model that comes with the program."""
+    return Model(demo.MODEL)
+
+
 def describe(fitted: ContactClassifier, samples: int = 40) -> ModelInfo:
-    """Metadata for a model that was fitted on vectors alone."""
-    return ModelInfo(
-        tasks={
-            task: Task(
-                tuple(map(str, fitted.classes_[task])),
-                choice.k,
-                fitted.components_[task],
-                choice.scaling,
-                0.0,
-            )
-            for task, choice in fitted.choices.items()
-        },
-        layout=SkinLayout(16, 24, True),
-        tracking=TrackSettings(),
-        window_s=1.2,
-        samples=samples,
-        features=FEATURES,
-        units=dict.fromkeys(FEATURES, ""),
-        motion_frame="skin",
-        chain=None,
-        rows=len(next(iter(fitted.labels_.values()))),
-        data_digest="",
-    )
+    """The shipped model's metadata, with the tasks of a model that was fitted on vectors alone."""
+    tasks = {
+        task: Task(
+            tuple(map(str, fitted.classes_[task])),
+            choice.k,
+            fitted.components_[task],
+            choice.scaling,
+            0.0,
+        )
+        for task, choice in fitted.choices.items()
+    }
+    rows = len(next(iter(fitted.labels_.values())))
+    return replace(shipped().info, tasks=tasks, samples=samples, rows=rows, trials=())
 
 
 def labels_for(X: Array, classes: int = 5, seed: int = 0) -> NDArray[np.str_]:

@@ -34,11 +34,11 @@ def recording(bad: float, key: str) -> None:
         save(Path(folder) / "x.npz", trial)
 
 
-def frame(bad: float, what: str) -> None:
-    times = np.full((16, 24), bad if what == "times" else 0.0)
-    joints = np.full(5, bad if what == "joints" else 0.0)
+def frame(bad: float, key: str) -> None:
+    times = np.full((16, 24), bad if key == "times" else 0.0)
+    joints = np.full(5, bad if key == "joints" else 0.0)
     tracker = ContactTracker(FOREARM, chain=Chain.cody())
-    t = bad if what == "t" else 0.0
+    t = bad if key == "t" else 0.0
     tracker.push(Frame(t, taxels((3, 3)), times=times, joints=joints))
 
 

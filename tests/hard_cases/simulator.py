@@ -20,7 +20,7 @@ def push_error(h: float, mu: float, steps: int = 120) -> float:
 
 
 def lugre(h: float, v: float = 0.2, sigma: float = 1e5, hold: float = 1.0) -> float:
-    """Largest bristle force over a slide by explicit steps, as a part of what friction can give."""
+    """Largest bristle force over a slide by explicit steps, over its limit."""
     z = worst = 0.0
     g = hold / sigma
     for _ in range(400):

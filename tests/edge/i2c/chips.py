@@ -1,4 +1,4 @@
-"""The fake chips that the drivers' tests share, and what they sense."""
+"""The fake chips that the drivers' tests share, and the values that they sense."""
 
 import numpy as np
 

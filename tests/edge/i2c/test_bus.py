@@ -1,4 +1,4 @@
-"""Errors by name, bits on the wire, and what the Linux adapter says when there is none."""
+"""Errors by name, bits on the wire, and the sentence for a bus that is missing."""
 
 import errno
 import fcntl

@@ -1,4 +1,4 @@
-"""What every chip does alike: it is identified, set up, checked and read."""
+"""Every chip is identified, set up, checked and read in the same way."""
 
 import numpy as np
 import pytest

@@ -51,7 +51,7 @@ class Board:
 
     def __init__(self):
         self.change = lambda answer, number: answer
-        """What becomes of an answer (its packet's bytes) on the way."""
+        """Gives the bytes that arrive of an answer, by its packet and its number."""
         self.asked = 0
         self.plug()
 
@@ -174,7 +174,7 @@ def test_an_unplugged_port_is_gone_until_it_is_plugged_in_again(board, bus):
     assert frame(chip)[1]
 
 
-def test_a_port_carries_only_what_a_microcontroller_serves(bus):
+def test_a_port_carries_only_the_registers_of_a_microcontroller(bus):
     for prepared in (
         bus.prepare(read(0, 4)),
         bus.prepare(write(0, b"\0\0"), read(0, 4)),

@@ -55,7 +55,7 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
 
 
 def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
-    """Its buffer still holds what was read before: old values must not pass for new ones."""
+    """Its buffer still holds the former reading: old values must not pass for new ones."""
     done = python(
         library,
         """
@@ -80,13 +80,10 @@ def test_a_bus_that_another_program_uses_is_refused(library):
 
 
 def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_named(library):
-    code = (
-        WHOLE_SKIN
-        + """
-        print(sorted({s.error.partition(": ")[2] for s in skin.status() if s.error}))
-    """
+    errors = (
+        """        print(sorted({s.error.partition(": ")[2] for s in skin.status() if s.error}))"""
     )
-    done = python(library, code, I2CDEV_OWNED="0x2E")
+    done = python(library, WHOLE_SKIN + errors, I2CDEV_OWNED="0x2E")
     valid, sentences = done.stdout.splitlines()
     assert valid == f"{384 - 8 * 12} 0"
     assert sentences == "['a driver of the kernel owns the address; unbind it (EBUSY)']"

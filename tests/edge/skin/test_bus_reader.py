@@ -1,4 +1,4 @@
-"""What a bus may do, and what the skin makes of it (`python -m tests.faults` plays all faults)."""
+"""The skin meets the faults of its buses (`python -m tests.faults` plays all of them)."""
 
 import errno
 import math
@@ -20,7 +20,7 @@ from edge.skin.bus_reader import (
 )
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
-from tests.faults import BACK_S, KINDS, SKINS, Pattern, brown_out, run, scripts, sweep
+from tests.faults import BACK_S, KINDS, REPEATED, SKINS, Pattern, run, scripts, sweep
 from tests.faulty import Fault, faulty_buses, faulty_skin
 
 CODY = SKINS["cody"]
@@ -45,8 +45,9 @@ def test_a_fault_gives_no_wrong_value_and_costs_no_other_chip(name):
 def test_after_a_brown_out_every_taxel_is_back_in_half_a_second_also_when_it_repeats(
     name, overhead_us
 ):
-    for at in ((3,), (3, 20, 37)):
-        outcome = brown_out(name, SKINS[name], at=at, overhead_s=overhead_us * 1e-6)
+    for resets in (REPEATED[:1], REPEATED[:3]):
+        lasts = {"seconds": (resets[-1] + 60) / SKINS[name].reading.rate_hz}
+        outcome = run(name, SKINS[name], resets=resets, overhead_s=overhead_us * 1e-6, **lasts)
         assert outcome.wrong == 0
         assert outcome.back_s <= BACK_S
 
@@ -79,7 +80,7 @@ def test_without_reading_back_a_wrong_channel_gives_wrong_values():
     assert run("", file, faults, seconds=1.2).wrong > 100
 
 
-def test_no_result_depends_on_what_power_up_leaves_undefined():
+def test_no_result_depends_on_registers_that_power_up_leaves_undefined():
     def frames(seed):
         clock, feels = VirtualClock(), Pattern(CODY)
         buses = faulty_buses(CODY, feels, clock, timed=True, seed=seed)

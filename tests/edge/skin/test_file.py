@@ -1,4 +1,4 @@
-"""skin.toml: what ships, what is refused and how it is said, and calibration written into it."""
+"""skin.toml: the shipped files, the sentence for each mistake, and calibration written into it."""
 
 import math
 from datetime import UTC, datetime

@@ -32,7 +32,7 @@ def mpr121(skin="", signal=""):
     return parse(MPR121.format(skin=skin, signal=signal))
 
 
-def test_an_mpr121_that_says_nothing_works():
+def test_an_mpr121_works_without_a_single_setting():
     """Its values fall with a touch, and a touch takes some tens of its 10 bits."""
     file = mpr121()
     assert file.chips[0].sign == -1
@@ -42,7 +42,7 @@ def test_an_mpr121_that_says_nothing_works():
     assert {(layout.threshold_counts, layout.onset) for layout in layouts} == {(8, 16)}
 
 
-def test_what_the_file_says_counts():
+def test_values_of_the_file_replace_the_defaults():
     file = mpr121("threshold_counts = 20", "sign = 1\ndead_band_counts = 1")
     assert (file.chips[0].sign, file.signal.dead_band_counts) == (1, 1)
     assert (file.layout.threshold_counts, file.layout.onset) == (20, 20)

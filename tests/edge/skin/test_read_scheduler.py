@@ -1,4 +1,4 @@
-"""Reading only what matters: what is chosen, and how far it is from reading everything."""
+"""Reading the chips near a contact: the choice, and its difference from reading every chip."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from edge.skin.read_scheduler import ReadScheduler, with_neighbours
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.track import ContactTracker
-from tests.wires import one_bus
+from tests.faulty import one_bus
 
 CODY = skinfile.load(skinfile.shipped("cody"))
 ONE = one_bus(CODY)
@@ -108,7 +108,7 @@ def test_a_taxel_keeps_its_value_and_its_own_time_until_it_is_read_again():
         for k in range(12):
             skin.clock.sleep_until(start + k * 0.01)
             frame = skin.read()
-            # What a taxel says is what it felt at its own time, a conversion ago at most.
+            # A taxel's value was felt at its own time, a conversion ago at most.
             old = frame.valid & (frame.counts == 700)
             new = frame.valid & (frame.counts == 0)
             assert (frame.times[old] < 0.05 + 0.0093).all()

@@ -98,13 +98,13 @@ def test_the_baseline_follows_drift_until_something_touches():
     quiet = [int(frame.counts.max()) for frame in frames if frame.t < 4.0]
     held = [int(frame.counts[5, 6]) for frame in frames if 4.0 <= frame.t < 6.0]
     assert max(quiet) <= 4
-    # Frozen: what drifts meanwhile adds to the contact, and nothing of the contact is lost.
+    # Frozen: the drift adds to the contact, and nothing of the contact is lost.
     assert held[0] in range(2999, 3005)
     assert held[-1] - held[0] in range(28, 32)
 
 
 @pytest.mark.parametrize("above", [0, 1])
-def test_what_is_above_the_threshold_touches_and_is_not_followed(above):
+def test_counts_above_the_threshold_are_a_touch_and_are_not_followed(above):
     level = np.full((16, 24), CODY.layout.threshold_counts + above, dtype=np.uint16)
     with fake_skin(CODY, lambda t: level) as skin:
         assert skin.touch_counts == CODY.layout.threshold_counts

@@ -1,4 +1,4 @@
-"""The wiring of a skin: which stage is which taxel, and what two chips may not share."""
+"""The wiring of a skin: the taxel of each stage, and conflicts between chips."""
 
 from dataclasses import replace
 
@@ -88,7 +88,7 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
         ("[{ first", "[{ address = 8, first", "address has no meaning on a serial port"),
     ],
 )
-def test_what_a_serial_port_cannot_carry_is_one_sentence(old, new, said):
+def test_a_mistake_about_a_serial_port_is_one_sentence(old, new, said):
     assert said in mistake(SERIAL.replace(old, new))
 
 

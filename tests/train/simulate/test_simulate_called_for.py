@@ -169,7 +169,7 @@ def test_each_required_effect_has_its_reason():
     assert ("foundation" in called, "relaxation" in called) == (True, False)
 
 
-def test_a_spread_around_0_calls_for_its_effect_in_what_is_movable():
+def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
     wall = {"name": "wall", "family": "rigid", "conditions": ["fixed"]}
     box = {**wall, "name": "box", "conditions": ["fixed", "movable"], "foot_m": 0.2, **MOVES}
     trial_scene = from_dict({"object": [box, wall], "spread": {"slope_deg": 1.0, "aside_m": 0.01}})

@@ -47,7 +47,7 @@ def test_each_trial_is_felt_and_long_enough(dataset):
     assert dataset.tasks == ("category", "mobility", "object", "softness")
     assert dataset.chain is not None
     assert all(trial.onset_s > 0.1 for trial in dataset.trials)
-    # What is light and stands on something smooth may be felt so late that its window is short.
+    # A light thing on smooth ground may be felt so late that its window is short.
     short = [t for t in dataset.trials if t.series.t[-1] < 1.2 and not t.series.ended]
     assert len(short) <= 2
     assert {t.labels["object"] for t in short} <= {"bed pillow"}

@@ -167,7 +167,7 @@ class TestCommand:
         ),
     ],
 )
-def test_simulate_warns_of_what_makes_trials_useless(tmp_path, capsys, rest, said):
+def test_simulate_warns_of_settings_that_make_trials_useless(tmp_path, capsys, rest, said):
     path = tmp_path / "scene.toml"
     path.write_text(
         f'{rest}\ntrials.count = 1\n[[object]]\nname = "feather"\nfamily = "rigid"\n'

@@ -100,7 +100,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("path", "value", "says"), MISTAKES)
-def test_a_mistake_gets_one_sentence_with_the_key_and_what_is_allowed(path, value, says):
+def test_a_mistake_gets_one_sentence_with_the_key_and_the_values_allowed(path, value, says):
     with pytest.raises(InputError) as error:
         from_dict(changed(path, value), where="scene.toml")
     assert str(error.value).startswith("scene.toml: ")
@@ -108,7 +108,7 @@ def test_a_mistake_gets_one_sentence_with_the_key_and_what_is_allowed(path, valu
     assert "\n" not in str(error.value)
 
 
-def test_a_scene_may_be_like_another_but_for_what_it_says(tmp_path):
+def test_a_scene_may_be_like_another_but_for_its_own_values(tmp_path):
     (tmp_path / "one.toml").write_text(
         'name = "one"\n[trials]\ncount = 3\nafter_s = 1.5\n[spread]\nyaw_deg = 2.0\n'
         '[[object]]\nname = "wall"\nfamily = "rigid"\nconditions = ["fixed"]\n'

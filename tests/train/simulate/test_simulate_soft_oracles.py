@@ -165,7 +165,7 @@ class TestAskew:
             (17.0, 6.00, 25.5, 0.445, [1.828, 1.454, 1.086, 0.786, 0.522, 0.258]),
         ],
     )
-    def test_rows_bear_what_an_elastic_block_gives_them(self, degrees, force, depth_mm, peak, rows):
+    def test_rows_bear_the_loads_of_an_elastic_block(self, degrees, force, depth_mm, peak, rows):
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
         slope, pitch = np.tan(np.radians(degrees)), t.skin.pitch[0]
@@ -256,7 +256,7 @@ class TestBubbles:
         # Nothing bears there until it is pressed through the bubble's height.
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
 
-    def test_the_bed_s_law_is_of_the_springs_that_are_left(self):
+    def test_the_law_of_the_bed_holds_the_springs_that_are_left(self):
         t = self.wrap(pop_n=0.5, width_m=0.05).trials
         bubbles, weight = t.own["pop"], t.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
@@ -312,7 +312,7 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     np.testing.assert_allclose(viscous.given, viscous.ratio * elastic, atol=1e-3)
 
 
-def test_under_a_pivoting_arm_the_springs_that_are_left_bear_what_they_are_pressed():
+def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
     wrap = make(one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0)
     t = run(replace(wrap, travel_s=0.6)).trials
     bubbles = t.own["pop"]

@@ -8,8 +8,8 @@ from train.simulate import streams
 
 def test_a_stream_is_the_same_on_every_machine():
     # `printf noise | sha256sum` begins so; two words, low byte first.
-    said = bytes.fromhex("efe2a5c09e6d49d7")
-    assert streams.key("noise") == tuple(np.frombuffer(said, dtype="<u4").tolist())
+    digest = bytes.fromhex("efe2a5c09e6d49d7")
+    assert streams.key("noise") == tuple(np.frombuffer(digest, dtype="<u4").tolist())
 
 
 @pytest.mark.parametrize("seed", [0, 2012, 2**32 + 7, 2**63 - 1])
