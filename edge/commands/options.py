@@ -31,11 +31,11 @@ seconds = within(float, 1e-3, 1e9)
 
 
 def task_label(text: str) -> tuple[str, str]:
-    """The type of an option that takes a task and its label."""
-    task, equals, label = text.partition("=")
-    if not (task.strip() and equals and label.strip()):
+    """The type of an option that takes a task and its label, in printable characters."""
+    task, _, label = (part.strip() for part in text.partition("="))
+    if not (task and label and text.isprintable()):
         raise argparse.ArgumentTypeError(f"must be TASK=LABEL, such as object=box, not {text!r}")
-    return task.strip(), label.strip()
+    return task, label
 
 
 def add_skin(parser: argparse.ArgumentParser) -> None:

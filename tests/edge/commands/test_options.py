@@ -24,10 +24,11 @@ URDF = """<robot name="two"><link name="base"/><link name="upper"/><link name="s
         (["fake", "--trials", "0"], "--trials: must be a whole number from 1 to 1000, not '0'"),
         (["fake", "--seed", "1.5"], "--seed: must be a whole number from 0 to 9.2"),
         (["record", "--length", "nan"], "--length: must be a number from 0.1 to 600, not 'nan'"),
+        (["label", "a.npz", "--set", "object=a\nb"], "--set: must be TASK=LABEL, such as"),
         (["run", "--seconds", "soon"], "--seconds: must be a number from 0.001 to 1e+09"),
     ],
 )
-def test_a_number_beyond_its_limits_is_refused(options, said, capsys):
+def test_a_value_that_an_option_does_not_take_is_refused(options, said, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(options)
     assert said in capsys.readouterr().err
