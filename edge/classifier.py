@@ -339,7 +339,7 @@ class Classifier:
             flags=(*blank.flags, *_flags(doubts)),
             error=None if rule is None else error,
             stopped_by=None if rule is None else "confidence" if sure else "window",
-            nearest=tuple(map(info.trial, decision.neighbours.tolist())) if info.trials else (),
+            nearest=tuple(map(info.trial, decision.neighbours.tolist())),
             decision=decision,
         )
 

@@ -58,7 +58,8 @@ class Decided:
         model: name and version of the model, if it has a name.
         strongest: without a contact, the largest count of any taxel, as a part of the count at
             which a contact begins; else None.
-        nearest: names of the nearest training trials, which voted, if the model has them.
+        nearest: names of the nearest training trials, which voted, or their numbers in a model
+            without names.
         decision: the model's own answer, with the votes and the nearest training trials; None
             without a label.
     """

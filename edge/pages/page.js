@@ -157,7 +157,7 @@ function drawDecisions(picture) {
     item.append(meter);
     for (const flag of decision.flags) item.append(element("span", flag, "flag"));
     if (decision.neighbours.length) {
-      const near = decision.neighbours.map((n) => `${n.name || "trial " + n.row} (${n.distance})`);
+      const near = decision.neighbours.map(([name, distance]) => `${name} (${distance})`);
       item.append(element("div", "nearest: " + near.join(", "), "near"));
     }
     return item;

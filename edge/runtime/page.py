@@ -3,7 +3,6 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -169,14 +168,10 @@ class Page:
 def _decision(event: Decided) -> dict[str, Any]:
     """A decision for the page, with the nearest training trials."""
     line = event.to_dict()
-    decision = event.decision
-    nearest = () if decision is None else zip(decision.neighbours, decision.distances, strict=True)
+    distances = [] if event.decision is None else event.decision.distances.round(3).tolist()
     return {
         **{key: line[key] for key in ("task", "label", "confidence", "flags", "window_s")},
-        "neighbours": [
-            {"row": int(row), "distance": round(float(d), 3), "name": name}
-            for (row, d), name in zip_longest(nearest, event.nearest)
-        ],
+        "neighbours": list(zip(event.nearest, distances, strict=True)),
     }
 
 

@@ -81,6 +81,16 @@ def test_decisions_stay_until_the_next_onset(page, pictures):
     }
 
 
+def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(page, pictures):
+    touch = edge.load(demo.FOLDER / "pillow-movable.npz")
+    events = edge.Classifier(edge.Model(demo.MODEL)).classify(touch)
+    decided = next(event for event in events if isinstance(event, Decided))
+    page.push(next(frames(1)), [decided])
+    names, distances = zip(*pictures[-1]["decisions"][0]["neighbours"], strict=True)
+    assert names == decided.nearest
+    assert distances == tuple(decided.decision.distances.round(3).tolist())
+
+
 def test_labels_and_recording_are_set_from_the_page(page):
     assert not page.recording
     with pytest.raises(InputError, match="give a label first"):
