@@ -275,7 +275,7 @@ def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
         raise InputError(f"{name}: meta is missing; store a JSON object as text under it")
     if raw.dtype.kind != "U" or raw.size != 1:
         raise InputError(f"{name}: meta must be one JSON text, not {raw.dtype} {raw.shape}")
-    meta = parse_json(str(raw.reshape(())[()]), f"{name}: meta")
+    meta = parse_json(raw.item(), f"{name}: meta")
     if not isinstance(meta, dict):
         raise InputError(f"{name}: meta must be a JSON object, not {shown(meta)}")
     return meta

@@ -18,6 +18,7 @@ from edge.i2c.bus import wire_bits
 from edge.i2c.chip import MOST_TAXELS, UNUSED, ChipSpec, Sense
 from edge.i2c.serial_bus import serial_bits
 from edge.i2c.tca9548a import FakeTCA9548A
+from edge.interrupt import delayed
 from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, TaxelCalibration
@@ -130,7 +131,8 @@ def fake_buses(
             count=serial_bits if spec.serial else wire_bits,
         )
         shape = NOISE_FRAMES if noise_counts else 1, calibration.baseline.size
-        drawn = np.random.default_rng([seed, b]).standard_normal(shape)
+        with delayed():  # numpy imports its generators at their first use
+            drawn = np.random.default_rng([seed, b]).standard_normal(shape)
         noise = np.rint(noise_counts * drawn).astype(np.int64)
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")

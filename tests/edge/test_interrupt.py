@@ -1,11 +1,16 @@
 """Ctrl-C during an import waits for its end."""
 
 import signal
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 
 from edge.interrupt import delayed
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -58,3 +63,27 @@ def test_a_thread_imports_without_it(interruptible):
     thread.start()
     thread.join()
     assert entered == [interruptible]
+
+
+HEARD = """
+import signal, sys
+from edge import demo
+from edge.__main__ import start
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+class Watch:
+    def find_spec(name, path=None, target=None):
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            print(name, file=sys.stderr)
+
+sys.meta_path.insert(0, Watch)
+start("edge.cli", ["run", "--model", str(demo.MODEL), "--fake", str(demo.recordings()[0])])
+"""
+
+
+def test_extension_modules_that_lose_ctrl_c_are_imported_within_it():
+    done = subprocess.run([sys.executable, "-c", HEARD], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0
+    losing = ("numpy.random", "onnxruntime")
+    assert [name for name in done.stderr.split() if name.startswith(losing)] == []
