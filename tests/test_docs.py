@@ -55,14 +55,10 @@ def test_the_notebook_runs(tmp_path):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_page_is_on_the_site_and_its_links_lead_somewhere(page):
+def test_every_page_is_on_the_site_and_its_links_and_paths_lead_somewhere(page):
     assert f": {page.name}" in (ROOT / "mkdocs.yml").read_text()
     for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text()):
         assert link.startswith("https://") or (DOCS / link).exists(), link
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_path_that_a_page_names_is_there(page):
     prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
     for named in re.findall(r"`((?:edge|train|examples|tests|board)/[\w./-]+)`", prose):
         assert (ROOT / named).exists(), named
