@@ -30,7 +30,7 @@ NOISE_COUNTS = 0.7
 """Noise of the fake skins that commands open, below that from which a chip that always serves the
 same bytes is stuck: a fake may be calibrated with noise, and then played without."""
 NOISE_FRAMES, NOISE_STEP_S = 97, 0.001
-"""The noise is a list of frames, repeated: one for each so many seconds."""
+"""The noise is this many frames, repeated, each of which lasts for this many seconds."""
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
 
@@ -220,7 +220,7 @@ def play(
 
 
 def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list[float]:
-    """Bits on the wire of each bus for so many frames, counted while the drivers send them.
+    """Bits on the wire of each bus for some frames, counted while the drivers send them.
 
     The software's time of each transaction counts as the bits that the wire would carry in it.
     """

@@ -29,8 +29,8 @@ LEAD_S = 0.3
 TAIL_S = 0.3
 """Time after it, during which its last forces go on: no touch ends within a decision's window."""
 WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
-"""Where counts per newton are unknown, the strongest taxel of the weakest contact has so many times
-the counts of the onset, which is taken to be at least so many."""
+"""Where counts per newton are unknown, the strongest taxel of the weakest contact has the counts of
+this many onsets; an onset below the second number is taken to be that number of counts."""
 
 
 def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str, Recording]]:

@@ -57,7 +57,7 @@ TO_HOST = 1
 HUB = Path("/sys/devices/platform/vhci_hcd.0")
 DRIVERS = (HUB, Path("/sys/bus/usb/drivers/i2c-tiny-usb"), Path("/sys/class/i2c-dev"))
 FREE_PORT = "004"
-"""How the hub's `status` file marks a port that nothing is plugged into (VDEV_ST_NULL)."""
+"""The mark of an empty port in the hub's `status` file (VDEV_ST_NULL)."""
 LOW_SPEED = 1
 APPEARS_S = 10.0
 

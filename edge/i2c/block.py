@@ -102,7 +102,7 @@ class Block(Chip):
         bits: int = 16,
         into: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Check that the microcontroller serves what the skin file says.
+        """Check that the microcontroller serves the taxels of the skin file.
 
         Args:
             bus: a bus, a mux's channel or a serial port.

@@ -1,7 +1,7 @@
 """A chip with taxels: its driver, its descriptor, its place in the wiring, and its model.
 
-Whoever adds a chip writes one module with a driver (a `Chip`), a model (a `FakeChip`) and a
-descriptor (a `ChipKind`), and adds the descriptor to the list in `edge.skin.kinds`.
+To add a chip, write one module with a driver (a `Chip`), a model (a `FakeChip`) and a descriptor (a
+`ChipKind`), and add the descriptor to the list in `edge.skin.kinds`.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Chip(ABC):
         self.bus.transfer(self.frame)
 
     def wrong(self, what: str) -> WrongChip:
-        """Build the error for a chip that is not what the skin file says."""
+        """Build the error for a chip that contradicts the skin file."""
         error = WrongChip(f"{self.bus.name}, address {self.address:#04x}: {what}")
         error.bus, error.address = self.bus.name, self.address
         return error

@@ -43,7 +43,7 @@ class TCA9548A:
             bus: the bus that it is on.
             address: 0x70 to 0x77.
             verify: read the control byte back whenever a channel is selected. It catches a wrong
-                channel, whose data would look plausible. Whoever calls `kept` after its
+                channel, whose data would look plausible. A caller that asks `kept` after its
                 transactions may switch it off meanwhile.
             beside: all muxes on the same bus, of which at most one may have a channel open; it may
                 grow later.
@@ -99,7 +99,7 @@ class TCA9548A:
         self.control = None
 
     def leave(self) -> None:
-        """Disconnect for the sake of a mux beside; a mux that never answers is passed over."""
+        """Disconnect, so that a mux beside may connect; a mux that never answers is passed over."""
         for _ in range(LEAVE_ATTEMPTS):
             with suppress(BusNack):
                 return self.select(None)

@@ -80,8 +80,8 @@ class Stopping:
     Attributes:
         slopes, intercepts: of each decision point: the probability that the label is right is the
             logistic function of slope * `margin` + intercept.
-        rules: rising in error. Mean times fall, but from a factor's own rules to those that it
-            shares with its product (see `edge.model.agreement`).
+        rules: in the order of rising error. Mean times fall along them, except from a factor's own
+            rules to those that it shares with its product (see `edge.model.agreement`).
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
@@ -122,7 +122,7 @@ class Stopping:
                 f"{known}, and {share:.1%} of them are decided wrongly even at the full window: "
                 "more trials alone will not do"
             )
-        # Chernoff: so many trials with the same share of errors are enough.
+        # Chernoff: this many trials with the same share of errors are enough.
         divergence = (1.0 - share) * (math.log1p(-share) - math.log1p(-error))
         if share > 0.0:
             divergence += share * math.log(share / error)
@@ -132,7 +132,7 @@ class Stopping:
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Stopping:
-        """Read the table that a model with so many decision points holds.
+        """Read the table from the metadata of a model with this number of decision points.
 
         Raises:
             InputError: the table is damaged.
@@ -181,7 +181,7 @@ class Novelty:
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Novelty:
-        """Read the table that a model with so many decision points holds.
+        """Read the table from the metadata of a model with this number of decision points.
 
         Raises:
             InputError: the table is damaged.

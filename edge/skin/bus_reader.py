@@ -24,17 +24,18 @@ PAUSE_S, LONG_PAUSE_S = 0.1, 0.3
 """Time between two attempts to bring the same chip back; the longer one also from a timeout to the
 next attempt on its bus. All taxels must be back 0.5 s after a fault's end."""
 FLAPS_S = 1.0
-"""A chip that fails again so soon after its return is not tried again at once."""
+"""A chip that fails again within this time of its return is not tried again at once."""
 LONGEST_PAUSE_S = 1.0
-"""Time between two attempts to open a lost bus again, at most: a tenth of the time since the loss,
-and no less than `PAUSE_S`."""
+"""Longest time between two attempts to open a lost bus again. It is a tenth of the time since the
+loss, and no less than `PAUSE_S`."""
 SET_UP_AFTER, SET_UP_EVERY = 8, 64
-"""A chip that keeps its settings but serves damaged bytes is set up again after so many frames in a
-row, and then every so many; a conversion takes at most four frames at 100 Hz."""
+"""A chip that keeps its settings but serves damaged bytes is set up again after the first number of
+frames in a row, and then each time the second has passed. At 100 Hz a conversion takes at most four
+frames."""
 LONGEST_STEP_S = 0.0015
-"""A step of a set-up takes no longer at 400 kHz; none begins so shortly before a frame's end."""
+"""A step of a set-up takes no longer at 400 kHz; none begins closer to a frame's end."""
 OLDEST_FRAMES = 4
-"""While a chip is being set up, each of the others is read in one frame of so many. A taxel stays
+"""While a chip is being set up, each of the others is read once in this many frames. A taxel stays
 valid for as long."""
 NEVER = -1.0e9
 """Read time of a chip not read yet."""

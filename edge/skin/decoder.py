@@ -11,7 +11,7 @@ from edge.skin.bus_reader import NEVER, Slot
 from edge.skin.file import SkinFile
 
 NOISY_COUNTS = 1.0
-"""Standard deviation from which a chip's bytes change with every conversion."""
+"""A chip with a taxel of at least this standard deviation has new bytes in every conversion."""
 
 
 class Decoder:

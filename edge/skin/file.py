@@ -23,7 +23,7 @@ class Signal:
     """From raw values to counts above baseline.
 
     Attributes:
-        dead_band_sigma: counts under so many standard deviations of the noise become 0.
+        dead_band_sigma: counts under this many standard deviations of the noise become 0.
         dead_band_counts: counts under this become 0 too.
         drift_counts_per_s: how fast the baseline follows while nothing touches.
         drift_limit_counts: how far from the calibration it may move.
@@ -51,8 +51,8 @@ class Reading:
         timeout_s: longest time that a hung chip costs; adapters round it up to 10 ms.
         verify_mux: read a mux's control byte back after each selection.
         recheck_frames: number of frames between two checks of a chip's settings on each bus.
-        stuck_frames: a chip whose bytes do not change for so many frames is invalid, if the
-            calibration saw it make noise.
+        stuck_frames: a chip whose bytes do not change for this many frames is invalid, if it made
+            noise during calibration.
         region_of_interest: read the chips near the contact at full rate, the rest in turn.
     """
 

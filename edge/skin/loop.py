@@ -54,8 +54,10 @@ class Periods:
         self._counts[int(min(period_s, 1.0) / self.BIN_S + 1e-6)] += 1
 
     def percentile(self, percent: float) -> float:
-        """The period in seconds that so many percent do not exceed, rounded up to a bin; NaN
-        without periods."""
+        """The seconds that this percentage of periods does not exceed, rounded up to a bin.
+
+        NaN without periods.
+        """
         rank, counted = math.ceil(self.n * percent / 100.0), 0
         for i, count in sorted(self._counts.items()):
             counted += count

@@ -16,9 +16,9 @@ from edge.touch.frame import Frame
 MARGIN = 0.9
 """Share of a period for planned readings; retries and checks need the rest."""
 OVERDUE_FRAMES = 12
-"""A chip that has waited for so many frames comes before those at a contact."""
+"""A chip that has waited for this many frames comes before those at a contact."""
 OLDEST_FRAMES = 25
-"""After so many frames without a reading a taxel is no longer valid. Of 32 chips on a bus, none
+"""After this many frames without a reading a taxel is no longer valid. Of 32 chips on a bus, none
 waits for more than 20."""
 
 

@@ -27,7 +27,7 @@ from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
 SILENT_FRAMES = 50
-"""A taxel without a valid value in so many frames in a row is silent: half a second at 100 Hz,
+"""A taxel without a valid value in this many frames in a row is silent: half a second at 100 Hz,
 within which a taxel returns from any fault that has ended."""
 
 

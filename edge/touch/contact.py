@@ -40,7 +40,7 @@ class FeatureSeries:
         zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
         taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`), or None.
-        kernel_cells: (n, cells) likewise, of the fewer cells that kernels take, or None.
+        kernel_cells: (n, cells) likewise, of the larger cells that kernels take, or None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or None.
     """
 

@@ -61,7 +61,7 @@ class KernelTable:
         """Read the table from a model's metadata, which holds its `vars`.
 
         Raises:
-            InputError: the numbers are not those of so many channels and biases.
+            InputError: the table has another number of channels or biases.
         """
         shifts = table.numbers("shifts", channels, low=-48, high=BITS)
         limits = table.numbers("biases", biases, low=-(2**BIAS_BITS), high=2**BIAS_BITS)
@@ -71,7 +71,7 @@ class KernelTable:
 
 @lru_cache
 def convolution_of_bias(biases: int) -> NDArray[np.int64]:
-    """(biases,) the convolution that each of so many biases belongs to."""
+    """(biases,) the convolution that each bias belongs to, from the number of biases."""
     each = np.repeat(BIASES[biases], len(KERNELS))
     return np.repeat(np.arange(CONVOLUTIONS), each)
 

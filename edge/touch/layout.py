@@ -49,7 +49,7 @@ class SkinLayout:
     dead: tuple[int, ...] = ()
     """Flat indices (row * cols + col) of taxels that can never be read."""
     release_s: float = RELEASE_S
-    """A contact ends after so many seconds with no taxel above the threshold."""
+    """A contact ends after this many seconds with no taxel above the threshold."""
 
     def __post_init__(self) -> None:
         if any(not 0 <= i < self.rows * self.cols for i in self.dead):

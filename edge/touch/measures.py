@@ -189,7 +189,7 @@ class Cells:
 
     A cell's value is the sum of all its counts, those below the threshold included; taxels that
     could not be read are left out. The side of a block is the smallest power of two that leaves at
-    most so many of them. Blocks without a living taxel are no cells.
+    most `most` of them. Blocks without a living taxel are no cells.
 
     Attributes:
         side: taxels along a block's side; 1 where every taxel is a cell.
@@ -225,7 +225,7 @@ class Measurer:
         zones: the zones measured, in the order of `ZONES`.
         width: how many whole numbers `measure` returns for a frame.
         cells: the skin's cells where a feature needs them, else None.
-        kernel_cells: the fewer cells that kernels take, likewise.
+        kernel_cells: the larger cells that kernels take, likewise.
         joints: number of joint angles kept of each frame; 0 where no feature needs them.
     """
 
