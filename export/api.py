@@ -1,7 +1,5 @@
 """Files of a fitted model, and the time and size of each candidate."""
 
-from __future__ import annotations
-
 import os
 import platform
 import statistics

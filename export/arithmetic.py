@@ -1,4 +1,4 @@
-"""Measure what a model's number format costs and gives, on the graph that ships.
+"""Measure the time, size and labels of a model in other number formats, on the graph that ships.
 
 The exported graph computes on whole numbers in float64. This program runs it beside three copies:
 one that rounds nothing to whole numbers, one with every number in float32 besides, and one whose
@@ -6,8 +6,6 @@ matrices are in int8 besides (ONNX Runtime's dynamic quantisation). Each row say
 decision, the size, how many labels become others, and how many of the neighbours' distances have
 other bits where a vector is decided alone than where all are decided at once.
 """
-
-from __future__ import annotations
 
 import argparse
 import json

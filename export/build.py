@@ -1,7 +1,5 @@
 """Nodes and constants of an ONNX graph, and the projection of `train.projection` as its nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -105,8 +103,8 @@ class Builder:
         """
         low, high = (self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0))
         inside = self.node("Clip", [x, low, high])
-        rest = self.node("Sub", [x, inside])
-        return inside, self.node("ReduceL1", [rest, self.ints(1)], keepdims=1)
+        excess = self.node("Sub", [x, inside])
+        return inside, self.node("ReduceL1", [excess, self.ints(1)], keepdims=1)
 
 
 def project(build: Builder, x: str, decision_points: Sequence[Projection]) -> tuple[str, str]:

@@ -1,7 +1,5 @@
 """golden.npz: see `edge.model.verify` for the format."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

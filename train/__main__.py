@@ -1,7 +1,5 @@
 """`python -m train`: the workstation's commands."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

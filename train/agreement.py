@@ -1,7 +1,5 @@
 """Which tasks' labels are the pairs of two others', as the training labels show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import combinations
 

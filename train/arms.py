@@ -1,7 +1,5 @@
 """The arms and joint angles of recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

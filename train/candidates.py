@@ -1,7 +1,5 @@
 """The candidates among features, scalings, projections and their numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """A Dask cluster as joblib's backend, so that the same work runs there as on local cores."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from importlib import import_module

@@ -5,8 +5,6 @@ all numbers of components, as squared distances are accumulated over components.
 number of components serves all k, as votes are accumulated over k.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

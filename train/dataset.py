@@ -6,6 +6,7 @@ import hashlib
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +20,7 @@ from edge.recording import LARGEST_BYTES, Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.features import (
-    FEATURES,
-    SAMPLES,
-    WINDOW_S,
-    feature_vector,
-    kernel_channels,
-    widths,
-)
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, kernel_channels, widths
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
@@ -319,16 +313,10 @@ def load_trials(
         for task in tasks
     }
     enough = any if partial else all
-    used = [
-        (path, own)
-        for path, own in zip(paths, labels, strict=True)
-        if enough(task in own for task in tasks)
-    ]
-    trials = [
-        replace(trial, labels=own)
-        for trial, own in zip(trials, labels, strict=False)
-        if enough(task in own for task in tasks)
-    ]
+    usable = [enough(task in own for task in tasks) for own in labels]
+    used = list(compress(zip(paths, labels, strict=True), usable))
+    felt = compress(zip(trials, labels, strict=False), usable)
+    trials = [replace(trial, labels=own) for trial, own in felt]
     if not trials:
         raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
     return DataSet(

@@ -63,19 +63,12 @@ its own place, posture recognises it for a reason that holds in that room only.
 | `joint_angle`, at ten times | radian | the angles themselves |
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import KERNELS, PAPER, QUANTITIES, Feature
 
-_TAXELS = (
-    "taxel_force@10",
-    "taxel_force_mean",
-    "taxel_force_deviation",
-    "taxel_force_roughness",
-)
+_TAXELS = ("taxel_force@10", "taxel_force_mean", "taxel_force_deviation", "taxel_force_roughness")
 
 SETS: dict[str, tuple[str, ...]] = {
     "paper": PAPER,

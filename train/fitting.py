@@ -1,7 +1,5 @@
 """Recordings to a fitted model: its settings are chosen, and their accuracy is measured."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,19 +1,11 @@
 """The tables of convolution features: shifts and biases that training touches give."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.kernels import (
-    BITS,
-    KernelTable,
-    convolution_of_bias,
-    convolved,
-    shifted,
-)
+from edge.touch.kernels import BITS, KernelTable, convolution_of_bias, convolved, shifted
 
 MOST_TOUCHES = 500
 """Touches that are enough for a table."""

@@ -1,7 +1,5 @@
 """Labels of contacts, and those that follow from others."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 

@@ -23,8 +23,6 @@ the smallest certified error was exceeded in 14 to 22 of 100 sets instead of ten
 of it. `make risk` counts it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -66,7 +64,7 @@ def stops(
 
 @dataclass(frozen=True)
 class Course:
-    """What a task would answer at each decision point.
+    """The answers of a task at each decision point, and how sure they are.
 
     Attributes:
         confidences: (decision points, n), of each part. A product of two tasks has these as its

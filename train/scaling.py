@@ -1,7 +1,5 @@
 """Scaling of feature vectors: a gain for each feature type."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

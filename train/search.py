@@ -1,7 +1,5 @@
 """Settings that share a decomposition of features, and the neighbours that each of them finds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -34,12 +34,7 @@ from threadpoolctl import threadpool_limits
 from edge.errors import InputError
 from edge.model.stopping import NOVELTY_RATE, Novelty, Stopping, margin
 from edge.touch.features import FEATURES
-from train.pipeline import (
-    Choice,
-    ContactClassifier,
-    columns_of,
-    types_of,
-)
+from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
 
@@ -230,7 +225,6 @@ class SequentialClassifier:
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or export "
                 "without decision points"
             )
-        count = len(fold_choices)
         kept = _taken(self.choices.values(), self.features)
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(kept, self.features, widths)
@@ -240,20 +234,18 @@ class SequentialClassifier:
         form = self.features, self.widths
         by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
         most = finest({task: y[task] for task in self.choices})
-        nearest = np.empty(X.shape[:2])
-        for k, answers_of in enumerate(by_fold):
-            nearest[:, folds == k] = answers_of[most][2]
-        unknown = np.zeros(nearest.shape, dtype=bool)
-        for k in range(count):
-            others = (folds >= 0) & (folds != k) & (y[most] != "")
-            limits = novelty(most, nearest[:, others])
-            unknown[:, folds == k] = unlike(limits, nearest[:, folds == k])
+        nearest, unknown = np.empty(X.shape[:2]), np.zeros(X.shape[:2], dtype=bool)
         self.right_ = right = {task: np.zeros(X.shape[:2], dtype=bool) for task in self.choices}
         margins = {task: np.empty(X.shape[:2]) for task in self.choices}
         for k, answers_of in enumerate(by_fold):
+            nearest[:, folds == k] = answers_of[most][2]
             for task, (named, sure, _) in answers_of.items():
                 right[task][:, folds == k] = named == y[task][folds == k]
                 margins[task][:, folds == k] = sure
+        for k in range(len(by_fold)):
+            others = (folds >= 0) & (folds != k) & (y[most] != "")
+            limits = novelty(most, nearest[:, others])
+            unknown[:, folds == k] = unlike(limits, nearest[:, folds == k])
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self.novelty_ = novelty(most, nearest[:, tested[most]])
         confidence = {

@@ -1,7 +1,5 @@
 """Thresholds: those that a skin's own noise suggests, and lower ones where touches are missed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

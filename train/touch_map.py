@@ -1,7 +1,5 @@
 """The contacts of a map of touch, as `edge.runtime.touch_map` describes its file."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator, Mapping
@@ -10,7 +8,7 @@ from typing import Any, NamedTuple
 
 from edge.config import parse_json
 from edge.errors import InputError
-from edge.files import open_regular
+from edge.files import open_regular, parsing
 from edge.runtime.touch_map import LARGEST_BYTES, LONGEST_LINE, NOT_A_MAP
 
 
@@ -79,13 +77,10 @@ class TouchMap:
                     continue  # cut short
                 if not isinstance(entry, dict):
                     continue
-                try:
-                    yield number, _parsed(entry)
-                except (KeyError, TypeError, ValueError, OverflowError):
-                    raise InputError(
-                        f"{self.path}: line {number} is not of a map; give a file that "
-                        "`run --map` wrote"
-                    ) from None
+                mend = "; give a file that `run --map` wrote"
+                with parsing(f"{self.path}: line {number}", "of a map", mend):
+                    parsed = _parsed(entry)
+                yield number, parsed
 
     def __iter__(self) -> Iterator[Touch]:
         """The contacts with all tasks decided, in the order of their last decisions.

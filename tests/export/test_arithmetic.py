@@ -1,4 +1,4 @@
-"""What a model's number format costs and gives, on the committed golden model."""
+"""Time, size and labels of a model in other number formats, on the committed golden model."""
 
 import json
 from pathlib import Path

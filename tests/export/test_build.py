@@ -32,7 +32,7 @@ class Names:
 
 @pytest.fixture
 def graph():
-    """A builder, and a function that runs what was built from x to the named output."""
+    """A builder, and a function that runs its graph from x to the named output."""
     names = Names()
 
     def run(output, x):

@@ -116,7 +116,7 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(kind, projection, sc
     fitted = fit(X, {"t": Choice(scaling, 6, k, projection)}, labels=4)
     data = to_onnx(fitted, describe(fitted, samples=8))
     proto = onnx.load_from_string(data)
-    # The coordinates are what the last Clip gives.
+    # The last Clip gives the coordinates.
     z_name = [node.output[0] for node in proto.graph.node if node.op_type == "Clip"][-1]
     proto.graph.output.append(onnx.helper.make_empty_tensor_value_info(z_name))
     [space] = fitted.projections_

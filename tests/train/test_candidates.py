@@ -49,11 +49,14 @@ def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
         assert not {"posture", "taxels", "sqrt_taxels"} & {
             s for candidate in tried for s in candidate.sets
         }
-        assert min(min(grid.shrinkages) for candidate in tried for grid in candidate.grids) == 0.3
-    assert (
-        min(min(grid.shrinkages) for candidate in candidates(TASKS) for grid in candidate.grids)
-        < 0.3
-    )
+        grids = [grid for candidate in tried for grid in candidate.grids]
+        assert min(min(grid.shrinkages) for grid in grids) == 0.3
+        # Ten directions at most: as many as the most components.
+        assert {grid.most_directions for grid in grids} == {10}
+        assert max(max(grid.components) for grid in grids) == 10
+    plain = [grid for candidate in candidates(TASKS) for grid in candidate.grids]
+    assert min(min(grid.shrinkages) for grid in plain) < 0.3
+    assert {grid.most_directions for grid in plain} == {None}
 
 
 def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():

@@ -59,7 +59,7 @@ def test_the_first_rule_is_the_full_window_at_the_whole_level():
 
 
 def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
-    """What the first decision point gets right counts for nothing once the full window, which is
+    """Right answers at the first decision point count for nothing once the full window, which is
     tested first, has 20 of 100 wrong."""
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[-1, :20] = True

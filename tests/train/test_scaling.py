@@ -27,7 +27,7 @@ def test_scalings_are_the_papers_equations_per_feature_type_but_for_their_offset
 
 
 def test_a_wide_feature_deviates_from_the_mean_of_each_column():
-    """Method IV: a cell's own level would swamp what the trials differ in."""
+    """Method IV: a cell's own level would swamp the differences between trials."""
     around = np.array([[1.0, -1.0], [-1.0, 1.0]])
     level = np.array([1000.0, -1000.0])
     gain = scale_of(level + around, "IV", ["taxel_force_mean"], [2])

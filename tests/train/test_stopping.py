@@ -122,7 +122,7 @@ def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
 
 
 def test_what_no_task_takes_is_there_for_the_folds_alone():
-    """The folds may choose what the model does not: its own vectors are the narrower ones."""
+    """The folds may choose features that the model does not: its own vectors are narrower."""
     X, labels = touches(60)
     names = ("max_force", "contact_area")
     folds = stratified_folds(labels)

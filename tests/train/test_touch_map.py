@@ -23,9 +23,9 @@ def test_a_contact_comes_once_all_of_its_tasks_are_decided(tmp_path):
         ("", "not a map"),
         ("[1]\n", "not a map"),
         ("hello\n", "not a map"),
-        ('{"event": "decision"}\n', "line 1 is not of a map"),
-        ('{"event": "map", "frame": "a", "unit": "metre"}\n', "line 1 is not of a map"),
-        (HEAD + PLACED + '"task": "mobility", "label": "fixed"}\n', "line 2 is not of a map"),
+        ('{"event": "decision"}\n', "line 1: not of a map"),
+        ('{"event": "map", "frame": "a", "unit": "metre"}\n', "line 1: not of a map"),
+        (HEAD + PLACED + '"task": "mobility", "label": "fixed"}\n', "line 2: not of a map"),
         (
             '{"event": "map", "frame": "a", "unit": "metre", "tasks": []}\n'
             '{"event": "map", "frame": "b", "unit": "metre", "tasks": []}\n',

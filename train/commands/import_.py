@@ -5,8 +5,6 @@ thresholds get those that `python -m train thresholds` proposes. To add a format
 train/importers/__init__.py.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Sequence
@@ -75,10 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
             save(path, recording)
         else:
             without_threshold.append((path, recording))
-    report = set_thresholds(without_threshold) if without_threshold else ""
-    print(f"recordings written to {arguments.out}: {len(paths)}")
-    if report:
-        print(report)
+    report = [set_thresholds(without_threshold)] if without_threshold else []
+    print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
     return 0
 
 

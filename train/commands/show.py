@@ -6,8 +6,6 @@ trials. Draws several recordings side by side, with the decisions of --model. Dr
 `edge-classify run --map` wrote: the places of the contacts, and their labels.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

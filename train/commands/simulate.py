@@ -4,8 +4,6 @@ Simulates the touches that a scene file describes, and only the effects that it 
 scene gives the same files, whatever the batch or the machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 
@@ -20,11 +18,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option("--seed", type=int, help="seed, instead of the scene's")
     text = "trials of each object in each condition, instead of the scene's"
     option("--trials", type=int, metavar="N", help=text)
-    option("--batch", type=int, default=400, help="most trials simulated side by side")
     option("--jobs", type=int, default=1, help="processes; -1 for all cores")
-    text = "where the batches run"
-    option("--backend", choices=("local", "dask"), default="local", help=text)
-    option("--address", help="address of a Dask scheduler, like tcp://127.0.0.1:8786")
+    text = "run the batches on the cluster of this Dask scheduler, like tcp://127.0.0.1:8786"
+    option("--address", help=text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,10 +31,6 @@ def run(arguments: argparse.Namespace) -> int:
     scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
     if not arguments.out and not arguments.explain:
         raise InputError("simulate: give --out DIR, --explain or both")
-    if arguments.address and arguments.backend != "dask":
-        raise InputError("simulate: --address needs --backend dask")
-    if arguments.backend == "dask" and not arguments.address:
-        raise InputError("simulate: --backend dask needs --address, like tcp://127.0.0.1:8786")
     if arguments.jobs == 0 or arguments.jobs < -1:
         raise InputError(f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}")
     if arguments.explain:
@@ -49,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
         from train.progress import bar
         from train.simulate.run import total_trials, write
 
-        given = {name: getattr(arguments, name) for name in ("batch", "jobs", "address")}
+        given = {name: getattr(arguments, name) for name in ("jobs", "address")}
         with bar(total=total_trials(scene), unit="trial", desc=scene.name) as shown:
             written = write(scene, arguments.out, **given, progress=shown.update)
         lines = [f"recordings written to {arguments.out}: {len(written.paths)}"]

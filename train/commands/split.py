@@ -5,8 +5,6 @@ number. Its labels come from meta.contacts, a list with the labels of each conta
 those of the recording.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

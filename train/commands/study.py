@@ -3,8 +3,6 @@
 Writes OUT/report.html, which needs no other file, each plot as PNG and each table as CSV.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from pathlib import Path

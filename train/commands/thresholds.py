@@ -6,8 +6,6 @@ touches. Proposes 1.5 times the threshold as onset. Counts the contacts that the
 thresholds give.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from tqdm import tqdm

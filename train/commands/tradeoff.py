@@ -4,8 +4,6 @@ Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each ta
 front.json, which `python -m export --front` reads.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

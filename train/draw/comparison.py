@@ -1,7 +1,5 @@
 """Draw touches side by side: the loaded skin, the three features, the decision and its time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

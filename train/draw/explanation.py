@@ -1,7 +1,5 @@
 """Draw the reasons for a model's answers: a touch's curves over those of the nearest trials."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

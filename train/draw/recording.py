@@ -1,14 +1,12 @@
 """Draw a recording: its frames with the contact region, the three features, and the arm."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from edge.errors import InputError
-from edge.files import write_whole
+from edge.files import parsing, write_whole
 from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
@@ -17,7 +15,7 @@ from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
 from train.arms import arm_of
 from train.dataset import with_thresholds
-from train.draw.sketch import draw_side, simulated
+from train.draw.sketch import draw_side
 
 FRAMES = 6
 HORIZON_S = 2.0
@@ -51,7 +49,6 @@ def draw(
         recording = recording.for_joints(chain.names)
     if scene and chain is None:
         raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
-    drawn = simulated(recording, where) if scene else {}
     contact = first_contact(recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S))
     onset, series = contact or (float(recording.t[0]), None)
     heights = [1.7, 3.2, 4.0][: 3 if scene else 2]
@@ -72,7 +69,8 @@ def draw(
             axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
             axis.set_ylim(bottom=0.0)
     if scene and chain is not None:
-        draw_side(figure.add_subplot(grid[2, 1:-1]), recording, chain, layout, onset, drawn)
+        with parsing(f"{where}: meta.simulation", "that of a scene"):
+            draw_side(figure.add_subplot(grid[2, 1:-1]), recording, chain, layout, onset)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
 

@@ -1,19 +1,15 @@
 """Sketch a contact from the side: the arm, and the object that was simulated, as it moves."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 
-from edge.config import ConfigTable
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from train.simulate.schema import OBJECT
 
 DEPTH_M, STANDS_M = 0.12, 0.15
 """Depth of an object, and its foot's distance below the contact, where the scene gives none."""
@@ -38,38 +34,15 @@ def link_positions(chain: Chain, q: Any) -> np.ndarray:
     return np.vstack([np.zeros(3), *(link.pose(q[: link.dof])[:3, 3] for link in chains)])
 
 
-def simulated(recording: Recording, where: str) -> dict[str, Any]:
-    """The `family`, `effects` and `values` of a simulated recording's object; {} of any other.
-
-    Raises:
-        InputError: `meta.simulation` lacks one of them, or a value cannot be drawn.
-    """
-    table = ConfigTable(recording.meta.get("simulation", {}), where, "meta.simulation.")
-    if not table.raw:
-        return {}
-    given = table.table("values")
-    values = {
-        key: given.number(key, 0.0, field.low, open_low=field.open_low)
-        for key, field in OBJECT.items()
-        if given.has(key)
-    }
-    return {"family": table.text("family"), "effects": table.texts("effects"), "values": values}
-
-
 def draw_side(
-    axis: Any,
-    recording: Recording,
-    chain: Chain,
-    layout: SkinLayout,
-    onset: float,
-    drawn: dict[str, Any],
+    axis: Any, recording: Recording, chain: Chain, layout: SkinLayout, onset: float
 ) -> None:
     """Draw the arm at onset and at the end of the window, in the x-z plane of its base.
 
-    An object that was simulated (`drawn`, see `simulated`) stands on its table, and slides, leans
-    or turns there.
+    An object that was simulated (`meta.simulation`) stands on its table, and slides, leans or turns
+    there.
     """
-    joints = recording.joints
+    joints, drawn = recording.joints, recording.meta.get("simulation")
     assert joints is not None
     first: Place | None = None
     motion = ""

@@ -1,7 +1,5 @@
 """A map of touch as a picture: the places of the contacts and their labels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -68,12 +66,12 @@ def draw(
             behind = {"color": "0.6", "lw": 2.0, "zorder": 0}
             axis.plot(line[:, across], line[:, up], label=None if i else name, **behind)
         for i, label in enumerate(sorted(set(labels))):
-            those = np.array([seen == label for seen in labels])
+            labelled = np.array([seen == label for seen in labels])
             style = {"s": 90, "edgecolors": "black", "linewidths": 0.6}
             style["color"] = "0.6" if label == UNKNOWN else f"C{i % 10}"
-            style |= {"marker": MARKERS[i % len(MARKERS)], "alpha": 0.35 + 0.65 * sure[those]}
-            text = f"{label} ({int(those.sum())})"
-            axis.scatter(*positions[those][:, [across, up]].T, **style, label=text)
+            style |= {"marker": MARKERS[i % len(MARKERS)], "alpha": 0.35 + 0.65 * sure[labelled]}
+            text = f"{label} ({int(labelled.sum())})"
+            axis.scatter(*positions[labelled][:, [across, up]].T, **style, label=text)
         unit = UNITS.get(contacts.head.unit, contacts.head.unit)
         axis.set(xlabel=f"{'xyz'[across]} ({unit})", ylabel=f"{'xyz'[up]} ({unit})", title=view)
         axis.set_aspect("equal", adjustable="datalim")

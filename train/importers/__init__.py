@@ -10,8 +10,6 @@ for formats with joint angles. A format with options of its own also has `add_op
 its `trials` then gets the parsed options as a third argument.
 """
 
-from __future__ import annotations
-
 import pkgutil
 
 

@@ -9,8 +9,6 @@ numbers from 1, such as `1-9,force`. `skin.json` in the folder is the `skin` of 
 With `--frames`, a folder holds a folder for each trial, with a file for each frame: a line a row.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import io
@@ -130,10 +128,10 @@ def trials(
             few = f"{values.shape[1]} taxels, and {first} {width}"
             raise InputError(f"{table.path}: has {few}; name them by --taxels")
     starts = [np.median(values[:START], axis=0) for _, values, _ in measured]
-    rest = max(starts, key=np.nansum) if options.falls else 0.0
+    at_rest = max(starts, key=np.nansum) if options.falls else 0.0
     for (name, labels, table), (t, values, joints) in zip(named, measured, strict=True):
         shape = _shape(options.shape, table, skin, width)
-        counts = (np.clip(rest - values, 0.0, None) if options.falls else values) * options.scale
+        counts = (np.clip(at_rest - values, 0.0, None) if options.falls else values) * options.scale
         valid = np.isfinite(counts)
         counts[~valid] = 0.0
         frames = np.rint(counts).clip(0.0, 65535.0).astype(np.uint16)

@@ -3,8 +3,6 @@
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

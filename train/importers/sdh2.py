@@ -5,8 +5,6 @@ which runs of zeros are packed, and the hand's seven joint angles with times of 
 https://github.com/peter-kiechle/tactile-sensors, `python/classification`.
 """
 
-from __future__ import annotations
-
 import bz2
 import math
 from collections.abc import Iterator

@@ -10,7 +10,7 @@ Joints are identified by name, in any order, and several messages may share them
 joints are selected in the arm's order, and a warning names the others. Without an arm, all joints
 are kept.
 
-A JSON file beside the log, `NAME.json`, may add what the log lacks: `labels` {task: label}, `skin`
+A JSON file beside the log, `NAME.json`, may complete it: `labels` {task: label}, `skin`
 (see `edge.touch.layout.SkinLayout`), `arm`, and, if there are several topics of a kind, the ones to
 use: `frames_topic` and `joints_topic`.
 """

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from edge import recording
-from edge.errors import InputError
 from edge.files import check_writable
 from edge.recording import Recording
 from train.cluster import on_cluster
@@ -104,8 +103,6 @@ def batches_of(
         convergences: the measured steps (`measured`), for a scene that gives no step.
         jobs: smallest number of batches, if there are so many trials.
     """
-    if batch < 1:
-        raise InputError(f"--batch must be at least 1, not {batch}")
     if convergences is None:
         convergences = measured(scene)
     every = [spec for specs in kinds(scene, convergences).values() for spec in specs]

@@ -1,4 +1,4 @@
-"""What the tests of pictures share."""
+"""Fixtures that the tests of pictures share."""
 
 import pytest
 from matplotlib.figure import Figure
