@@ -41,7 +41,6 @@ from train.rules import RISK
 from train.simulate import scene as scenes
 from train.simulate.run import write
 from train.stopping import answers
-from train.tradeoff.choices import promised
 from train.tradeoff.front import NAMES, ParetoFront
 
 SCENE = Path(__file__).parents[1] / "train" / "scenes" / "cody18.toml"
@@ -136,7 +135,7 @@ def realised(
         vectors = drawn.vectors([window], others, other.dataset.names)
         answered = answers([other.classifier], vectors)
         right[window] = {task: float((answered[task][0][0] == y[task]).mean()) for task in y}
-    points = {window: promised(made[window].chosen) for window in POINTS_S}
+    points = {window: made[window].chosen for window in POINTS_S}
     shown = np.empty((len(y), len(NAMES), 5))
     for task, out in zip(y, shown, strict=True):
         front = ParetoFront.of(points, task)

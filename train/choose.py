@@ -1,7 +1,5 @@
 """The choice among the candidates, by nested cross-validation."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,8 +14,10 @@ from train.candidates import Candidate, costs, places_of
 from train.dataset import DataSet
 from train.evaluate import (
     FOLDS,
+    VARIANCE,
     AnswerTable,
     Labels,
+    Promise,
     Result,
     choose,
     evaluate,
@@ -82,7 +82,8 @@ class Chosen:
     Attributes:
         choice: the features, scaling, projection and numbers.
         accuracy: nested accuracy of the entire choice, with entire groups left out where
-            `left_out` is not `trial`. Tasks that agree are decided together, as the model does.
+            `left_out` is not `trial`. Tasks that agree are decided together, as the model does. Its
+            interval is that of the exported model on other trials.
         by_trial: the same with single trials left out.
         left_out: `trial`, or the label whose groups were left out.
         candidates: nested accuracy of each candidate's own choice of numbers, by the task alone.
@@ -93,10 +94,10 @@ class Chosen:
     """
 
     choice: Choice
-    accuracy: Result
-    by_trial: Result
+    accuracy: Promise
+    by_trial: Promise
     left_out: str
-    candidates: tuple[Result, ...] = ()
+    candidates: tuple[Promise, ...] = ()
     picks: tuple[Choice, ...] = ()
     folds: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()
@@ -140,7 +141,7 @@ class Choosing:
         for name, groups in ((KIND, kinds), (leave_out, dataset.groups(leave_out))):
             if groups is None or name == TRIAL or self._grouped:
                 continue
-            self._leave_out = name
+            self._leave_out, self._groups = name, groups
             self._grouped = {t for t in y if t != leave_out and groupable(y[t], groups)}
             few = len(groups) <= FEW and not quick
             count = GROUP_FOLDS if few else fold_count(len(groups), quick)
@@ -200,9 +201,7 @@ class Choosing:
     def accuracy(self, window_s: float) -> float:
         """Mean accuracy of the tasks in plain cross-validation; missed touches count as wrong."""
         results = [
-            _with_untouched(
-                self._dataset.untouched_labels(task), Result(int(right.sum()), len(right))
-            )
+            promised(Result(int(right.sum()), len(right)), self._dataset.untouched_labels(task))
             for task, right in self._right(window_s).items()
         ]
         return sum(result.accuracy for result in results) / len(results)
@@ -261,19 +260,15 @@ class Choosing:
                 for by_task, place in zip(without_groups, places, strict=True):
                     by_task[task] = unseen[place]
             nested = table.by_fold(task, prices, margin=margin)
-            accuracies = [
-                table.answered(task, nested),
-                trials.answered(task, picked),
-                *(table.nested(task, prices, places) for places in own),
-            ]
             untouched = self._dataset.untouched_labels(task)
-            first, second, *rest = (_with_untouched(untouched, result) for result in accuracies)
+            count = len(set(self._groups[self._y[task] != ""].tolist())) if grouped else 0
+            by_candidate = (table.nested(task, prices, places) for places in own)
             chosen[task] = Chosen(
                 choices[table.chosen(task, prices, margin=margin)],
-                first,
-                second,
+                promised(table.answered(task, nested), untouched, count),
+                promised(trials.answered(task, picked), untouched),
                 self._leave_out if grouped else TRIAL,
-                tuple(rest),
+                tuple(promised(result, untouched, count) for result in by_candidate),
                 tuple(choices[table.chosen(task, prices, places)] for places in own),
                 table.folds,
             )
@@ -316,7 +311,7 @@ def decided_together(
                     asked = folds == fold
                     right[left_out, task][asked] = labels[0] == y[task][asked]
 
-    def counted(task: str, left_out: str, result: Result) -> Result:
+    def counted(task: str, left_out: str, result: Promise) -> Promise:
         if task not in family_of:
             return result
         hits = right[left_out, task][(plans[left_out][0] >= 0) & (y[task] != "")]
@@ -362,7 +357,16 @@ def without_folds(
     return [table.choices[task][place] for place in places]
 
 
-def _with_untouched(labels: Sequence[str], result: Result) -> Result:
-    """Count missed touches as wrong, and recordings of no touch without a contact as right."""
-    right = result.right + list(labels).count(NO_CONTACT)
-    return replace(result, right=right, total=result.total + len(labels))
+def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:
+    """A result as a promise of the accuracy on other trials, or on other groups.
+
+    Args:
+        result: on the trials with a contact.
+        untouched: labels of the recordings without one. Missed touches count as wrong, and
+            recordings of no touch as right.
+        groups: number of the groups left out; 0 for single trials.
+    """
+    right, total = result.right + untouched.count(NO_CONTACT), result.total + len(untouched)
+    variance = max(VARIANCE, total / groups if groups else 0.0)
+    counted = {"right": right, "total": total, "variance": variance}
+    return Promise(**{**vars(result), **counted})

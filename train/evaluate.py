@@ -10,8 +10,6 @@ right answers is the nested accuracy. A fit without folds i and j serves both i 
 take 55 fits, not 110.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -32,6 +30,11 @@ from train.search import Decomposition, SearchGrid
 FOLDS = 10
 SEED = 2012
 """Of the folds, so that they are the same for the same labels."""
+
+VARIANCE = 2.0
+"""Variance of the nested accuracy around the exported model's accuracy on other trials, in binomial
+variances. It is above 1 because the folds' models differ from the exported one, and because reports
+show the best of several windows. `make risk` counts how often the interval holds."""
 
 Labels = Mapping[str, NDArray[np.str_]]
 """{task: (n,) labels}."""
@@ -68,6 +71,23 @@ class Result:
     def interval(self) -> tuple[float, float]:
         """95 % binomial interval (Wilson)."""
         return wilson(self.right, self.total)
+
+
+@dataclass(frozen=True)
+class Promise(Result):
+    """A nested accuracy with an interval for the exported model's accuracy on other trials.
+
+    Attributes:
+        variance: of the difference, in binomial variances. Where entire groups are left out it is
+            the number of trials in a group, as these are right or wrong together.
+    """
+
+    variance: float = VARIANCE
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval: Wilson's for `variance` times fewer trials."""
+        return wilson(self.right / self.variance, self.total / self.variance)
 
 
 def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int64]:

@@ -6,8 +6,6 @@ turn, while the simulated ones are always there. A weight is how often a trial c
 projection, in whole numbers. As a neighbour, each votes once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,15 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from train.choose import FEWEST_GROUPS, TRIAL, Chosen, decided_together, fold_count
+from train.choose import FEWEST_GROUPS, TRIAL, Chosen, decided_together, fold_count, promised
 from train.dataset import DataSet
-from train.evaluate import (
-    AnswerTable,
-    Labels,
-    evaluate,
-    group_folds,
-    stratified_folds,
-)
+from train.evaluate import AnswerTable, Labels, evaluate, group_folds, stratified_folds
 from train.labels import ENOUGH
 from train.pipeline import Choice
 from train.search import SearchGrid
@@ -106,9 +98,10 @@ def mix(
     finest = max(y, key=lambda task: len(set(y[task][own].tolist())))
     count = fold_count(int(own.sum()), quick)
     by_trial = by_group = answers(stratified_folds(y[finest][own], count))
+    group_count = 0
     groups = None if leave_out == TRIAL else dataset.part(own).groups(leave_out)
     if groups is not None and len(set(groups.tolist())) >= FEWEST_GROUPS:
-        by_group = answers(group_folds(groups, count))
+        by_group, group_count = answers(group_folds(groups, count)), len(set(groups.tolist()))
     plans: dict[str, tuple[NDArray[np.int64], list[dict[str, Choice]]]] = {
         left_out: (table.folds, [{} for _ in range(int(table.folds.max()) + 1)])
         for left_out, table in ((leave_out, by_group), (TRIAL, by_trial))
@@ -134,8 +127,10 @@ def mix(
         chosen[task] = replace(
             settled,
             choice=best,
-            accuracy=table.nested(task, *rule),
-            by_trial=by_trial.nested(task, *rule),
+            accuracy=promised(
+                table.nested(task, *rule), groups=0 if table is by_trial else group_count
+            ),
+            by_trial=promised(by_trial.nested(task, *rule)),
             left_out=TRIAL if table is by_trial else leave_out,
             folds=table.folds,
         )

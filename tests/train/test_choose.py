@@ -1,4 +1,4 @@
-"""What is left out, the choice of settings, and of the window."""
+"""The groups left out, and the choice of settings and of the window."""
 
 from dataclasses import replace
 from itertools import product
@@ -8,8 +8,9 @@ import pytest
 
 import train
 from edge.recording import save
+from edge.statistics import wilson
 from train.choose import Chosen, decided_together, fold_count, groupable, kinds_of, without_folds
-from train.evaluate import AnswerTable, Result
+from train.evaluate import AnswerTable, Promise
 from train.pipeline import Choice, ContactClassifier
 
 TWO = ("max_force", "contact_area")
@@ -80,7 +81,7 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together():
     X[:, 0] += mobility == "m"
     X[:, 3] += softness == "s"
     choices = {task: Choice("IV", 2, 3, "lda") for task in y}
-    folds, alone = np.arange(60) % 5, Result(0, 60, hits=np.zeros(60, dtype=bool))
+    folds, alone = np.arange(60) % 5, Promise(0, 60, hits=np.zeros(60, dtype=bool))
     chosen = {task: Chosen(choice, alone, alone, "trial") for task, choice in choices.items()}
     plans = {"trial": (folds, [choices] * 5)}
     decided = decided_together(chosen, X, y, plans, TWO, (3, 3))
@@ -118,7 +119,9 @@ def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(make_touch, t
     late = touches(make_touch, tmp_path / "late", 6.0, 1.8)
     fitted = train.fit(late, **FEW)
     assert fitted.window_s == 2.4
-    assert fitted.chosen["kind"].accuracy.accuracy == 1.0
+    told = fitted.chosen["kind"]
+    for result in (told.accuracy, told.by_trial, *told.candidates):
+        assert (result.accuracy, result.interval) == (1.0, wilson(10, 10))
     (note,) = [note for note in fitted.notes if "the window is" in note]
     assert "the window is 2.4 s" in note
     assert "100% at 2.4 s, 100% at 4.8 s" in note

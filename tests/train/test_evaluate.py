@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from train.evaluate import choose, evaluate, fits, group_folds, stratified_folds
+from edge.statistics import wilson
+from train.evaluate import Promise, Result, choose, evaluate, fits, group_folds, stratified_folds
 from train.pipeline import ContactClassifier
 from train.search import SearchGrid
 
@@ -101,6 +102,12 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
             best, X, y, np.flatnonzero(folds != i), np.flatnonzero(folds == i)
         ).sum()
     assert table.nested("t").right == right
+
+
+def test_a_promise_is_as_wide_as_half_of_its_trials_make_it():
+    assert Result(90, 100).interval == wilson(90, 100)
+    assert Promise(90, 100).interval == wilson(45, 50)
+    assert Promise(90, 100, variance=10.0).interval == wilson(9, 10)
 
 
 def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_scores():

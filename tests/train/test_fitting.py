@@ -9,6 +9,7 @@ import train
 from edge.errors import InputError
 from edge.recording import Recording, save
 from train.dataset import load_trials
+from train.evaluate import VARIANCE
 from train.fitting import _decision_points, _leaks
 from train.pipeline import Choice
 
@@ -48,7 +49,11 @@ def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_
             labels = {"category": kind, "object": f"{kind} {seed % 3}"}
             save(tmp_path / f"{kind}{seed}.npz", make_touch(kind=kind, seed=seed, labels=labels))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
-    assert fitted.chosen["category"].left_out == "object"
+    told = fitted.chosen["category"]
+    assert told.left_out == "object"
+    # The 18 trials count as much as their six objects do.
+    assert [result.variance for result in (told.accuracy, *told.candidates)] == [3.0, 3.0]
+    assert told.by_trial.variance == VARIANCE
     assert fitted.chosen["object"].left_out == "trial"
 
 

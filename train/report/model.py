@@ -189,13 +189,18 @@ def _accuracy(exported: Exported, task: str) -> Section:
     text = f"{accuracy(chosen)}."
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
+    text += (
+        " The intervals are for the exported model on other trials: Wilson's for half as many "
+        "trials, because that model differs from those of the folds. Where entire groups are left "
+        "out they count groups, whose trials are right or wrong together."
+    )
     labels = sorted(set(truth))
     scores: Any = precision_recall_fscore_support(truth, answers, labels=labels, zero_division=0.0)
     rows: list[Row] = [
         {
             task: label,
             "recall %": percent(recall),
-            "95 % interval": interval(Result(round(recall * total), int(total))),
+            "95 % interval": interval(replace(chosen.accuracy, right=recall * total, total=total)),
             "precision %": percent(precision),
             "F1 %": percent(f1),
             "trials": int(total),

@@ -42,7 +42,7 @@ def summary(fitted: Fitted, prices: Prices) -> str:
         "  ".join(f"{row[i]:{'<' if i < 2 else '>'}{width}}" for i, width in enumerate(widths))
         for row in cells
     ]
-    lines += ["* chosen for the task", ""]
+    lines += ["* chosen; in brackets, the 95 % interval of the accuracy on other trials", ""]
     for task, chosen in fitted.chosen.items():
         lines += [f"{task}: {accuracy(chosen)}", f"  {_described(chosen.choice, fitted)}"]
     units: dict[str, list[str]] = {}

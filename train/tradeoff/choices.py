@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.statistics import wilson
 from edge.touch.features import WINDOW_S
 from train.candidates import candidates
 from train.choose import TRIAL, Chosen, kinds_of
@@ -20,22 +19,8 @@ from train.fitting import fit
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Windows of the report, which are also the decision points of its early decisions."""
-VARIANCE = 2.0
-"""Variance of the nested accuracy around the exported model's accuracy on other trials, in binomial
-variances. It is above 1 because the folds' models differ from the exported one, and because the
-report shows the best windows. `make risk` counts how often the interval holds."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
-
-
-@dataclass(frozen=True)
-class Promise(Result):
-    """A nested accuracy with an interval for the exported model's accuracy on other trials."""
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval: Wilson's for `VARIANCE` times fewer trials."""
-        return wilson(self.right / VARIANCE, self.total / VARIANCE)
 
 
 def followed(
@@ -58,15 +43,7 @@ def trials_of(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
 def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:
     """Each task's choice, as `python -m export --quick --window` makes it with options `given`."""
     form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1, **given}
-    return promised(fit(dataset, **form).chosen)
-
-
-def promised(choices: Mapping[str, Chosen]) -> dict[str, Chosen]:
-    """The choices with the intervals that the report shows and `make export FRONT=` promises."""
-    return {
-        task: replace(choice, by_trial=Promise(**vars(choice.by_trial)))
-        for task, choice in choices.items()
-    }
+    return fit(dataset, **form).chosen
 
 
 def unseen(choice: Chosen) -> Result | None:

@@ -51,7 +51,7 @@ class ParetoFront:
         """The windows that no other beats in both time and accuracy.
 
         Args:
-            points: the choices at each window, the shortest first, with `promised` intervals.
+            points: the choices at each window, the shortest first.
             task: the task whose accuracy counts.
             after_s: seconds from the end of a window to the decision.
         """

@@ -4,23 +4,22 @@ import pytest
 
 from tests.browser import chromium
 from train.choose import Chosen
-from train.evaluate import Result
+from train.evaluate import Promise
 from train.pipeline import Choice
 from train.report.page import write
 from train.report.section import Section
-from train.tradeoff.choices import promised
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.slider import slider
 
 
 def chosen(right, left_out="trial"):
-    return Chosen(Choice("IV", 1, 1), Result(73, 100), Result(right, 100), left_out)
+    return Chosen(Choice("IV", 1, 1), Promise(73, 100), Promise(right, 100), left_out)
 
 
 ANSWERS = {
-    0.4: promised({"mobility": chosen(60, "object"), "<b>": chosen(50)}),
-    1.0: promised({"mobility": chosen(97, "object"), "<b>": chosen(80)}),
-    1.2: promised({"mobility": chosen(99, "object"), "<b>": chosen(91)}),
+    0.4: {"mobility": chosen(60, "object"), "<b>": chosen(50)},
+    1.0: {"mobility": chosen(97, "object"), "<b>": chosen(80)},
+    1.2: {"mobility": chosen(99, "object"), "<b>": chosen(91)},
 }
 
 

@@ -23,13 +23,13 @@ from train.__main__ import main as train
 from train.choose import Chosen
 from train.commands.tradeoff import cost
 from train.dataset import read
-from train.evaluate import Result
+from train.evaluate import Promise
 from train.pipeline import Choice
 from train.rules import Course
 from train.tradeoff import answer, board, costs, early
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
-from train.tradeoff.choices import followed, promised, unseen
+from train.tradeoff.choices import followed, unseen
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import tradeoff
 from train.tradeoff.wires import spread, wire, wires
@@ -65,13 +65,13 @@ class TestWires:
 
 def chosen(hits, left_out="trial"):
     """A choice that answers these trials rightly, trials left out."""
-    result = Result(int(np.sum(hits)), len(hits), hits=np.array(hits, dtype=bool))
-    return Chosen(Choice("IV", 1, 1), Result(1, 2), result, left_out)
+    result = Promise(int(np.sum(hits)), len(hits), hits=np.array(hits, dtype=bool))
+    return Chosen(Choice("IV", 1, 1), Promise(1, 2), result, left_out)
 
 
 def test_the_front_is_what_no_other_window_beats_in_both():
     shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
-    points = {w: promised({"t": chosen(np.arange(100) < share)}) for w, share in shares.items()}
+    points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
     best = ParetoFront.of(points, "t", 0.01).points
     assert [(p.window_s, p.milliseconds, p.accuracy) for p in best] == [
         (0.2, 210.0, 0.5),
