@@ -74,8 +74,8 @@ def voted(rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int)
         k: number of neighbours that vote.
     """
     classes, labels = np.unique(y, return_inverse=True)
-    said = np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
-    return Result(int((said == y).sum()), len(y), components, k, said)
+    answers = np.asarray(classes[vote(labels[rows[:, components - 1, :k]])])
+    return Result(int((answers == y).sum()), len(y), components, k, answers)
 
 
 def grid_search(

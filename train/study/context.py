@@ -32,8 +32,8 @@ class Context:
     @property
     def labels(self) -> Labels:
         """{task: (n,) labels} of the tasks that have more than one class."""
-        every = {task: self.dataset.labels(task) for task in self.dataset.tasks}
-        return {task: labels for task, labels in every.items() if len(set(labels)) > 1}
+        y = {task: self.dataset.labels(task) for task in self.dataset.tasks}
+        return {task: labels for task, labels in y.items() if len(set(labels)) > 1}
 
     def vectors(
         self, window_s: float = WINDOW_S, names: Sequence[str] = FEATURES

@@ -139,11 +139,11 @@ def right_despite_the_object(numbers: Numbers) -> float:
     return float(np.mean(shares)) if shares else np.nan
 
 
-def rank_correlation(theirs: ArrayLike, ours: ArrayLike) -> float | None:
+def rank_correlation(paper: ArrayLike, ours: ArrayLike) -> float | None:
     """Spearman's rank correlation; None if all values on one side are equal."""
-    if np.ptp(theirs) == 0.0 or np.ptp(ours) == 0.0:
+    if np.ptp(paper) == 0.0 or np.ptp(ours) == 0.0:
         return None
-    return float(spearmanr(theirs, ours).statistic)
+    return float(spearmanr(paper, ours).statistic)
 
 
 def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:

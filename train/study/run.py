@@ -91,7 +91,7 @@ def study(
             numbers += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
             shown.insert(1, paper.comparison(numbers, seeds * len(dataset.trials)))
     name = source.name if source is not None else Path(data[0]).name
-    return write(out, f"What a touch reveals: {name}", _lead(context, constant), shown)
+    return write(out, f"The paper's analyses, repeated on {name}", _lead(context, constant), shown)
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:

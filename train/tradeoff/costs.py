@@ -44,7 +44,7 @@ class Change:
 
     Attributes:
         name: the change.
-        price: what it saves or costs other than accuracy.
+        price: its saving, or its cost other than accuracy.
         source: the trials, or recordings to follow again.
         given: options of the choice.
         fewer: whether trials are left out on purpose; otherwise a contact that is no longer

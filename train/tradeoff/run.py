@@ -103,7 +103,7 @@ def tradeoff(
         f"{counted(len(dataset.trials), 'contact')}{simulated}."
     ]
     sections = [make(measured) for make in SECTIONS]
-    report = write(out, "What accuracy costs in time", lead, sections)
+    report = write(out, "Accuracy against time", lead, sections)
     best = ParetoFront.of(points, main, measured.after_s).to_dict(dataset.digest)
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(best, indent=1).encode() + b"\n")

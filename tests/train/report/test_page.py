@@ -23,7 +23,7 @@ def table(**more):
     return Table("speed", "How fast", rows, **more)
 
 
-def test_what_is_not_ours_is_escaped():
+def test_text_from_elsewhere_is_escaped():
     text = page(HOSTILE, [HOSTILE], [Section(HOSTILE, [HOSTILE], [table()])])
     assert "<script>" not in text
     assert text.count("&lt;script&gt;") == 6  # title twice, lead, heading, text, cell
@@ -45,7 +45,7 @@ def test_a_column_has_as_many_decimals_as_its_numbers_need():
     assert cells == ["1", "54.3", "2", "0.12", "2", "60.0", "3", "0.50"]
 
 
-def test_what_a_clock_measured_stands_in_a_file_of_its_own():
+def test_timings_are_in_a_file_of_their_own():
     files = table_csv(table(timed=("seconds",)))
     assert sorted(files) == ["speed.csv", "speed_timings.csv"]
     assert "seconds" not in files["speed.csv"]

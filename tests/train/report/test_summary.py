@@ -24,7 +24,7 @@ def fitted(recordings):
     return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
 
 
-def test_a_row_a_candidate_says_what_it_gives_and_costs(fitted):
+def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
     lines = summary(fitted, [(162.04, 31.46)] * len(fitted.candidates)).splitlines()
     assert lines[0].split() == [
         "features",
@@ -43,7 +43,7 @@ def test_a_row_a_candidate_says_what_it_gives_and_costs(fitted):
     assert not lines[3]
 
 
-def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
+def test_flattering_data_and_left_out_recordings_get_a_warning(recordings, make_touch, tmp_path):
     save(tmp_path / "still.npz", make_touch(seconds=0.0))
     save(tmp_path / "odd.npz", make_touch(labels={"category": "soft-fixed"}))
     paths = [str(recordings), str(tmp_path)]
@@ -55,7 +55,7 @@ def test_what_flatters_or_is_left_out_is_said(recordings, make_touch, tmp_path):
     assert "the window of 9 s is too long: every recording ends within 1.59 s of the onset" in text
 
 
-def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings, tmp_path):
+def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
     """The arm stood elsewhere for each object: its angles tell all without a touch."""
     objects = sorted({load(path).labels["object"] for path in recordings.glob("*.npz")})
     for path in recordings.glob("*.npz"):
@@ -68,7 +68,7 @@ def test_joint_angles_that_tell_the_label_before_the_touch_are_named(recordings,
     assert "at onset alone give 100.0% of the labels" in said
 
 
-def test_joint_angles_that_tell_nothing_are_no_leak(recordings, tmp_path):
+def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
     """Every recording begins in a pose that one of another object has too, and no other."""
     for i, path in enumerate(sorted(recordings.glob("*.npz"))):
         recording = load(path)

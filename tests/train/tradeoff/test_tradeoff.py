@@ -1,4 +1,4 @@
-"""What accuracy costs in time: wires, boards, nested accuracy, points, and early stopping."""
+"""The trade-off: wires, boards, nested accuracy, points, and early decisions."""
 
 import argparse
 import csv
@@ -69,7 +69,7 @@ def chosen(hits, left_out="trial"):
     return Chosen(Choice("IV", 1, 1), Promise(1, 2), result, left_out)
 
 
-def test_the_front_is_what_no_other_window_beats_in_both():
+def test_the_front_has_the_windows_that_no_other_beats_in_both():
     shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
     points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
     best = ParetoFront.of(points, "t", 0.01).points
@@ -188,7 +188,7 @@ def share_right(*shares):
 
 
 class TestEarly:
-    def test_confidence_that_says_what_comes_true_has_no_calibration_error(self):
+    def test_a_calibrated_confidence_has_no_calibration_error(self):
         compared = comparison(share_right(0.5, 0.5, 0.5))
         assert compared.calibration_error == pytest.approx(0.0)
         assert comparison(share_right(0.9, 0.9, 0.9)).calibration_error == pytest.approx(0.4)
@@ -213,7 +213,7 @@ class TestEarly:
         assert decisions.gain[0] == 0.0
         assert (decisions.mean_s, decisions.early, decisions.unknown) == (0.6, 1.0, 0.0)
 
-    def test_what_is_plain_at_the_first_decision_point_is_decided_then(self, tmp_path):
+    def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
         dataset = followed(read([save_touches(tmp_path, 20)]))
         compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
         assert compared.right.all()
@@ -222,7 +222,7 @@ class TestEarly:
         # Forty trials certify no rate as low as the smallest one.
         assert min(certified.asked for certified in compared.certified) > early.ERRORS[0]
 
-    def test_the_floor_is_when_the_arm_s_spring_breaks_friction(self):
+    def test_an_object_moves_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
 
         floors = breakaway_times(load(SCENE))
