@@ -69,17 +69,30 @@ VOTES = Space(
     mean=np.zeros(1),
     gain=np.ones(1),
     weights=np.ones((1, 1)),
-    rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [np.inf]]),
-    labels=np.array([1, 0, 0, 1, -1]),
+    rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [5.0], [np.inf]]),
+    labels=np.array([1, 0, 0, 1, 0, -1]),
 )
-"""Three trials vote at 0: the nearest for label 1, the others for label 0. One has no label."""
+"""The first three trials vote at 0, one for label 1 and two for label 0. The last has no label."""
 
 
-def test_a_change_is_found_where_the_nearest_trial_was_outvoted():
-    why = explain(VOTES, np.zeros(1), [0, 1, 2], 0, ["force"], [1])
-    assert (why.rival.row, why.rival.distance) == (0, 1.0)
+@pytest.mark.parametrize("outvoted", [-1.0, -2.5], ids=["the nearest", "the farthest"])
+def test_a_change_is_found_where_a_trial_was_outvoted(outvoted):
+    space = VOTES._replace(rows=np.vstack([[outvoted], VOTES.rows[1:]]))
+    why = explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1])
+    assert (why.rival.row, why.rival.distance) == (0, -outvoted)
     # At -0.5 the trial at -3 is as near as that at 2; a fifth more makes it nearer.
     assert why.changes == (Change("force", 1, pytest.approx(0.6), pytest.approx(-0.6)),)
+
+
+def test_a_trial_on_the_way_makes_the_least_change_smaller():
+    space = VOTES._replace(
+        weights=np.array([[1.0, 3.0]]),
+        rows=np.array([[0.0, 0.0], [2.0, 0.0], [0.6, 2.5]]),
+        labels=np.array([0, 1, 1]),
+    )
+    why = explain(space, np.zeros(1), [0], 0, ["force"], [1])
+    assert why.rival.row == 1
+    assert why.changes == (Change("force", 1, 0.5, 0.5),)
 
 
 def test_an_answer_that_its_votes_do_not_give_has_no_change():
@@ -88,7 +101,7 @@ def test_an_answer_that_its_votes_do_not_give_has_no_change():
 
 
 def test_a_trial_without_a_label_is_no_rival():
-    space = VOTES._replace(labels=np.array([0, 0, 0, 0, -1]))
+    space = VOTES._replace(labels=np.array([0, 0, 0, 0, 0, -1]))
     assert explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1]).rival is None
 
 
