@@ -3,15 +3,13 @@
 The sentence reads `FILE: KEY must be X, not Y`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any, NoReturn, Self
+from typing import Any, Self
 
 from edge.errors import InputError
 from edge.files import parsing, read_bytes, read_text
@@ -42,18 +40,14 @@ def _whole(text: str) -> int:
     return int(text)
 
 
-def _real(text: str) -> float:
+def _finite(text: str) -> float:
     value = float(text)
-    if math.isinf(value):
-        raise ValueError(f"the number {text[:LONGEST_WHOLE]} is too large")
+    if not math.isfinite(value):
+        raise ValueError(f"the number {text[:LONGEST_WHOLE]} is not finite")
     return value
 
 
-def _constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not a JSON number")
-
-
-_DECODER = json.JSONDecoder(parse_int=_whole, parse_float=_real, parse_constant=_constant)
+_DECODER = json.JSONDecoder(parse_int=_whole, parse_float=_finite, parse_constant=_finite)
 
 
 def parse_json(text: str | bytes, where: str) -> Any:
@@ -87,27 +81,6 @@ def json_file(path: str | os.PathLike[str], kind: str, mend: str) -> Iterator[An
     text = read_bytes(path)
     with parsing(os.fspath(path), kind, f"; {mend}"):
         yield _DECODER.decode(text.decode())
-
-
-def parse_toml(text: str, where: str) -> ConfigTable:
-    """The top table of a TOML text.
-
-    Raises:
-        InputError: it is not TOML; the message begins with `where`.
-    """
-    import tomllib  # most runs read no TOML file
-
-    with parsing(where, "TOML"):
-        return ConfigTable(tomllib.loads(text), where)
-
-
-def read_toml(path: str | os.PathLike[str]) -> ConfigTable:
-    """The top table of a TOML file.
-
-    Raises:
-        InputError: it cannot be read, or is not TOML.
-    """
-    return parse_toml(read_text(path), os.fspath(path))
 
 
 class ConfigTable:
@@ -284,3 +257,24 @@ class ConfigTable:
                 raise InputError(
                     f"{self.where}: {item}unknown key {table}{shown(key)[1:-1]}; allowed: {allowed}"
                 )
+
+
+def parse_toml(text: str, where: str) -> ConfigTable:
+    """The top table of a TOML text.
+
+    Raises:
+        InputError: it is not TOML; the message begins with `where`.
+    """
+    import tomllib  # most runs read no TOML file
+
+    with parsing(where, "TOML"):
+        return ConfigTable(tomllib.loads(text), where)
+
+
+def read_toml(path: str | os.PathLike[str]) -> ConfigTable:
+    """The top table of a TOML file.
+
+    Raises:
+        InputError: it cannot be read, or is not TOML.
+    """
+    return parse_toml(read_text(path), os.fspath(path))

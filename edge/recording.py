@@ -1,7 +1,5 @@
 """A recording: the frames, joint angles and metadata of one trial, in one `.npz` file."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os
@@ -10,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, BinaryIO, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +78,7 @@ class Recording:
         """Number of joint angles in a frame, or None without any."""
         return None if self.joints is None else self.joints.shape[1]
 
-    def for_joints(self, names: Sequence[str], where: str = "recording") -> Recording:
+    def for_joints(self, names: Sequence[str], where: str = "recording") -> Self:
         """The recording with the angles of these joints, in this order.
 
         A recording that does not name its joints is returned as it is.

@@ -84,7 +84,13 @@ def measure(model: Model) -> dict[str, Any]:
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return {
-        "machine": machine(),
+        "machine": {
+            "name": platform.node(),
+            "kind": kind(),
+            "cores": os.cpu_count(),
+            "system": platform.platform(),
+            "edge-classify": __version__,
+        },
         "load": {"mean_of_a_minute": load, "waited": waited},
         "model": {
             "sha256": hashlib.sha256(model.contents.data).hexdigest(),
@@ -181,17 +187,6 @@ def cold_start_ms(path: str) -> float:
     """Fewest milliseconds from the start of Python to a ready classifier."""
     command = [sys.executable, "-c", COLD, path]
     return min(timed(lambda _: subprocess.run(command, check=True), range(REPEATS))) / 1e3
-
-
-def machine() -> dict[str, Any]:
-    """A description of this machine."""
-    return {
-        "name": platform.node(),
-        "kind": kind(),
-        "cores": os.cpu_count(),
-        "system": platform.platform(),
-        "edge-classify": __version__,
-    }
 
 
 def kind() -> str:

@@ -1,14 +1,12 @@
 """Output of a command: text for a person, JSON lines for a program, and messages on stderr."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import shutil
 import sys
 import textwrap
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 from edge.errors import printable
 from edge.events import json_line
@@ -27,7 +25,7 @@ class Output:
         self.as_json = as_json
 
     @classmethod
-    def of(cls, arguments: argparse.Namespace) -> Output:
+    def of(cls, arguments: argparse.Namespace) -> Self:
         """JSON if `--json` is given or stdout is no terminal, otherwise text."""
         return cls(arguments.json or not sys.stdout.isatty())
 

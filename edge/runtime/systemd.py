@@ -25,7 +25,10 @@ class Notifier:
         self._now = now
         address = environment.get("NOTIFY_SOCKET", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
-        self.period_s = _watchdog_s(environment) / 2.0
+        watched = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+        microseconds = environment.get("WATCHDOG_USEC", "") if watched else ""
+        allowed = int(microseconds) if microseconds.isdecimal() else 0
+        self.period_s = 0.5e-6 * allowed if allowed else NEVER
         """Half of the time that the manager allows between two signs of life; infinity if it does
         not watch."""
         self._due = NEVER if self.period_s == NEVER else now()
@@ -52,12 +55,3 @@ class Notifier:
         # A manager that has gone, or is too busy to listen, must not end the service.
         with suppress(OSError), socket.socket(socket.AF_UNIX, kind) as sender:
             sender.sendto(text.encode(), self._address)
-
-
-def _watchdog_s(environment: Mapping[str, str]) -> float:
-    """Longest time in seconds between two signs of life that the manager allows."""
-    microseconds = environment.get("WATCHDOG_USEC", "")
-    watched = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
-    if not (watched and microseconds.isdecimal() and int(microseconds)):
-        return NEVER
-    return int(microseconds) * 1e-6

@@ -114,7 +114,7 @@ WRONG = {
     "meta no text": (change(meta=np.array(3)), "meta must be one JSON text"),
     "meta no JSON": (change(meta=np.array("{")), "meta: not JSON"),
     "meta no object": (change(meta=np.array("[1]")), "meta must be a JSON object"),
-    "meta with NaN": (change(meta=np.array('{"a": NaN}')), "NaN is not a JSON number"),
+    "meta with NaN": (change(meta=np.array('{"a": NaN}')), "the number NaN is not finite"),
     "labels no text": (change(meta=np.array('{"labels": {"a": true}}')), "meta.labels must map"),
     "few joint names": (named("a"), "number of meta.joint_names is 1, of joint angles 5"),
     "a joint name twice": (named(*"abcda"), "meta.joint_names must be a list of different names"),
