@@ -53,7 +53,7 @@ def test_a_recording_is_as_the_contract_says(demo, written):
     assert trial.t[-1] >= touched + 2.0
 
 
-@pytest.mark.parametrize("how", [{"batch": 1}, {"batch": 3}, {"jobs": 2}])
+@pytest.mark.parametrize("how", [{"batch": 3}, {"jobs": 2}])
 def test_the_same_bytes_whatever_the_batch_or_the_cores(demo, written, tmp_path, how):
     seen = []
     write(demo, tmp_path, progress=seen.append, **how)
