@@ -4,7 +4,8 @@ BIN := $(VENV)/bin
 OUT ?= build
 READY := $(VENV)/.ready
 # Only errors: every editable installation prints a warning.
-PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
+PINNED := python -m pip install -qq --disable-pip-version-check -c
+PIP := $(BIN)/$(PINNED) constraints.txt
 # Several threads slow down matrices as small as ours, and disturb the processes beside them.
 export OPENBLAS_NUM_THREADS := 1
 
@@ -34,7 +35,7 @@ help:
 	@echo "Measurements"
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
-	@echo "  make matched       four touches in MuJoCo and in our simulator, beside theory"
+	@echo "  make matched       four touches in MuJoCo and in our simulator"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
@@ -185,8 +186,18 @@ ifndef DATA
 stopping: $(SIMULATED)/.made
 endif
 
-stopping: $(READY)
-	$(BIN)/python -m bench.stopping --data $(RECORDINGS) $(STOPPING)
+# An environment of its own: aeon 1.6.0 does not take the numpy that constraints.txt pins.
+PEERS := $(OUT)/peers
+
+$(PEERS)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(PEERS)
+	grep -v '^numpy==' constraints.txt > $(PEERS)/constraints.txt
+	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt "pip>=25.1"
+	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt -e . --group peers
+	@touch $@
+
+stopping: $(PEERS)/.ready
+	$(PEERS)/bin/python -m bench.stopping --data $(RECORDINGS) $(STOPPING)
 
 # FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
 faults: $(READY)

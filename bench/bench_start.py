@@ -11,9 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from export.__main__ import main as export
-from train.__main__ import main as train
-from train.dataset import load_trials
+from edge.demo import FOLDER, MODEL
 
 ROOT = Path(__file__).parents[1]
 USUAL = """
@@ -31,12 +29,9 @@ print(model.predict(X[:1]))
 
 
 def bench_cold_start(against, tmp_path):
-    data, arrays = tmp_path / "data", tmp_path / "xy.npz"
-    assert train(["simulate", str(ROOT / "train/scenes/cody18.toml"), "--out", str(data)]) == 0
-    assert export(["--data", str(data), "--out", str(tmp_path), "--quick"]) == 0
-    path, recording = tmp_path / "model.onnx", min(data.glob("*.npz"))
-    trials = load_trials([data])
-    np.savez(arrays, X=trials.features(), y=trials.labels("object"))
+    """The rival fits as many vectors of the paper's features as the paper has trials."""
+    arrays = tmp_path / "xy.npz"
+    np.savez(arrays, X=np.random.default_rng(0).normal(size=(140, 120)), y=np.arange(140) % 18)
     # Unbuffered, so that a line arrives as soon as it is printed; with compiled files, as an
     # installed package has them.
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
@@ -53,9 +48,10 @@ def bench_cold_start(against, tmp_path):
 
         return until_decided
 
+    replay = ["-m", "edge", "replay", "--model", MODEL, FOLDER / "pillow-movable.npz"]
     against(
-        start(b'"decision"', "-m", "edge", "replay", "--model", path, recording),
-        {"scikit-learn's pipeline": start(b"'", "-c", USUAL, arrays)},
+        start(b'"decision"', *replay),
+        {"scikit-learn's pipeline": start(b"[", "-c", USUAL, arrays)},
         most={"scikit-learn's pipeline": 1 / 6},
         calls=1,
         rounds=7,

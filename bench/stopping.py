@@ -3,29 +3,33 @@
 All decide on the same five folds. Extra trees decide at the first point at which their highest
 class probability passes a threshold. CALIMERA (Bilski and Jastrzebska, CALIMERA: a new early time
 series classification method, 2023) decides on the same features with calibrated ridge classifiers,
-at several prices of waiting. TEASER (Schäfer and Leser, TEASER: early and accurate time series
-classification, 2020) and a threshold of the probability are aeon's (`pip install aeon`), on the
-paper's three features as series, with aeon's time series forest as classifier. Columns are compared
-at the same mean time, between two thresholds or prices by interpolation. The gain is by how much
-deciding when sure errs less than the fixed window; its standard error treats the two shares as
-independent, which overstates it.
+at several prices of waiting. Columns are compared at the same mean time, between two thresholds or
+prices by interpolation. The gain is by how much deciding when sure errs less than the fixed window;
+its standard error treats the two shares as independent, which overstates it.
+
+The second table has rules that choose their mean time themselves: aeon's TEASER (Schäfer and Leser,
+TEASER: early and accurate time series classification, 2020) and its threshold of the probability,
+0.85. Both ask extra trees about the paper's three features at each frame until then, every
+0.2 s. aeon teaches TEASER which answers to trust by answers to whole series.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from aeon.classification.early_classification import TEASER, ProbabilityThresholdEarlyClassifier
+from aeon.classification.sklearn import SklearnClassifierWrapper
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import RidgeClassifier
-from sklearn.model_selection import cross_val_predict
+from sklearn.model_selection import PredefinedSplit, cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -39,37 +43,39 @@ from train.feature_sets import expand
 from train.rules import NEVER, THRESHOLDS, Course
 from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
-from train.tradeoff.choices import followed, trials_of
+from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, StoppingComparison, compare_stopping
 
-TREES = 300
-WAITING = (0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
+SECONDS = np.array(DECISION_POINTS_S)
+RATE_HZ = 100
+"""Frames of the series that aeon's rules look at."""
+TREES = 100
+WAITING = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Prices of waiting for the full window, in wrong decisions."""
-AEON = {"TEASER": "TEASER", "ProbabilityThresholdEarlyClassifier": "threshold 0.85"}
-"""Early classifiers of aeon, and the heads of their columns."""
+AEON = {"TEASER": TEASER, "threshold 0.85": ProbabilityThresholdEarlyClassifier}
 NAMES = ("paper", "contact")
-"""The features of the extra trees."""
+"""The features of the extra trees and of CALIMERA."""
 Curve = list[tuple[float, float]]
-"""(mean seconds, share wrong) at each threshold."""
+"""(mean seconds, share wrong) at each threshold or price."""
+
+
+def decided(stops: NDArray[np.int64], right: NDArray[np.bool_]) -> tuple[float, float]:
+    """(mean seconds, share wrong) of trials that are decided at the points `stops` (n,)."""
+    return float(SECONDS[stops].mean()), 1.0 - float(right[stops, np.arange(len(stops))].mean())
 
 
 def extra_trees(
-    X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64], jobs: int
+    X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
 ) -> Curve:
     """Extra trees at each decision point, X (points, n, p), that decide when sure."""
-    right = np.empty(X.shape[:2], dtype=bool)
-    confidence = np.empty(X.shape[:2])
-    for fold in range(FOLDS):
-        test = folds == fold
-        for point, vectors in enumerate(X):
-            model = ExtraTreesClassifier(TREES, n_jobs=jobs, random_state=0)
-            shares = model.fit(vectors[~test], labels[~test]).predict_proba(vectors[test])
-            right[point, test] = model.classes_[shares.argmax(axis=1)] == labels[test]
-            confidence[point, test] = shares.max(axis=1)
-    seconds, trials = np.array(DECISION_POINTS_S), np.arange(len(labels))
+    model = ExtraTreesClassifier(TREES, random_state=0)
+    split = PredefinedSplit(folds)
+    shares = np.stack(
+        [cross_val_predict(model, x, labels, cv=split, method="predict_proba") for x in X]
+    )
+    right, confidence = np.unique(labels)[shares.argmax(axis=2)] == labels, shares.max(axis=2)
     confidence[-1] = 1.0
-    stops = [(confidence >= threshold).argmax(axis=0) for threshold in THRESHOLDS]
-    return [(float(seconds[at].mean()), 1.0 - float(right[at, trials].mean())) for at in stops]
+    return [decided((confidence >= limit).argmax(axis=0), right) for limit in THRESHOLDS]
 
 
 def halts(
@@ -97,53 +103,53 @@ def halts(
 
 def calimera(X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]) -> Curve:
     """CALIMERA at each decision point, X (points, n, p), a row for each of `WAITING`."""
-    seconds = np.array(DECISION_POINTS_S)
-    at = np.empty((len(WAITING), len(labels)), dtype=np.int64)
+    stops = np.empty((len(WAITING), len(labels)), dtype=np.int64)
     right = np.empty(X.shape[:2], dtype=bool)
     ridge = make_pipeline(StandardScaler(), RidgeClassifier(alpha=10.0))
+    model = CalibratedClassifierCV(ridge, cv=2)
     for fold in range(FOLDS):
         test = folds == fold
         known, new = [], []
         for point, vectors in enumerate(X):
-            model = CalibratedClassifierCV(ridge, cv=2)
             train = vectors[~test], labels[~test]
             known.append(cross_val_predict(model, *train, cv=3, method="predict_proba"))
             new.append(model.fit(*train).predict_proba(vectors[test]))
             right[point, test] = model.classes_[new[-1].argmax(axis=1)] == labels[test]
         for i, price in enumerate(WAITING):
-            at[i, test] = halts(np.array(known), np.array(new), price * seconds / seconds[-1])
-    trials = np.arange(len(labels))
-    return [(float(seconds[a].mean()), 1.0 - float(right[a, trials].mean())) for a in at]
+            waiting = price * SECONDS / SECONDS[-1]
+            stops[i, test] = halts(np.array(known), np.array(new), waiting)
+    return [decided(at, right) for at in stops]
 
 
 def of_aeon(
-    name: str, series: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
+    make: Callable[..., Any],
+    series: NDArray[np.float64],
+    labels: NDArray[np.str_],
+    folds: NDArray[np.int64],
 ) -> tuple[float, float]:
-    """(mean seconds, share wrong) of aeon's classifier `name` on series (n, features, samples)."""
-    module = importlib.import_module("aeon.classification.early_classification")
-    forests = importlib.import_module("aeon.classification.interval_based")
-    looks = DECISION_POINTS_S[::2]  # half as many, as the forests are slow
-    points = [round(s / looks[-1] * (SAMPLES - 1)) + 1 for s in looks]
-    seconds, wrong = [], []
+    """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames * features)."""
+    trees = SklearnClassifierWrapper(ExtraTreesClassifier(TREES), random_state=0)
+    looks = SECONDS[::2]  # half as many, as TEASER is slow
+    points = [len(FEATURES) * (round(RATE_HZ * s) + 1) for s in looks]
+    seconds, right = np.empty(len(labels)), np.empty(len(labels), dtype=bool)
     for fold in range(FOLDS):
         test = folds == fold
-        forest = forests.TimeSeriesForestClassifier(n_estimators=50, random_state=0)
-        make = getattr(module, name)
-        model: Any = make(forest, classification_points=points, random_state=0)
-        model.fit(series[~test], labels[~test])
-        named, stop = np.empty(test.sum(), dtype=labels.dtype), np.zeros(test.sum(), dtype=int)
-        waiting = np.arange(test.sum())
-        for look, point in enumerate(points):
-            ask = model.update_predict if look else model.predict
-            answers, sure = ask(series[test][waiting][:, :, :point])
-            sure = np.asarray(sure)
-            named[waiting[sure]], stop[waiting[sure]] = answers[sure], look
-            waiting = waiting[~sure]
-            if not len(waiting):
-                break
-        seconds += [looks[look] for look in stop]
-        wrong += (named != labels[test]).tolist()
-    return float(np.mean(seconds)), float(np.mean(wrong))
+        model = make(trees, classification_points=points, random_state=0)
+        model.fit(series[~test], labels[~test]).predict(series[test])
+        stop, _, said, _ = model.get_state_info().T
+        seconds[test], right[test] = looks[stop], model.classes_[said] == labels[test]
+    return float(seconds.mean()), 1.0 - float(right.mean())
+
+
+def peers(
+    X: NDArray[np.float64],
+    series: NDArray[np.float64],
+    labels: NDArray[np.str_],
+    folds: NDArray[np.int64],
+) -> tuple[list[Curve], dict[str, tuple[float, float]]]:
+    """The curves of extra trees and of CALIMERA on a task, and the points of aeon's rules."""
+    curves = [extra_trees(X, labels, folds), calimera(X, labels, folds)]
+    return curves, {name: of_aeon(make, series, labels, folds) for name, make in AEON.items()}
 
 
 def at(rows: Curve, seconds: float) -> float:
@@ -154,58 +160,53 @@ def at(rows: Curve, seconds: float) -> float:
 
 def when_sure(parts: Sequence[StoppingComparison]) -> Curve:
     """Stopping at each threshold, of a task that is decided when each of these is sure."""
-    seconds = np.array(DECISION_POINTS_S)
     course = Course([p.confidence for p in parts], [~p.right for p in parts], parts[0].unknown)
     curve = []
     for threshold in (NEVER, *THRESHOLDS.tolist()):
-        stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(seconds) - 1))
-        curve.append((float(seconds[stops].mean()), float(wrong.mean())))
+        stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1))
+        curve.append((float(SECONDS[stops].mean()), float(wrong.mean())))
     return curve
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure and print the table."""
+    """Measure and print the tables."""
     dataset = followed(read(arguments.data), NAMES)
-    n = len(dataset.trials)
-    rows = np.sort(np.random.default_rng(0).permutation(n)[: arguments.trials or n])
-    dataset = trials_of(dataset, rows)
     y = {task: dataset.labels(task) for task in dataset.tasks}
+    folds = stratified_folds(y[finest(y)], FOLDS)
     X = np.stack([dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S])
+    frames = round(RATE_HZ * DECISION_POINTS_S[-1]) + 1
+    paper, n = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES), len(folds)
+    series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
     compared = compare_stopping(dataset, DECISION_POINTS_S, jobs=arguments.jobs)
     factors = factors_of(y)
-    folds = stratified_folds(y[finest(y)], FOLDS)
-    paper = dataset.features(DECISION_POINTS_S[-1], SAMPLES, expand(["paper"]))
-    series = paper.reshape(len(rows), len(FEATURES), SAMPLES)
-    others = list(AEON) if importlib.util.find_spec("aeon") is not None else []
-    columns = ["task", "mean time, s", "fixed window, % wrong", "when sure", "gain", "trees"]
-    print("|", " | ".join([*columns, "CALIMERA", *(AEON[name] for name in others)]), "|")
-    print("|---" * (7 + len(others)) + "|")
-    for task, ours in compared.items():
-        waiting = 1.0 - ours.right.mean(axis=1)
-        fixed = list(zip(ours.decision_points_s, waiting.tolist(), strict=True))
+    others = Parallel(n_jobs=arguments.jobs)(
+        delayed(peers)(X, series, y[task], folds) for task in compared
+    )
+    print("| task | mean time, s | fixed window, % wrong | when sure | gain | trees | CALIMERA |")
+    print("|---" * 7 + "|")
+    table = ["| task | rule | mean time, s | % wrong | when sure, at that time |", "|---" * 5 + "|"]
+    for (task, ours), (curves, points) in zip(compared.items(), others, strict=True):
+        fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
         sure = when_sure([compared[factor] for factor in factors.get(task, [task])])
-        trees = extra_trees(X, y[task], folds, arguments.jobs)
-        cheapest = calimera(X, y[task], folds)
-        aeons = [of_aeon(name, series, y[task], folds) for name in others]
-        for seconds in sorted({*DECISION_POINTS_S, *(mean_s for mean_s, _ in aeons)}):
-            waited, stopped, *curves = (
-                100 * at(way, seconds) for way in (fixed, sure, trees, cheapest)
-            )
-            shares = [f"{100 * wrong:.1f}" * (mean_s == seconds) for mean_s, wrong in aeons]
-            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / len(rows))
-            print(
-                f"| {task} | {seconds:.2f} | {waited:.1f} | {stopped:.1f} | "
-                f"{waited - stopped:.1f} ± {error:.1f} | "
-                + " | ".join([*(f"{wrong:.1f}" for wrong in curves), *shares])
-                + " |"
-            )
-    rules = ((name, rule) for name, ours in compared.items() for rule in ours.certified)
-    for name, rule in rules:
-        if rule.folds:
-            print(
-                f"{name}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
-                f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) at {rule.mean_s:.2f} s"
-            )
+        for seconds in DECISION_POINTS_S:
+            waited, stopped, *shares = (100 * at(way, seconds) for way in (fixed, sure, *curves))
+            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / n)
+            cells = [f"{waited:.1f}", f"{stopped:.1f}", f"{waited - stopped:.1f} ± {error:.1f}"]
+            cells += [f"{wrong:.1f}" for wrong in shares]
+            print(f"| {task} | {seconds:.1f} |", " | ".join(cells), "|")
+        for name, (seconds, wrong) in points.items():
+            cells = f"{seconds:.2f} | {100 * wrong:.1f} | {100 * at(sure, seconds):.1f}"
+            table.append(f"| {task} | {name} | {cells} |")
+    print("", *table, sep="\n")
+    print()
+    for task, ours in compared.items():
+        for rule in ours.certified:
+            if rule.folds:
+                print(
+                    f"{task}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
+                    f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) "
+                    f"at {rule.mean_s:.2f} s"
+                )
     return 0
 
 
@@ -213,7 +214,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     top = argparse.ArgumentParser(prog="bench.stopping", description=__doc__)
     top.add_argument("--data", nargs="+", required=True, metavar="REC", help=".npz or folders")
-    top.add_argument("--trials", type=int, help="use this many of them (default: all)")
     top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
     top.set_defaults(run=run)
     return dispatch(top, argv)

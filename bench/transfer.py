@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,12 +21,12 @@ import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
 from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Touched, simulate
+from edge.cli import dispatch
 from edge.commands.replay import Summary, decide
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.stopping import UNKNOWN
 from edge.recording import Recording, load, save
-from edge.statistics import wilson
 from train.progress import bar
 from train.simulate import streams
 
@@ -181,12 +181,13 @@ def _touch_object(folder: Path, index: int, numbers: range, seed: int, habit: st
 
 
 def score(model: Model, by_habit: Mapping[str, list[Path]]) -> str:
-    """Accuracies in all and by habit, the share called unknown, and each task's confusion.
+    """Right decisions by habit and in all, contacts called unknown, and each task's confusion.
 
     A contact without a decision counts as wrong.
     """
-    tasks = {name: task for name, task in model.info.tasks.items() if name in TASKS}
-    pooled, unknown, rows = Summary(tasks), 0, []
+    tasks = [name for name in model.info.tasks if name in TASKS]
+    pooled, unknown = Summary(tasks), 0
+    lines = [f"{'right':<20}" + "".join(f"{task:>12}" for task in tasks)]
     for habit, paths in by_habit.items():
         summary = Summary(tasks)
         for path in paths:
@@ -195,43 +196,28 @@ def score(model: Model, by_habit: Mapping[str, list[Path]]) -> str:
             unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
             summary.add(recording.labels, events)
             pooled.add(recording.labels, events)
-        if paths:
-            rows.append(row(habit, summary, tasks))
-    head = f"{'right':<20}" + "".join(f"{task:>26}" for task in tasks)
-    lines = [head, row("all", pooled, tasks), *rows]
-    lines.append(f"{'unknown':<20}{share(unknown, pooled.recordings):>26}")
-    return "\n".join([*lines, "", pooled.text()])
+        right = "".join(f"{summary.right(task)[0]:>12}" for task in tasks)
+        lines.append(f"{habit:<20}{right} of {summary.recordings}")
+    return "\n".join([*lines, f"unknown: {unknown} of {pooled.recordings}", "", pooled.text()])
 
 
-def row(name: str, summary: Summary, tasks: Iterable[str]) -> str:
-    """A line of the table: the right decisions of each task."""
-    cells = "".join(f"{share(*summary.right(task)):>26}" for task in tasks)
-    return f"{name:<20}{cells} of {summary.recordings}"
-
-
-def share(count: int, total: int) -> str:
-    """A percentage with its 95 % interval."""
-    low, high = wilson(count, total)
-    return f"{100 * count / total:6.1f} %  ({100 * low:.0f} to {100 * high:.0f})"
-
-
-def main(arguments: list[str] | None = None) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Make the trials, score the model on them and print."""
-    parser = argparse.ArgumentParser(prog="bench.transfer", description=__doc__.split("\n\n")[0])
-    parser.add_argument("--model", type=Path, required=True)
-    parser.add_argument("--out", type=Path, default=Path("build/transfer"))
-    parser.add_argument("--trials", type=int, default=96)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    try:
-        folder = options.out / f"seed{options.seed}"
-        text = score(Model(options.model), make_trials(folder, options.trials, options.seed))
-    except InputError as error:
-        print(f"transfer: {error}", file=sys.stderr)
-        return 2
+    folder = arguments.out / f"seed{arguments.seed}"
+    text = score(Model(arguments.model), make_trials(folder, arguments.trials, arguments.seed))
     print(text)
-    (options.out / "transfer.txt").write_text(text + "\n")
     return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    top = argparse.ArgumentParser(prog="bench.transfer", description=__doc__.split("\n\n")[0])
+    top.add_argument("--model", type=Path, required=True)
+    top.add_argument("--out", type=Path, default=Path("build/transfer"))
+    top.add_argument("--trials", type=int, default=96)
+    top.add_argument("--seed", type=int, default=1)
+    top.set_defaults(run=run)
+    return dispatch(top, argv)
 
 
 if __name__ == "__main__":
