@@ -34,10 +34,9 @@ def bench(exported, recordings, tmp_path_factory):
     """A folder with the files that the README's commands name."""
     folder = tmp_path_factory.mktemp("owner")
     touch = load(recordings / "hard_0.npz")
-    thresholds = touch.layout
     text = skinfile.shipped().read_text()
     text = re.sub(r"(?m)^threshold_counts = \d+", "threshold_counts = 50", text)
-    text = re.sub(r"(?m)^onset_counts = \d+", f"onset_counts = {thresholds.onset}", text)
+    text = re.sub(r"(?m)^onset_counts = \d+", f"onset_counts = {touch.layout.onset}", text)
     (folder / "skin.toml").write_text(text)
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(exported / name, folder)
