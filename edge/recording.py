@@ -288,6 +288,8 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     >>> recording.labels["object"], recording.frames.shape[1:]
     ('pillow', (16, 24))
 
+    A warning names the likely unit of times that do not seem to be in seconds.
+
     Args:
         path: of the `.npz`, which sentences name.
         file: its contents, where they have been read already.
@@ -305,7 +307,20 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     recording = Recording(
         arrays["t"], arrays["frames"], arrays.get("joints"), arrays.get("valid"), meta
     )
-    return _checked(name, recording)
+    recording = _checked(name, recording)
+    _warn_of_another_unit(name, recording.t)
+    return recording
+
+
+def _warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
+    """Name the likely unit of times that do not seem to be in seconds."""
+    steps = np.diff(t)
+    rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
+    if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        units = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
+        likely = [u for u, factor in units.items() if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ]
+        guess = f", and these may be in {likely[0]}" if likely else ""
+        LOG.warning(f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}")
 
 
 def save(
@@ -344,13 +359,7 @@ def save(
     """
     name = os.fspath(path)
     recording = _checked(name, recording, scale)
-    steps = np.diff(recording.t)
-    rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
-    if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
-        units = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
-        likely = [u for u, factor in units.items() if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ]
-        guess = f", and these may be in {likely[0]}" if likely else ""
-        LOG.warning(f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}")
+    _warn_of_another_unit(name, recording.t)
     why = doubt(
         recording.t, recording.frames, recording.meta.get("skin", {}), recording.layout.onset
     )

@@ -73,6 +73,15 @@ class Candidate:
         return " ".join(self.sets)
 
 
+def known_products(y: Labels) -> dict[str, tuple[str, str]]:
+    """{product: its factors} as `products`, where every trial with the one has labels of both."""
+    return {
+        task: factors
+        for task, factors in products(y).items()
+        if all((y[factor][y[task] != ""] != "").all() for factor in factors)
+    }
+
+
 def candidates(
     y: Labels,
     features: Sequence[str] | None = None,
@@ -123,7 +132,7 @@ def candidates(
                 most_directions=DRAWN_COMPONENTS[-1] if drawn else None,
                 neighbours=neighbours if k is None else (k,),
             )
-            pairs = products(y) if kind == "lda" else {}
+            pairs = {} if kind == "pca" else known_products(y)
             grids = [grid, *(replace(grid, targets=pairs[t], tasks=(t,)) for t in pairs)]
             together = tuple(t for t in sorted(y) if t not in pairs and (y[t] != "").all())
             if kind == "lda" and len(together) > 1 and not drawn:

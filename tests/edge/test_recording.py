@@ -179,6 +179,9 @@ def test_times_that_do_not_seem_to_be_in_seconds_are_named(make_touch, tmp_path,
     recording = make_touch()
     save(tmp_path / "a.npz", replace(recording, t=recording.t * factor))
     assert (said in caplog.text) if said else not caplog.text
+    caplog.clear()
+    load(tmp_path / "a.npz")
+    assert (said in caplog.text) if said else not caplog.text
 
 
 def test_a_folder_without_recordings_is_named(tmp_path):

@@ -49,6 +49,8 @@ def test_trials_of_one_recording_are_numbered_and_too_many_names_are_left_out(
     trials = fitted.dataset.trials
     twice = replace(fitted.dataset, trials=(*trials[:2], trials[1]))
     assert names(twice)[1] == ("hard_0", "hard_1 1", "hard_1 2")
+    no_text = replace(trials[0], path=trials[0].path.with_name("c\udcff.npz"))
+    assert names(replace(twice, trials=(no_text, *trials[1:])))[1][0] == r"c\udcff"
     monkeypatch.setattr("export.api.MOST_NAMES", 16 * len("hard_0") - 1)
     export.save(tmp_path / "model.onnx", fitted)
     info = Model(tmp_path / "model.onnx").info

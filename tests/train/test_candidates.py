@@ -21,6 +21,14 @@ def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn
     assert together not in drawn
 
 
+def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
+    """A thing whose category is of its own, such as `liquid`, has no softness and no mobility."""
+    y = {task: np.append(labels, "") for task, labels in TASKS.items() if task != "object"}
+    y["category"][-1] = "liquid"
+    targets = {grid.targets for candidate in candidates(y) for grid in candidate.grids}
+    assert ("mobility", "softness") not in targets
+
+
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert {candidate.sets for candidate in candidates(TASKS)} == set(PLAIN)
     assert {candidate.sets for candidate in candidates(TASKS, joints=True)} == set(WITH_JOINTS)

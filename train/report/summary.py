@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.neighbors import NearestNeighbors
 
+from edge.errors import printable
 from edge.touch import measures
 from train.choose import TRIAL, Chosen
 from train.dataset import DataSet
@@ -210,7 +211,8 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
 def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
     """The name of the folder that holds all recordings, and each trial's path in it.
 
-    The paths have no suffix. If a recording has several trials, they are numbered from 1.
+    The paths have no suffix. If a recording has several trials, they are numbered from 1. Names
+    that are no text have escapes.
     """
     folder = Path(os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials]))
     paths = [t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials]
@@ -218,8 +220,9 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
     trials = []
     for path in paths:
         seen[path] += 1
-        trials.append(path.as_posix() + (f" {seen[path]}" if counts[path] > 1 else ""))
-    return folder.name, tuple(trials)
+        number = f" {seen[path]}" if counts[path] > 1 else ""
+        trials.append(printable(path.as_posix()) + number)
+    return printable(folder.name), tuple(trials)
 
 
 def _files(paths: Sequence[Path]) -> str:
