@@ -23,10 +23,12 @@ BOOT_S = 3.0
 PING_S = 0.1
 LONGEST_PACKET = 16384
 """More bytes than this without a zero are noise."""
+OTHERS = "another program has the port open; close it"
 REMEDIES = {
     errno.ENOENT: "no such serial port; is the microcontroller plugged in?",
     errno.EACCES: "may not be opened; add yourself to the group dialout",
-    errno.EBUSY: "another program has the port open; close it",
+    errno.EBUSY: OTHERS,
+    errno.EAGAIN: OTHERS,  # it holds the lock
     errno.EIO: "the transfer broke off; check the cable",
     errno.ETIMEDOUT: "no complete answer came in time; check the firmware and the baud rate",
     errno.ENODEV: "the port has gone; plug the microcontroller in again",

@@ -16,7 +16,17 @@ from hypothesis import strategies as st
 from edge.errors import InputError
 from edge.i2c import block
 from edge.i2c.block import Block
-from edge.i2c.bus import BusFault, BusGone, BusMissing, BusRefused, BusTimeout, fetch, read, write
+from edge.i2c.bus import (
+    BusError,
+    BusFault,
+    BusGone,
+    BusMissing,
+    BusRefused,
+    BusTimeout,
+    fetch,
+    read,
+    write,
+)
 from edge.i2c.serial_bus import SerialBus, decode, encode, serial_bits
 from edge.skin.skin import Skin
 
@@ -192,6 +202,11 @@ def test_a_missing_port_and_a_missing_pyserial_are_one_sentence_each(board, tmp_
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(InputError, match="pip install pyserial"):
         SerialBus(board.port)
+
+
+def test_a_port_that_another_program_has_open_is_refused_by_name(board, bus):
+    with pytest.raises(BusError, match=f"{board.port}: another program has the port open"):
+        SerialBus(board.port, boot_s=0.0)
 
 
 def test_bits_on_the_line_are_those_of_the_packets():
