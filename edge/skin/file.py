@@ -140,6 +140,8 @@ def parse(text: str, where: str = "skin") -> SkinFile:
         layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
     has = top.has("calibration")
     calibration = _calibration(top.table("calibration"), layout) if has else None
+    if calibration is not None:
+        _tellable(buses, calibration.baseline.ravel(), where)
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
@@ -191,7 +193,7 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
             numbers = "numbers" if key == "noise" else "whole numbers"
             raise InputError(
                 f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} from "
-                "0 to 65535; calibrate again"
+                "0 to 65535; delete [calibration], and calibrate again"
             )
         arrays[key] = array
     taken = table.get("taken", None)
@@ -199,6 +201,17 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
         raise table.fail("taken", "a date and time")
     table.done()
     return TaxelCalibration(arrays["baseline"].astype(np.uint16), arrays["noise"], taken)
+
+
+def _tellable(buses: Sequence[BusSpec], baseline: NDArray[np.uint16], where: str) -> None:
+    """Refuse the calibration of a skin with other chips."""
+    for chip in (chip for bus in buses for chip in bus.chips):
+        highest = max(baseline[[taxel for taxel in chip.taxels if taxel != UNUSED]], default=0)
+        if highest > chip.highest:
+            raise InputError(
+                f"{where}: calibration.baseline is {highest} for a taxel of a {chip.kind.name}, "
+                f"which tells at most {chip.highest}; delete [calibration], and calibrate again"
+            )
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:

@@ -31,8 +31,8 @@ PAPERS_GRID = SearchGrid(
     components=tuple(range(1, MAX_COMPONENTS + 1)), neighbours=tuple(range(1, MAX_K + 1))
 )
 TREES = 100
-TAXELS = "taxel_force@10"
-"""The feature that the trees get: each taxel's force, at ten times."""
+TIMES = 10
+"""Number of times at which the trees get every taxel."""
 GROUP_TASK = "object"
 
 Answers = Mapping[str, Result]
@@ -44,6 +44,18 @@ def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> 
     trees, split = ExtraTreesClassifier(TREES, random_state=0), PredefinedSplit(folds)
     hits = {task: cross_val_predict(trees, X, y[task], cv=split) == y[task] for task in y}
     return {task: Result(int(right.sum()), len(X)) for task, right in hits.items()}
+
+
+def taxels(context: Context) -> NDArray[np.float64]:
+    """(n, times * taxels) counts at evenly spaced times; the last frame stays until the end."""
+    wanted = np.linspace(0.0, WINDOW_S, TIMES)
+    alive = context.dataset.layout.alive.reshape(-1)
+    rows = []
+    for trial in context.dataset.trials:
+        t = trial.recording.t - trial.onset_s
+        at = np.clip(np.searchsorted(t, wanted, side="right") - 1, 0, len(t) - 1)
+        rows.append(trial.recording.frames[at].reshape(TIMES, -1)[:, alive].ravel())
+    return np.stack(rows).astype(np.float64)
 
 
 def methods(context: Context) -> dict[str, Callable[..., Answers]]:
@@ -61,8 +73,7 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
             features=taken.names,
             widths=taken.widths(SAMPLES // 2),
         )
-    taxels = data.features(WINDOW_S, names=[TAXELS])
-    compared[f"{TREES} extra trees on every taxel"] = partial(extra_trees, taxels)
+    compared[f"{TREES} extra trees on every taxel"] = partial(extra_trees, taxels(context))
     return compared
 
 

@@ -69,7 +69,7 @@ def study(
         if value < 1:
             raise InputError(f"{option} must be at least 1, not {value}")
     source = None if scene is None else scenes.load(scene)
-    names = expand([*(name for name, _ in methods.OURS), methods.TAXELS])
+    names = expand([name for name, _ in methods.OURS])
     dataset = load_trials(data, horizon_s=LONGEST_S, features=names, progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(

@@ -92,6 +92,16 @@ def test_a_damaged_calibration_is_refused(key, row):
     assert f"calibration.{key}" in mistake(text)
 
 
+def test_a_calibration_above_what_its_chips_tell_is_refused():
+    """An MPR121 tells 10 bits, of which 1023 is saturated."""
+    pad = skinfile.shipped("mpr121").read_text()
+    highest = [[1022] * 12] * 8
+    for added, said in ((0, ""), (1, "calibration.baseline is 1023 for a taxel of a mpr121")):
+        highest = [[value + added for value in row] for row in highest]
+        text = pad + f"[calibration]\nbaseline = {highest}\nnoise = {highest}\n"
+        assert said in mistake(text) if said else skinfile.parse(text).calibration
+
+
 def test_saving_a_calibration_keeps_the_old_file_and_leaves_a_wrong_one_alone(tmp_path):
     path = tmp_path / "skin.toml"
     wrong = SMALL.replace("sign = -1", "sign = 2")
