@@ -139,7 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     if arguments.report:
-        from train.report.model import write  # loads matplotlib
+        from train.model_report import write  # loads matplotlib
 
         print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0

@@ -10,7 +10,7 @@ import train
 from edge.model.model import Model
 from edge.recording import load, save
 from export.api import measure
-from train.report import model as report
+from train import model_report as report
 
 
 @pytest.fixture(scope="module")
