@@ -12,6 +12,8 @@ ABOVE_FLOOR_M = 0.30
 """Height of the middle of the contact."""
 NET_M, FACE_M, LAYER_KG_M2 = 0.0108, 0.008, 8.7
 """The pitch of the net, half the face's thickness, and the layer's mass."""
+SHEAR = 0.06
+"""The layer's shear stiffness divided by modulus times thickness."""
 SOLIMP, CONTACT = 0.95, "-1e5 -600"
 SHEAR_N_M, SHEAR_NS_M = 1e4, 15.0
 """The skin's stretch along the forearm: its stiffness and its loss."""
@@ -23,7 +25,7 @@ def beneath_n_m(modulus_pa: float) -> float:
 
 
 def layer_xml(
-    height_m: float, breadth_m: float, modulus_pa: float, thick_m: float, sideways: float
+    height_m: float, breadth_m: float, modulus_pa: float, thick_m: float
 ) -> tuple[str, str, str]:
     """An elastic layer: a net of sprung knots, the springs between neighbours (together a Pasternak
     foundation) and the face stretched over the net.
@@ -37,7 +39,7 @@ def layer_xml(
     rows, cols = round(high / NET_M), round(wide / NET_M)
     dz, dy = high / rows, wide / cols
     k = modulus_pa * dz * dy / thick_m
-    shear = sideways * modulus_pa * thick_m
+    shear = SHEAR * modulus_pa * thick_m
     mass = LAYER_KG_M2 * dz * dy
     xml, between, knots = "", "", []
     for r in range(rows + 1):

@@ -53,7 +53,6 @@ class Thing:
         height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
         below_m: how far a rigid face reaches below the middle of the contact (default: the floor).
         modulus_pa, thick_m: of a soft layer.
-        sideways: the layer's shear stiffness divided by modulus times thickness.
         stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the contact.
         seed: of a plant's shape.
         joint: MuJoCo's joint between a movable thing and the room.
@@ -68,7 +67,6 @@ class Thing:
     below_m: float = ABOVE_FLOOR_M
     modulus_pa: float = 8e3
     thick_m: float = 0.1
-    sideways: float = 0.06
     stems: int = 8
     stem_n_m: float = 10.0
     seed: int = 0
@@ -212,7 +210,7 @@ def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str
     springs, layer, back = "", "", FOOT_M / 2
     if thing.layered:
         upper, springs, layer = mujoco_layer.layer_xml(
-            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m, thing.sideways
+            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m
         )
         back = 0.2
     elif thing.soft:

@@ -153,9 +153,14 @@ def peers(
 
 
 def at(rows: Curve, seconds: float) -> float:
-    """The share wrong at a mean time, interpolated; NaN before the soonest decision."""
+    """The percentage wrong at a mean time, interpolated; NaN before the soonest decision."""
     times, wrong = zip(*sorted(rows), strict=True)
-    return float(np.interp(seconds, times, wrong, left=np.nan))
+    return 100.0 * float(np.interp(seconds, times, wrong, left=np.nan))
+
+
+def cell(percentage: float) -> str:
+    """A percentage for a table; a dash where it is NaN."""
+    return "-" if np.isnan(percentage) else f"{percentage:.1f}"
 
 
 def when_sure(parts: Sequence[StoppingComparison]) -> Curve:
@@ -189,13 +194,13 @@ def run(arguments: argparse.Namespace) -> int:
         fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
         sure = when_sure([compared[factor] for factor in factors.get(task, [task])])
         for seconds in DECISION_POINTS_S:
-            waited, stopped, *shares = (100 * at(way, seconds) for way in (fixed, sure, *curves))
+            waited, stopped, *others_wrong = (at(way, seconds) for way in (fixed, sure, *curves))
             error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / n)
-            cells = [f"{waited:.1f}", f"{stopped:.1f}", f"{waited - stopped:.1f} ± {error:.1f}"]
-            cells += [f"{wrong:.1f}" for wrong in shares]
+            gain = "-" if np.isnan(error) else f"{waited - stopped:.1f} ± {error:.1f}"
+            cells = [cell(waited), cell(stopped), gain, *map(cell, others_wrong)]
             print(f"| {task} | {seconds:.1f} |", " | ".join(cells), "|")
         for name, (seconds, wrong) in points.items():
-            cells = f"{seconds:.2f} | {100 * wrong:.1f} | {100 * at(sure, seconds):.1f}"
+            cells = f"{seconds:.2f} | {100 * wrong:.1f} | {cell(at(sure, seconds))}"
             table.append(f"| {task} | {name} | {cells} |")
     print("", *table, sep="\n")
     print()
