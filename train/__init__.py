@@ -3,8 +3,6 @@
 `train.fit` does from Python what `make export` does; `export.save` writes the result.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

@@ -1,7 +1,5 @@
 """The report of a fitted model: its accuracy, wrong answers, features, and candidates."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

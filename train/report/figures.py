@@ -1,7 +1,5 @@
 """The reports' pictures as PNG, each drawn once for a page and once for a phone."""
 
-from __future__ import annotations
-
 import io
 import textwrap
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The report as one HTML file, with each table as CSV and each plot as PNG beside it."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import html

@@ -1,7 +1,5 @@
 """The accuracies of the reports (nested, leave-one-out, transferred) and their columns."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

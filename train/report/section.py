@@ -1,7 +1,5 @@
 """The elements of a report: sections with text, tables and figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """The same recordings as skins with larger taxels would have made them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

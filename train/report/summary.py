@@ -1,7 +1,5 @@
 """A fit summed up for a terminal: the candidates, the choices, and warnings."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Work shared among several processes, with a progress bar."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

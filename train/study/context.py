@@ -1,7 +1,5 @@
 """The data set that every section of the study works on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """The study's findings: the accuracy of each method on new contacts with known and new objects."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from operator import call

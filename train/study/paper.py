@@ -1,7 +1,5 @@
 """The paper's 46 accuracies in its Tables I to III, compared with ours."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The cost of another speed, arm or sensor, for simulated data sets."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The study: every analysis of the paper, repeated on one data set and written as a report."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """The paper's own analyses of the features: Figs. 6 to 10, Tables I to III."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """The sections on accuracy against time, with the command that exports each model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread

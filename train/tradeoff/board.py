@@ -1,7 +1,5 @@
 """The time and memory that a decision takes on a machine, read from its board.json."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The time until an object that can move does: the physical limit of an early decision."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from train.simulate.arm import Kinematics

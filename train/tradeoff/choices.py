@@ -1,13 +1,7 @@
 """The quick choice of `make export`, made at each window and for changed recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from edge.touch.features import WINDOW_S
 from train.candidates import candidates
@@ -33,11 +27,6 @@ def followed(
     return load_trials(
         raw, horizon_s=WINDOWS_S[-1], features=expand([*sets, *features]), progress=progress
     )
-
-
-def trials_of(dataset: DataSet, rows: NDArray[np.int64]) -> DataSet:
-    """The data set with only the trials of these rows."""
-    return replace(dataset, trials=tuple(dataset.trials[i] for i in rows))
 
 
 def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:

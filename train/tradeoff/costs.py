@@ -1,7 +1,5 @@
 """The accuracy that each saving costs, in one table."""
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -22,7 +20,7 @@ from train.report.skins import coarser
 from train.report.work import Workers
 from train.stopping import finest
 from train.tradeoff.board import ESTIMATED, estimated_s
-from train.tradeoff.choices import Points, chosen, followed, trials_of
+from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured
 from train.tradeoff.wires import Wire, wires
 
@@ -98,11 +96,11 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     )
     y = {task: dataset.labels(task) for task in dataset.tasks}
     for part in PARTS:
-        rows = np.flatnonzero(stratified_folds(y[finest(y)], part) == 0)
-        if len(rows) >= FEWEST:
-            name = f"{len(rows)} of {len(dataset.trials)} trials"
-            price = f"{counted(len(dataset.trials) - len(rows), 'recording')} fewer"
-            cases.append(Change(name, price, trials_of(dataset, rows), fewer=True))
+        kept = dataset.part(stratified_folds(y[finest(y)], part) == 0)
+        if len(kept.trials) >= FEWEST:
+            name = f"{len(kept.trials)} of {len(dataset.trials)} trials"
+            price = f"{counted(len(dataset.trials) - len(kept.trials), 'recording')} fewer"
+            cases.append(Change(name, price, kept, fewer=True))
     return cases
 
 

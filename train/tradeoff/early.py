@@ -1,7 +1,5 @@
 """Early decisions compared with fixed windows, on held-out trials."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +16,6 @@ from train.report.score import paired
 from train.report.work import Workers
 from train.rules import Course, candidates
 from train.stopping import finest
-from train.tradeoff.choices import trials_of
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -107,7 +104,7 @@ def compare_stopping(
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
-    tests = [np.flatnonzero(folds == k) for k in range(FOLDS)]
+    tests = [folds == k for k in range(FOLDS)]
     cases = [(dataset, test, decision_points_s) for test in tests]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
@@ -131,12 +128,12 @@ def compare_stopping(
 
 
 def _held_out(
-    dataset: DataSet, test: NDArray[np.int64], decision_points_s: Sequence[float]
+    dataset: DataSet, test: NDArray[np.bool_], decision_points_s: Sequence[float]
 ) -> tuple[Any, ...]:
     """The model that was fitted without a fold, and its answers to the fold's trials (`judged`)."""
-    train = trials_of(dataset, np.setdiff1d(np.arange(len(dataset.trials)), test))
+    train, others = dataset.part(~test), dataset.part(test)
     fitted = fit(train, quick=True, leave_out=TRIAL, decision_points_s=decision_points_s, jobs=1)
-    model, others = fitted.sequential, trials_of(dataset, test)
+    model = fitted.sequential
     assert model is not None
     form = fitted.samples, fitted.dataset.names
     new = np.stack([others.features(seconds, *form) for seconds in decision_points_s])

@@ -1,7 +1,5 @@
 """The measurements that the sections of the trade-off show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

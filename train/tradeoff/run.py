@@ -1,7 +1,5 @@
 """The trade-off: its report and settings, from recordings and the figures of a board."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The first screen: a line for each task, and a slider that sets the time of the decision."""
 
-from __future__ import annotations
-
 import html
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Ways to wire a skin, and the cost of a frame on each, counted from the drivers' transactions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The sketch of a simulated touch: what leans, turns or bends does so in the picture."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
