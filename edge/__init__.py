@@ -4,8 +4,6 @@ Only the names below are public; everything else may move. Each is loaded at its
 `import edge` alone is quick.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 TYPE_CHECKING = False  # type checkers read it as true; to load typing would take longer than edge

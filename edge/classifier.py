@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from edge.errors import InputError
+from edge.errors import InputError, OutOfRange
 from edge.events import Decided, Event, Onset, Release
 from edge.model.agreement import product_label
 from edge.model.model import Decision, Model, require_joints
@@ -267,7 +267,7 @@ class Classifier:
         try:
             vector = info.vector(series, window_s)
             decisions = self.model.decide(vector, None if self.error is None else decision_point)
-        except InputError:
+        except OutOfRange:
             answers = [replace(answer, flags=(*flags, OUT_OF_RANGE)) for answer in answers]
         else:
             novel, novelty = 1.0, info.novelty

@@ -12,11 +12,9 @@ class Clock(Protocol):
 
     def now(self) -> float:
         """Seconds since some fixed moment."""
-        ...
 
     def sleep_until(self, t: float) -> None:
         """Wait until `t`; return at once if it has passed."""
-        ...
 
 
 class SystemClock:

@@ -40,3 +40,7 @@ class InputError(EdgeError, ValueError):
     ...     print(error)
     touch.npz: cannot be read: No such file or directory
     """
+
+
+class OutOfRange(InputError):
+    """Features that are too large to be scaled, or not finite: a decision on them has no label."""

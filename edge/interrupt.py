@@ -1,7 +1,5 @@
 """Ctrl-C while a module is being imported."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

@@ -13,6 +13,7 @@ from edge import __version__
 from edge.files import write_whole
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
+from edge.touch.track import DEBOUNCE
 from export import golden
 from export.graph import to_onnx
 from train.choose import TRIAL, Chosen
@@ -101,7 +102,7 @@ def describe(
             for task, choice in classifier.choices.items()
         },
         layout=dataset.layout,
-        tracking=dataset.tracking,
+        debounce=DEBOUNCE,
         window_s=window_s,
         samples=samples,
         features=dataset.names,

@@ -24,7 +24,7 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, ker
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, TrackSettings
+from edge.touch.track import ContactTracker
 from train.arms import arm_of, joint_angles
 from train.feature_sets import moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
@@ -80,7 +80,6 @@ class DataSet:
     Attributes:
         trials: in the order of the files' names.
         layout: the skin, with the thresholds used for all trials.
-        tracking: how contacts were followed.
         chain: the arm, where the trials have joint angles and a feature needs them; motion is then
             in the world's frame.
         untouched: recordings in which no contact was found, with their labels.
@@ -96,7 +95,6 @@ class DataSet:
 
     trials: tuple[Trial, ...]
     layout: SkinLayout
-    tracking: TrackSettings
     chain: Chain | None
     untouched: tuple[tuple[Path, dict[str, str]], ...]
     digest: str
@@ -282,12 +280,11 @@ def load_trials(
                 raise InputError(f"{path}: its arm is not that of {kept[0][1]}; train on one arm")
     joints = joint_angles(kept) if needed else 0
     names = tuple(feature.name for feature in types)
-    settings = TrackSettings()
     trials: list[Trial] = []
     untouched: list[tuple[Path, dict[str, str]]] = []
     unused: list[Path] = []
     tracked = {"chain": chain, "horizon_s": horizon_s, "features": names, "joints": joints}
-    work = (delayed(_followed)(*pair, reference, settings, **tracked) for pair in kept)
+    work = (delayed(_followed)(*pair, reference, **tracked) for pair in kept)
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
     shown = bar(results, total=len(kept), desc="following", unit=" trials", disable=not progress)
     for (recording, path), (touches, labels) in zip(kept, shown, strict=True):
@@ -322,7 +319,6 @@ def load_trials(
     return DataSet(
         tuple(trials),
         reference,
-        settings,
         chain,
         tuple(used[len(trials) :]),
         raw.digest,
@@ -335,11 +331,11 @@ def load_trials(
 
 
 def _followed(
-    recording: Recording, path: Path, layout: SkinLayout, settings: TrackSettings, **tracked: Any
+    recording: Recording, path: Path, layout: SkinLayout, **tracked: Any
 ) -> tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
-        tracker = ContactTracker(for_device(layout, recording.layout), settings, **tracked)
+        tracker = ContactTracker(for_device(layout, recording.layout), **tracked)
         touches = contacts(recording, tracker)
         return touches, labels_of(recording, len(touches))
     except InputError as error:

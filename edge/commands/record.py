@@ -31,7 +31,7 @@ from edge.runtime.event_writer import Lines
 from edge.skin.skin import Skin
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.track import ContactTracker, TrackSettings
+from edge.touch.track import DEBOUNCE, ContactTracker
 
 if TYPE_CHECKING:
     from edge.runtime.page import Page
@@ -89,10 +89,9 @@ class Trials:
     """
 
     def __init__(self, skin: Skin, length_s: float) -> None:
-        settings, lead_frames = TrackSettings(), round(LEAD_S / skin.period_s)
-        self._tracker = ContactTracker(skin.layout, settings, horizon_s=0.0)
+        self._tracker = ContactTracker(skin.layout, horizon_s=0.0)
         self._length = length_s
-        self._before: deque[Frame] = deque(maxlen=lead_frames + settings.debounce)
+        self._before: deque[Frame] = deque(maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE)
         self._frames: list[Frame] | None = None
         self._saved: Contact | None = None
 

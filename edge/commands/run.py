@@ -79,7 +79,7 @@ class UnknownTouches:
         LOG.warning(
             f"{unknown} of the last {touches} touches are unlike all training trials: the model "
             "does not know these things. Record some touches of them, and add them with "
-            f"`edge-classify teach --model {self._model} REC...`"
+            f"`edge-classify teach --new-labels --model {self._model} REC...`"
         )
         return {"event": "unknown_touches", "unknown": unknown, "touches": touches}
 

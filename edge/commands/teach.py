@@ -7,23 +7,18 @@ carries no certificate: it decides at the end of its window, and `run --error` r
 `make export` with the same recordings fits everything anew.
 """
 
-from __future__ import annotations
-
 import argparse
-import logging
 from pathlib import Path
 
 import numpy as np
 
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output
 from edge.commands.replay import contact_of
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.model.teaching import joined, spelled_like, taught, unknown_labels
 from edge.model.verify import renew
 from edge.recording import find, load
-
-LOG = logging.getLogger(__name__)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -6,10 +6,8 @@ cut off at the training data's reach. Its squared distance to a trial at b is
 feature f brings the touch to the trial than its mean would.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +42,7 @@ class Space(NamedTuple):
     limit: float = np.inf
 
     @classmethod
-    def of(cls, model: Model, task: str) -> Space:
+    def of(cls, model: Model, task: str) -> Self:
         """Read a task's space, at the full window, from the model file.
 
         Raises:

@@ -1,12 +1,10 @@
 """The metadata of a model file, which the board reads beside the graph."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +18,7 @@ from edge.touch.contact import FeatureSeries
 from edge.touch.features import channels_of, feature_vector, widths
 from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, TrackSettings
+from edge.touch.track import ContactTracker
 
 METADATA_KEY = "edge-classify"
 FORMAT = 4
@@ -63,7 +61,8 @@ class ModelInfo:
 
     tasks: dict[str, Task]
     layout: SkinLayout
-    tracking: TrackSettings
+    debounce: int
+    """Frames in a row that confirm a contact."""
     window_s: float
     samples: int
     features: tuple[str, ...]
@@ -138,7 +137,7 @@ class ModelInfo:
         """
         return ContactTracker(
             for_device(self.layout, layout),
-            self.tracking,
+            self.debounce,
             chain=self.chain,
             horizon_s=self.window_s,
             features=self.features,
@@ -153,20 +152,20 @@ class ModelInfo:
             "format": FORMAT,
             "tasks": {name: _to_dict(task) for name, task in self.tasks.items()},
             "skin": self.layout.to_dict(),
-            "tracking": vars(self.tracking),
+            "tracking": {"debounce": self.debounce},
             "arm": None if self.chain is None else self.chain.to_dict(),
             "stopping": {task: asdict(rules) for task, rules in self.stopping.items()},
             "novelty": self.novelty and asdict(self.novelty),
             "kernels": {name: vars(table) for name, table in self.kernels.items()},
         }
-        del entries["layout"], entries["chain"]
+        del entries["layout"], entries["chain"], entries["debounce"]
         for key in OPTIONAL:
             if not entries[key]:
                 del entries[key]
         return json.dumps(entries, sort_keys=True, allow_nan=False, ensure_ascii=False)
 
     @classmethod
-    def from_json(cls, text: str, name: str) -> ModelInfo:
+    def from_json(cls, text: str, name: str) -> Self:
         """Read the text that `to_json` wrote.
 
         Raises:
@@ -189,7 +188,7 @@ class ModelInfo:
             info = cls(
                 tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
                 layout=layout,
-                tracking=TrackSettings(tracking.whole("debounce", allowed=range(1, 1001))),
+                debounce=tracking.whole("debounce", allowed=range(1, 1001)),
                 window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
                 samples=meta.whole("samples", allowed=range(2, 10_001)),
                 features=names,

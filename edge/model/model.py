@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge.errors import EdgeError, InputError
+from edge.errors import EdgeError, InputError, OutOfRange
 from edge.files import read_bytes
 from edge.interrupt import delayed
 from edge.model import onnx_file
@@ -180,8 +180,9 @@ class Model:
             decision_point: index in `decision_points_s`; None for the last, the full window.
 
         Raises:
-            InputError: the vector has another length, or a value that is not finite before or
-                after scaling; the model has no such decision point, or its file is damaged.
+            OutOfRange: a value of the vector is not finite, before or after scaling.
+            InputError: the vector has another length, the model has no such decision point, or
+                its file is damaged.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != (self.info.width,):
@@ -220,13 +221,13 @@ class Model:
         reason = " ".join(reason.split())[:200]
         return InputError(f"{self.path}: cannot be run ({reason}); copy or export it again")
 
-    def _refusal(self, x: NDArray[np.float64]) -> InputError:
+    def _refusal(self, x: NDArray[np.float64]) -> OutOfRange:
         """The error for a vector that the graph answers with label -1."""
         finite = np.isfinite(x)
         if finite.all():
-            return InputError("the features are too large to be scaled")
+            return OutOfRange("the features are too large to be scaled")
         feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
-        return InputError(f"value {finite.argmin()} of the features, of {feature}, is not finite")
+        return OutOfRange(f"value {finite.argmin()} of the features, of {feature}, is not finite")
 
 
 def require_joints(model: Model, dof: int | None, where: str) -> None:

@@ -5,8 +5,6 @@ constants change. Scaling, projection, calibration and certificates remain those
 the model was fitted on.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence

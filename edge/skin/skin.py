@@ -1,13 +1,11 @@
 """The skin: its buses are read side by side, one frame at a time."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +113,7 @@ class Skin:
         *,
         calibrated: bool = True,
         touch_counts: int | None = None,
-    ) -> Skin:
+    ) -> Self:
         """Open the buses of a skin file and set their chips up.
 
         Args:
@@ -253,7 +251,7 @@ class Skin:
         for reader in self.readers:
             reader.bus.close()
 
-    def __enter__(self) -> Skin:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

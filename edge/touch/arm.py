@@ -1,13 +1,11 @@
 """Forward kinematics of a joint chain: joint angles to the pose of the link with the skin."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -162,7 +160,7 @@ class Chain:
         return {"base": self.base, "tip": self.tip, "joint": joints}
 
     @classmethod
-    def from_dict(cls, arm: Mapping[str, Any], where: str = "arm") -> Chain:
+    def from_dict(cls, arm: Mapping[str, Any], where: str = "arm") -> Self:
         """The chain that `to_dict` or an arm's TOML file describes.
 
         Raises:
@@ -178,7 +176,7 @@ class Chain:
             raise InputError(f"{where}: {error}") from None
 
     @classmethod
-    def from_toml(cls, path: str | os.PathLike[str]) -> Chain:
+    def from_toml(cls, path: str | os.PathLike[str]) -> Self:
         """The chain of a TOML file like `edge/arms/cody.toml`.
 
         Raises:
@@ -187,14 +185,14 @@ class Chain:
         return cls.from_dict(read_toml(path).raw, where=os.fspath(path))
 
     @classmethod
-    def cody(cls) -> Chain:
+    def cody(cls) -> Self:
         """Cody's right arm, up to the wrist frame that carries the skin: 5 angles."""
         return cls.from_toml(Path(__file__).parents[1] / "arms" / "cody.toml")
 
     @classmethod
     def from_file(
         cls, path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
-    ) -> Chain:
+    ) -> Self:
         """The chain of a TOML file, or of a URDF file between two of its links.
 
         Raises:
@@ -213,7 +211,7 @@ class Chain:
         return cls.from_toml(path)
 
     @classmethod
-    def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Chain:
+    def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Self:
         """The chain between two links of a URDF file.
 
         Raises:

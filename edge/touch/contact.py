@@ -1,10 +1,8 @@
 """One contact: its measurements frame by frame, and the series that features are made of."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +55,7 @@ class FeatureSeries:
     kernel_cells: NDArray[np.int64] | None = None
     joints: NDArray[np.float64] | None = None
 
-    def felt(self, window_s: float) -> FeatureSeries:
+    def felt(self, window_s: float) -> Self:
         """The frames in which the contact is felt, up to the first one at the window's end.
 
         A board decides with that frame, so later ones must not count. Frames in which the contact
@@ -73,7 +71,7 @@ class FeatureSeries:
             felt[last + 1 :] = True
         return self._frames(np.flatnonzero(felt))
 
-    def _frames(self, pick: slice | NDArray[np.intp]) -> FeatureSeries:
+    def _frames(self, pick: slice | NDArray[np.intp]) -> Self:
         changes: dict[str, Any] = {
             name: value[pick] for name, value in vars(self).items() if isinstance(value, np.ndarray)
         }

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.errors import InputError
+from edge.errors import InputError, OutOfRange
 from edge.touch import kernels, measures
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
 from edge.touch.kernels import KernelTable
@@ -94,6 +94,7 @@ def feature_vector(
     Raises:
         InputError: the window or the number of samples makes no sense, the series is empty, a
             feature does not exist or was not measured, or its table is missing.
+        OutOfRange: a feature is too large for a float.
     """
     if not (math.isfinite(window_s) and window_s > 0.0):
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
@@ -181,7 +182,7 @@ class _Course:
         complete = known.all(axis=1)
         for feature, row in zip(group, values, strict=False):
             if np.isinf(row).any():
-                raise InputError(
+                raise OutOfRange(
                     f"{feature.name} is too large for a number of 64 bits; look at the skin's "
                     "counts_per_newton and pitch_m"
                 )

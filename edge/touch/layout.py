@@ -1,12 +1,10 @@
 """Shape, geometry and scale of a skin: the place of a taxel in metres, a count in newtons."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,7 +132,7 @@ class SkinLayout:
         return out
 
     @classmethod
-    def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> SkinLayout:
+    def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> Self:
         """Read the `skin` object of metadata; unknown keys are ignored.
 
         Raises:

@@ -6,11 +6,9 @@ clear and keeps a shift or a carry from running into the next row. Every result 
 the same on every machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,7 +196,7 @@ class Region:
         row, col = divmod((self.bits & -self.bits).bit_length() - 1, self._grid.stride)
         return row * self._grid.cols + col
 
-    def touches(self, other: Region) -> bool:
+    def touches(self, other: Self) -> bool:
         """Whether a taxel of this region is next to, or the same as, one of the other's."""
         return bool((self.bits | self._grid.neighbours(self.bits)) & other.bits)
 

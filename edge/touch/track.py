@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
@@ -15,18 +14,9 @@ from edge.touch.region import ActiveTaxels, Region
 MAX_CONTACTS = 8
 """Contacts followed at once where every region counts. The limit keeps a flickering skin from
 stalling the loop."""
-
-
-@dataclass(frozen=True)
-class TrackSettings:
-    """How a contact begins; training and the board use the same settings.
-
-    The skin's layout has the counts at which it begins and the time after which it ends.
-    """
-
-    debounce: int = 2
-    """Frames in a row whose peak is above the skin's onset count before a contact is confirmed.
-    The first of them is its onset."""
+DEBOUNCE = 2
+"""Frames in a row whose peak is above the skin's onset count before a contact is confirmed. The
+first of them is its onset."""
 
 
 class ContactTracker:
@@ -52,7 +42,7 @@ class ContactTracker:
     def __init__(
         self,
         layout: SkinLayout,
-        settings: TrackSettings | None = None,
+        debounce: int = DEBOUNCE,
         *,
         chain: Chain | None = None,
         horizon_s: float = math.inf,
@@ -65,7 +55,7 @@ class ContactTracker:
 
         Args:
             layout: the skin, with its thresholds.
-            settings: how contacts begin.
+            debounce: frames in a row that confirm a contact; training and the board use the same.
             chain: with it, motion is measured in the base's frame from each frame's joint
                 angles; without, on the skin.
             horizon_s: seconds from onset after which a contact's series takes in no more.
@@ -83,7 +73,7 @@ class ContactTracker:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
         self.layout, self.horizon_s = layout, horizon_s
         self.region: Region | None = None
-        self._settings = settings or TrackSettings()
+        self._debounce = debounce
         self._chain, self._motion_on_skin = chain, motion_on_skin
         self._measurer = Measurer(layout, features, joints)
         self._max_contacts = max_contacts
@@ -123,14 +113,14 @@ class ContactTracker:
         for contact, of_contact in zip(contacts, of_contacts, strict=True):
             self._follow(contact, frame, active, of_contact)
         self._contacts = [contact for contact in contacts if not contact.ended]
-        return [contact for contact in contacts if contact.frames >= self._settings.debounce]
+        return [contact for contact in contacts if contact.frames >= self._debounce]
 
     def _follow(
         self, contact: Contact, frame: Frame, active: ActiveTaxels, region: Region | None
     ) -> None:
         """Take a frame into a contact, and end it where it is over."""
         age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
-        confirmed = contact.frames >= self._settings.debounce
+        confirmed = contact.frames >= self._debounce
         if not confirmed and (region is None or region.peak <= self.layout.onset):
             contact.ended = True
             return

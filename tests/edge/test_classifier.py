@@ -147,6 +147,13 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     assert [(bool(e.label), bool(e.decision)) for e in decided] == [(labelled, labelled)] * 2
 
 
+def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(exported, make_touch, monkeypatch):
+    broken = Model(exported / "model.onnx")
+    monkeypatch.setattr(broken, "_session", None)
+    with pytest.raises(InputError, match="cannot be run .*; copy or export it again"):
+        list(Classifier(broken).classify(make_touch()))
+
+
 def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(model, make_touch):
     events = watch(model, make_touch(seconds=0.5))
     assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (None, Decided), (None, Decided)]

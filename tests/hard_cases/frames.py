@@ -14,7 +14,7 @@ from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker, TrackSettings
+from edge.touch.track import ContactTracker
 from tests.edge.touch.test_region import SHAPES, by_scipy, by_us
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
 
@@ -45,7 +45,7 @@ def seam_usual() -> str:
 
 def contact_of(frames: Iterable[Frame], layout: SkinLayout = FOREARM, **options: Any) -> Contact:
     """The first contact of some frames."""
-    tracker = ContactTracker(layout, TrackSettings(debounce=1), **options)
+    tracker = ContactTracker(layout, 1, **options)
     contact, *_ = [contact for frame in frames for contact in tracker.push(frame)]
     return contact
 

@@ -13,20 +13,19 @@ from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, TrackSettings, first_contact
+from edge.touch.track import ContactTracker, first_contact
 
 
 def follow(
     recordings: Sequence[Recording],
     layout: SkinLayout,
-    tracking: TrackSettings,
     chain: Chain | None,
 ) -> list[FeatureSeries | None]:
     """The first contact of each recording, or None where there is none."""
     contacts: list[FeatureSeries | None] = []
     for recording in recordings:
         device = for_device(layout, recording.layout)
-        tracker = ContactTracker(device, tracking, chain=chain, horizon_s=WINDOW_S)
+        tracker = ContactTracker(device, chain=chain, horizon_s=WINDOW_S)
         contact = first_contact(recording, tracker)
         contacts.append(None if contact is None else contact[1])
     return contacts

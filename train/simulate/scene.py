@@ -4,7 +4,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -223,7 +223,7 @@ def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
     skin = Cylinder.from_dict(given, where=table.where)
     if not skin.wraps:
         raise table.fail("wraps", "true: the skin is a cylinder")
-    return cast(Cylinder, skin), taxel
+    return skin, taxel
 
 
 def _objects(

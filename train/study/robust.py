@@ -71,7 +71,7 @@ def simulated_again(scene: Scene, data: DataSet) -> list[FeatureSeries | None]:
         for spec in batch
     )
     files, sensed = zip(*recordings(run_physics(scene, specs)), strict=True)
-    contacts = dict(zip(files, follow(sensed, data.layout, data.tracking, data.chain), strict=True))
+    contacts = dict(zip(files, follow(sensed, data.layout, data.chain), strict=True))
     return [contacts.get(file) for file in attempts]
 
 

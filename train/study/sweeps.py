@@ -8,7 +8,6 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
-from edge.touch.track import TrackSettings
 from train.evaluate import Labels, Result
 from train.report import figures
 from train.report.score import grid_search, score
@@ -145,12 +144,11 @@ def _compared(
 def _with_skin(
     layout: SkinLayout,
     recordings: Sequence[Recording],
-    tracking: TrackSettings,
     arm: Chain | None,
     labels: Labels,
 ) -> tuple[Mapping[str, Result], int]:
     """Each task's accuracy with a skin, and the number of trials without contact."""
-    contacts = follow(recordings, layout, tracking, arm)
+    contacts = follow(recordings, layout, arm)
     return grid_search(vectors(contacts), labels), contacts.count(None)
 
 
@@ -159,7 +157,7 @@ def resolution(context: Context) -> Section:
     data, labels = context.dataset, context.labels
     recordings = [trial.recording for trial in data.trials]
     skins = [(data.layout, recordings), *coarser(data.layout, recordings)]
-    cases = [(*skin, data.tracking, data.chain, labels) for skin in skins]
+    cases = [(*skin, data.chain, labels) for skin in skins]
     answers = context.workers.map("taxel resolution", _with_skin, cases)
     taxels = [layout.rows * layout.cols for layout, _ in skins]
     results, lost = (

@@ -68,7 +68,7 @@ def test_percentiles_are_by_nearest_rank():
 def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
     info = Model(exported / "model.onnx").info
     frames = touch(Model(exported / "model.onnx"), info.window_s)
-    tracker = ContactTracker(info.layout, info.tracking, chain=info.chain, horizon_s=info.window_s)
+    tracker = ContactTracker(info.layout, info.debounce, chain=info.chain, horizon_s=info.window_s)
     onset, series = first_contact(frames, tracker)
     assert onset == 0.0
     assert series.t[-1] == pytest.approx(info.window_s)

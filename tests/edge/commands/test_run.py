@@ -17,7 +17,9 @@ def test_most_touches_are_unknown_and_it_is_said_once_with_the_remedy(caplog):
     events = [event for event in heard if event is not None]
     assert events == [{"event": "unknown_touches", "unknown": 6, "touches": FEWEST_TOUCHES}]
     (sentence,) = caplog.messages
-    assert sentence.endswith("add them with `edge-classify teach --model m.onnx REC...`")
+    assert sentence.endswith(
+        "add them with `edge-classify teach --new-labels --model m.onnx REC...`"
+    )
 
 
 def test_half_of_the_touches_may_be_unknown_and_old_ones_are_forgotten():

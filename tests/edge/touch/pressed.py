@@ -3,7 +3,7 @@
 import numpy as np
 
 from edge.touch.frame import Frame
-from edge.touch.track import ContactTracker
+from edge.touch.track import DEBOUNCE, ContactTracker
 
 
 def pressed(layout, t, taxels, **more):
@@ -14,9 +14,9 @@ def pressed(layout, t, taxels, **more):
     return Frame(t, counts, **more)
 
 
-def followed(layout, frames, settings=None, **options):
+def followed(layout, frames, debounce=DEBOUNCE, **options):
     """The last contact that a frame belongs to."""
-    tracker, contact = ContactTracker(layout, settings, **options), None
+    tracker, contact = ContactTracker(layout, debounce, **options), None
     for frame in frames:
         (contact,) = tracker.push(frame) or [contact]
     return contact

@@ -8,16 +8,17 @@ import pytest
 from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, TrackSettings, first_contact
+from edge.touch.track import DEBOUNCE, ContactTracker, first_contact
 from tests.edge.touch.pressed import followed, pressed
 
 FLAT = SkinLayout(4, 6, threshold_counts=10, onset_counts=20, pitch_m=0.01)
-AT_ONCE = TrackSettings(debounce=1)
+AT_ONCE = 1
+"""The frame that confirms a contact is its first."""
 
 
-def follow(peaks, settings=None, *, layout=FLAT, dt=0.01, start=0.0, **keywords):
+def follow(peaks, debounce=DEBOUNCE, *, layout=FLAT, dt=0.01, start=0.0, **keywords):
     """The contacts of a stream, each as (onset_s, peaks, ended)."""
-    tracker = ContactTracker(layout, settings, **keywords)
+    tracker = ContactTracker(layout, debounce, **keywords)
     contacts = {}
     for i, peak in enumerate(peaks):
         contacts |= dict.fromkeys(tracker.push(pressed(layout, start + i * dt, {(1, 1): peak})))

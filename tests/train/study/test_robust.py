@@ -65,7 +65,7 @@ def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(context
     data, changed = context.dataset, variants(scene)[change]
     trials = dict(simulate(changed))
     asked = [trials[trial.path.name] for trial in data.trials]
-    expected = vectors(follow(asked, data.layout, data.tracking, data.chain))
+    expected = vectors(follow(asked, data.layout, data.chain))
     assert (vectors(simulated_again(changed, data)) == expected).all()
     assert (expected != context.vectors()).any()
 
