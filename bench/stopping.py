@@ -122,10 +122,7 @@ def calimera(X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np
 
 
 def of_aeon(
-    make: Callable[..., Any],
-    series: NDArray[np.float64],
-    labels: NDArray[np.str_],
-    folds: NDArray[np.int64],
+    make: Callable[..., Any], series: NDArray, labels: NDArray, folds: NDArray
 ) -> tuple[float, float]:
     """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames * features)."""
     trees = SklearnClassifierWrapper(ExtraTreesClassifier(TREES), random_state=0)
@@ -142,10 +139,7 @@ def of_aeon(
 
 
 def peers(
-    X: NDArray[np.float64],
-    series: NDArray[np.float64],
-    labels: NDArray[np.str_],
-    folds: NDArray[np.int64],
+    X: NDArray, series: NDArray, labels: NDArray, folds: NDArray
 ) -> tuple[list[Curve], dict[str, tuple[float, float]]]:
     """The curves of extra trees and of CALIMERA on a task, and the points of aeon's rules."""
     curves = [extra_trees(X, labels, folds), calimera(X, labels, folds)]
@@ -202,8 +196,7 @@ def run(arguments: argparse.Namespace) -> int:
         for name, (seconds, wrong) in points.items():
             cells = f"{seconds:.2f} | {100 * wrong:.1f} | {cell(at(sure, seconds))}"
             table.append(f"| {task} | {name} | {cells} |")
-    print("", *table, sep="\n")
-    print()
+    print("", *table, "", sep="\n")
     for task, ours in compared.items():
         for rule in ours.certified:
             if rule.folds:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import subprocess
@@ -45,14 +44,13 @@ def skipping() -> Iterator[None]:
 def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
     """Make a folder, unless it was made by the same recipe before; a failed one is not kept."""
     stamp = target / ".made-from"
-    digest = hashlib.sha256(recipe.encode()).hexdigest()
-    if not (stamp.is_file() and stamp.read_text() == digest):
+    if not (stamp.is_file() and stamp.read_text() == recipe):
         fresh = target.with_name(target.name + ".new")
         for old in (fresh, target):
             shutil.rmtree(old, ignore_errors=True)
         fresh.mkdir(parents=True)
         make(fresh)
-        (fresh / stamp.name).write_text(digest)
+        (fresh / stamp.name).write_text(recipe)
         fresh.rename(target)
     return target
 
