@@ -1,6 +1,8 @@
 """Recordings small enough to read, and a model fitted on them."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,8 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
 
-REAL = Path(__file__).parents[2] / "shared" / "real"
+ROOT = Path(__file__).parents[1]
+REAL = ROOT.parent / "shared" / "real"
 
 FOREARM = SkinLayout(
     rows=16,
@@ -97,6 +100,12 @@ def recordings(tmp_path_factory) -> Path:
         for seed in range(8):
             save(folder / f"{kind}_{seed}.npz", touch(kind=kind, seed=seed))
     return folder
+
+
+def python(*arguments, **options) -> subprocess.CompletedProcess:
+    """A process of its own that ran Python in the project's folder, with its output as text."""
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, **options)
 
 
 PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")

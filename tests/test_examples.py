@@ -4,22 +4,20 @@ import json
 import os
 import re
 import runpy
-import subprocess
 import sys
 import types
 from collections import defaultdict
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 
 import edge
 from edge import demo
 from edge.fake.player import play, skin_file
-from tests.conftest import save_touches
+from tests.conftest import ROOT, python, save_touches
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = ROOT / "examples"
 PACKAGE = EXAMPLES / "ros2" / "edge_classify_ros"
 PILLOW = demo.FOLDER / "pillow-movable.npz"
 
@@ -57,10 +55,8 @@ def test_the_fitting_program_finds_its_packages_as_its_first_line_says():
     line = (EXAMPLES / "fit_and_export.py").read_text().splitlines()[0]
     path, _, program = line.split("`")[1].split()[:3]
     environment = {**os.environ, "PYTHONPATH": path.removeprefix("PYTHONPATH=")}
-    ended = subprocess.run(
-        [sys.executable, program], cwd=EXAMPLES.parent, env=environment, capture_output=True
-    )
-    assert ended.stderr.splitlines()[-1] == b"IndexError: list index out of range"
+    ended = python(program, env=environment)
+    assert ended.stderr.splitlines()[-1] == "IndexError: list index out of range"
 
 
 def test_a_skin_is_watched(monkeypatch, capsys):

@@ -1,7 +1,6 @@
 """Imports follow the one way of the data, and the board's package needs few others."""
 
 import ast
-import subprocess
 import sys
 from functools import cache
 from graphlib import TopologicalSorter
@@ -9,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.conftest import ROOT, python
+
 BOARD = {"numpy", "onnxruntime", "smbus2", "edge"}
 OPTIONAL = {"serial": "edge/i2c/serial_bus.py", "argcomplete": "edge/cli.py"}
 """The packages of the wheel's extras, and the only module that may import each."""
@@ -85,9 +85,7 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
 def test_slow_packages_are_loaded_only_when_they_are_needed(names, left_out):
     """Loading onnxruntime takes most of the start-up time, and only a model needs it."""
     code = f"import sys, {names}; print([m for m in sys.modules if m.startswith({left_out})])"
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    assert python("-c", code).stdout == "[]\n"
 
 
 def test_no_modules_import_each_other_in_a_circle():

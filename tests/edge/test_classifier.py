@@ -14,11 +14,6 @@ from edge.model.model import Model, require_joints
 from edge.recording import Recording
 
 
-@pytest.fixture(scope="module")
-def model(exported):
-    return Model(exported / "model.onnx")
-
-
 def watch(model, recording):
     classifier = Classifier(model, recording.layout)
     events = [(f.t, event) for f in recording for event in classifier.push(f)]

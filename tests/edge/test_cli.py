@@ -16,9 +16,8 @@ from edge.errors import InputError
 from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
 from export.__main__ import main as export
+from tests.conftest import ROOT, python
 from train.__main__ import main as train
-
-ROOT = Path(__file__).parents[2]
 
 
 def top(run):
@@ -97,10 +96,7 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
         "COMP_POINT": str(len(line)),
         "COMP_TYPE": "9",
     }
-    done = subprocess.run(
-        [sys.executable, "-m", "edge"], cwd=ROOT, env=asked, capture_output=True, text=True
-    )
-    assert done.stdout.split() == ["record"]
+    assert python("-m", "edge", env=asked).stdout.split() == ["record"]
 
 
 @pytest.mark.parametrize(("error", "status"), [(InputError, 2), (BusMissing, 3)])
@@ -135,9 +131,7 @@ def test_only_the_command_that_is_asked_for_is_loaded():
         "import sys; from edge import cli; cli.parser(['check']); "
         "print(*sorted(m for m in sys.modules if m.startswith('edge.commands.')))"
     )
-    said = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.split()
+    said = python("-c", code).stdout.split()
     assert "edge.commands.check" in said
     assert not {"edge.commands.run", "edge.commands.replay", "edge.commands.bench"} & set(said)
 
@@ -154,6 +148,4 @@ def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_p
 
 
 def test_the_module_of_the_command_line_runs_it():
-    command = [sys.executable, "-m", "edge.cli", "--version"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout == f"edge-classify {__version__}\n"
+    assert python("-m", "edge.cli", "--version").stdout == f"edge-classify {__version__}\n"

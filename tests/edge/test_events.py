@@ -1,7 +1,5 @@
 """Events as values, and as lines of JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 

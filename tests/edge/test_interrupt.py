@@ -1,24 +1,12 @@
 """Ctrl-C during an import waits for its end."""
 
 import signal
-import subprocess
-import sys
 import threading
-from pathlib import Path
 
 import pytest
 
 from edge.interrupt import delayed
-
-ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def interruptible():
-    """A shell that runs the tests in the background lets them ignore SIGINT."""
-    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield signal.default_int_handler
-    signal.signal(signal.SIGINT, inherited)
+from tests.conftest import python
 
 
 def test_ctrl_c_comes_at_the_end_of_the_block(interruptible):
@@ -83,7 +71,7 @@ start("edge.cli", ["run", "--model", str(demo.MODEL), "--fake", str(demo.recordi
 
 
 def test_extension_modules_that_lose_ctrl_c_are_imported_within_it():
-    done = subprocess.run([sys.executable, "-c", HEARD], cwd=ROOT, capture_output=True, text=True)
+    done = python("-c", HEARD)
     assert done.returncode == 0
     losing = ("numpy.random", "onnxruntime")
     assert [name for name in done.stderr.split() if name.startswith(losing)] == []

@@ -39,7 +39,7 @@ def skin(tmp_path):
 @pytest.fixture
 def quiet(tmp_path, make_touch):
     """A recording in which nothing touches."""
-    trial = make_touch(arm=False)
+    trial = make_touch()
     path = tmp_path / "quiet.npz"
     recording.save(path, replace(trial, frames=np.zeros_like(trial.frames)))
     return path

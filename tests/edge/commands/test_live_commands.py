@@ -2,9 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -12,9 +9,8 @@ from edge import recording
 from edge.commands import source
 from edge.fake.touches import still
 from edge.skin import file as skinfile
+from tests.conftest import python
 from tests.edge.commands.conftest import lines
-
-ROOT = Path(__file__).parents[3]
 
 
 def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
@@ -75,27 +71,23 @@ def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, parted)
     assert twice[-1]["frames"] == 460
 
 
-def test_run_needs_the_joint_angles_that_its_model_was_made_with(edge, exported, make_touch,
-                                                                 tmp_path):  # fmt: skip
-    model, bare = exported / "model.onnx", tmp_path / "bare.npz"
-    recording.save(bare, make_touch(arm=False))
-    status, _, err = edge("run", "--model", model, "--fake", bare)
-    assert status == 2
-    assert "has no joint angles, but the model needs 5 of each frame" in err
-    status, events, _ = edge("run", "--model", model, "--fake", bare, "--without-joints", "skin")
-    decisions = [e for e in events if e["event"] == "decision"]
-    assert status == 0
-    assert len(decisions) == 2
-    assert all("skin_motion" in e["flags"] for e in decisions)
+@pytest.fixture
+def bare(make_touch, tmp_path):
+    """A touch without joint angles, which the model needs."""
+    recording.save(tmp_path / "bare.npz", make_touch(arm=False))
+    return tmp_path / "bare.npz"
 
 
 @pytest.mark.parametrize(
-    ("options", "flag"), [((), "missing_pose"), (("--without-joints", "skin"), "skin_motion")]
+    ("options", "flag"),
+    [
+        (("--joints", "udp:0"), "missing_pose"),  # a sender that is silent
+        (("--joints", "udp:0", "--without-joints", "skin"), "skin_motion"),
+        (("--without-joints", "skin"), "skin_motion"),
+    ],
 )
-def test_run_flags_a_decision_whose_joints_never_came(edge, exported, recordings, options, flag):
-    """A model with an arm, a sender that is silent."""
-    given = ("--model", exported / "model.onnx", "--fake", recordings / "hard_0.npz")
-    status, events, _ = edge("run", *given, "--joints", "udp:0", *options)
+def test_run_flags_a_decision_whose_joints_never_came(edge, exported, bare, options, flag):
+    status, events, _ = edge("run", "--model", exported / "model.onnx", "--fake", bare, *options)
     assert status == 0
     assert [e["flags"][0] for e in events if e["event"] == "decision"] == [flag] * 2
 
@@ -107,11 +99,9 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         json.dumps({"t": t, "q": q}) + "\n"
         for t, q in zip(trial.t.tolist()[:63], trial.joints.tolist(), strict=False)
     )
-    done = subprocess.run(
-        [sys.executable, "-m", "edge", "run", "--model", str(exported / "model.onnx"),
-         "--fake", str(recordings / "hard_2.npz"), "--joints", "stdin"],
-        cwd=ROOT, input=sent + "nonsense\n", capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
+    given = ("--model", exported / "model.onnx", "--fake", recordings / "hard_2.npz")
+    command = ("-m", "edge", "run", *given, "--joints", "stdin")
+    done = python(*command, input=sent + "nonsense\n", timeout=60)
     assert done.returncode == 0
     flags = [e["flags"] for e in lines(done.stdout) if e["event"] == "decision"]
     assert all("missing_pose" in f for f in flags)
@@ -131,12 +121,13 @@ def test_run_takes_joints_from_stdin(exported, recordings):
             ["--fake", "REC", "--joints", "udp:x"],
             "--joints udp:x: give HOST:PORT, for example",
         ),
+        (["--fake", "BARE"], "has no joint angles, but the model needs 5 of each frame"),
         (["--fake", "REC", "--skin", "PAD"], "this skin has 8 x 12 taxels, flat, with"),
     ],
 )
-def test_a_bad_option_is_one_sentence(edge, exported, recordings, arguments, said):
-    named = {"REC": recordings / "hard_0.npz", "PAD": skinfile.shipped("mpr121")}
-    given = [named.get(a, a) for a in arguments]
+def test_a_bad_option_is_one_sentence(edge, exported, recordings, bare, arguments, said):
+    files = {"REC": recordings / "hard_0.npz", "BARE": bare, "PAD": skinfile.shipped("mpr121")}
+    given = [files.get(a, a) for a in arguments]
     status, events, err = edge("run", "--model", exported / "model.onnx", *given)
     assert (status, events) == (2, [])
     assert err.startswith("edge-classify: ")

@@ -22,8 +22,7 @@ from edge.fake.clock import VirtualClock
 from edge.recording import load, save
 from edge.runtime.event_writer import Lines
 from edge.touch.frame import Frame
-
-ROOT = Path(__file__).parents[3]
+from tests.conftest import ROOT
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):

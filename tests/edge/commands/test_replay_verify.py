@@ -3,15 +3,13 @@
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from edge.cli import main
 from edge.commands.replay import Summary
-
-ROOT = Path(__file__).parents[3]
+from tests.conftest import ROOT, python
 
 
 @pytest.fixture
@@ -48,14 +46,8 @@ def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_pa
     assert "skin.npz: has no joint angles" in said[2]
 
 
-def test_a_recording_without_contact_says_so(replay, make_touch, tmp_path):
-    from dataclasses import replace
-
-    from edge.recording import save
-
-    quiet = make_touch()
-    save(tmp_path / "quiet.npz", replace(quiet, frames=np.zeros_like(quiet.frames)))
-    status, events, err = replay(tmp_path / "quiet.npz", "--summary")
+def test_a_recording_without_contact_says_so(replay, quiet):
+    status, events, err = replay(quiet, "--summary")
     assert (status, [e["event"] for e in events]) == (0, ["no_contact"])
     assert "0 of 1 right" in err
 
@@ -136,10 +128,9 @@ def test_a_pipe_that_is_closed_is_quiet(exported, recordings):
 
 
 def test_output_without_room_is_one_sentence(exported, recordings):
-    model, touch = str(exported / "model.onnx"), str(recordings / "hard_0.npz")
-    command = [sys.executable, "-m", "edge", "replay", "--model", model, touch]
+    given = ("--model", exported / "model.onnx", recordings / "hard_0.npz")
     with open("/dev/full", "w") as full:
-        run = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+        run = python("-m", "edge", "replay", *given, stdout=full)
     assert run.returncode == 2
     assert run.stderr.startswith("edge-classify: standard output cannot be written: No space left")
     assert run.stderr.count("\n") == 1

@@ -1,11 +1,10 @@
 """An unmodified smbus2 end to end: open, I2C_TIMEOUT, I2C_RDWR and errno over a C shim."""
 
-import subprocess
-import sys
 import textwrap
 
 import pytest
 
+from tests.conftest import python
 from tests.edge.i2c.shim import build as shim
 
 pytestmark = pytest.mark.skipif(
@@ -18,15 +17,10 @@ def library(tmp_path_factory):
     return shim.build(tmp_path_factory.mktemp("shim"))
 
 
-def python(library, code, **environment):
+def run(library, code, **environment):
     """Run code in a Python of its own, over the shim; returns the finished process."""
-    return subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        env=shim.environment(library, **environment),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    environment = shim.environment(library, **environment)
+    return python("-c", textwrap.dedent(code), env=environment, timeout=60)
 
 
 WHOLE_SKIN = """
@@ -48,7 +42,7 @@ WHOLE_SKIN = """
 
 def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
     log = tmp_path / "log"
-    done = python(library, WHOLE_SKIN, I2CDEV_LOG=str(log))
+    done = run(library, WHOLE_SKIN, I2CDEV_LOG=str(log))
     assert (done.stdout, done.stderr) == ("384 0\n", "")
     # 20 ms are two of the adapter's units of 10 ms, on each of the three buses.
     assert log.read_text() == "timeout 2\n" * 3
@@ -56,7 +50,7 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
 
 def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
     """Its buffer still holds the former reading: old values must not pass for new ones."""
-    done = python(
+    done = run(
         library,
         """
         import os
@@ -73,7 +67,7 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
 
 
 def test_a_bus_that_another_program_uses_is_refused(library):
-    done = python(library, "from edge.i2c.bus import LinuxBus; LinuxBus(1)", I2CDEV_LOCKED="1")
+    done = run(library, "from edge.i2c.bus import LinuxBus; LinuxBus(1)", I2CDEV_LOCKED="1")
     assert done.stderr.splitlines()[-1] == (
         "edge.i2c.bus.BusBusy: /dev/i2c-1: another program is using the bus; end it first (EBUSY)"
     )
@@ -83,14 +77,14 @@ def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_name
     sentences = """
         print(sorted({s.error.partition(": ")[2] for s in skin.status() if s.error}))
     """
-    done = python(library, WHOLE_SKIN + sentences, I2CDEV_OWNED="0x2E")
+    done = run(library, WHOLE_SKIN + sentences, I2CDEV_OWNED="0x2E")
     valid, sentences = done.stdout.splitlines()
     assert valid == f"{384 - 8 * 12} 0"
     assert sentences == "['a driver of the kernel owns the address; unbind it (EBUSY)']"
 
 
 def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
-    done = python(
+    done = run(
         library,
         """
         from edge.i2c.bus import BusGone, LinuxBus, fetch

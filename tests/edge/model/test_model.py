@@ -16,11 +16,6 @@ from edge.model.model import Model
 
 
 @pytest.fixture(scope="module")
-def model(exported):
-    return Model(exported / "model.onnx")
-
-
-@pytest.fixture(scope="module")
 def golden(exported):
     return np.load(exported / "golden.npz")
 

@@ -62,14 +62,6 @@ def test_garbage_collection_leaves_out_the_objects_made_before_the_loop():
     assert (frozen, gc.get_freeze_count()) == ([True, True], 0)
 
 
-@pytest.fixture
-def interruptible():
-    """A shell that runs the tests in the background lets them ignore SIGINT."""
-    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield signal.default_int_handler
-    signal.signal(signal.SIGINT, inherited)
-
-
 def test_a_signal_asks_once_and_is_itself_again_afterwards(interruptible):
     with stop_on(signal.SIGINT) as stop:
         signal.raise_signal(signal.SIGINT)
